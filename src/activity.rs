@@ -80,7 +80,7 @@ pub struct Halt {
 }
 
 impl Halt {
-    /// At rest, with the bridge open.
+    /// State of a motor at rest, with the bridge open.
     pub const OPEN: Self = Self { at: Millimetres::ZERO, still_ns: None };
     /// A motor that was driven just now.
     pub const BRAKES: Self = Self { at: Millimetres::ZERO, still_ns: Some(0) };

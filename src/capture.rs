@@ -14,9 +14,9 @@
 //! | 4 | rows, columns, why it ended, 0 |
 //! | 8 | a number for the names and the order of the parameters |
 //! | 12 | frames, bits of all frames, digest after the last one, check sum of the bits, missed frames before the first one |
-//! | 32 | numbers of the requests taken up before, as in [`Taken`]; 0 |
+//! | 32 | numbers of the requests taken up before, as in [`AcknowledgedRequests`]; 0 |
 //! | 36 | from frame to frame, ns |
-//! | 40 | what is known of the motor's winding, as [`Winding`](crate::control::Winding) tells it |
+//! | 40 | state of the motor's winding model, as [`Winding`](crate::control::Winding) stores it |
 //! | 68 | the parameters, 4 bytes each; the gains, 2 bytes each, of an odd number another two |
 //! | then | the frames, without a gap |
 //!
@@ -34,7 +34,7 @@ use crate::command::Command;
 use crate::control::WINDING_WORDS;
 use crate::frame::{Frame, Sense};
 use crate::params::Params;
-use crate::pipeline::{Status, Taken};
+use crate::pipeline::{AcknowledgedRequests, Status};
 use crate::pressure::Gains;
 use crate::units::Duty;
 use write::{WIDTH_MAX, mix};
@@ -45,7 +45,7 @@ pub const VERSION: u8 = 3;
 /// State of a capture. The numbers are stable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
-pub enum State {
+pub enum CaptureState {
     /// No capture was requested since reset, or it was cancelled.
     #[default]
     None = 0,
@@ -64,7 +64,7 @@ pub enum Ended {
     /// The capture did not end.
     #[default]
     No = 0,
-    /// Its memory is full.
+    /// The memory is full.
     Full = 1,
     /// The host stopped it.
     Asked = 2,
@@ -95,7 +95,7 @@ impl Ended {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CaptureStatus {
     /// State of the capture.
-    pub state: State,
+    pub state: CaptureState,
     /// Reason why the capture ended.
     pub ended: Ended,
     /// Number of captures begun since reset; wraps.
@@ -167,7 +167,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Last<ROWS, COLUMNS> {
     }
 }
 
-/// Low bits of what is coded beside the codes: chosen by what each does from frame to frame.
+/// Low bits of the values coded beside the codes, chosen by the change of each from frame to frame.
 pub mod width {
     /// Width of the frame's number.
     pub const SEQUENCE: u32 = 0;
@@ -201,7 +201,7 @@ pub struct Head<const ROWS: usize, const COLUMNS: usize> {
     /// Number of frames missed since reset, before the first one.
     pub missed_frames: u32,
     /// Requests acknowledged before.
-    pub taken: Taken,
+    pub taken: AcknowledgedRequests,
     /// Thermal state of the motor's winding, see [`Winding`](crate::control::Winding).
     pub winding: [u32; WINDING_WORDS],
     /// Time from frame to frame, ns.

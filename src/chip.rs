@@ -106,7 +106,7 @@ impl Chip {
         let full = reference.wrapping_mul(FACTORY_MV).wrapping_mul(FRAMES);
         let supply_mv = full.checked_div(self.reference_sum).and_then(|mv| u16::try_from(mv).ok());
         self.analogue_mv = supply_mv.filter(|mv| BELIEVED_MV.contains(mv)).unwrap_or(0);
-        // The sensor's mean code, were the supply 3.3 V.
+        // Mean code of the sensor, scaled to a supply of 3.3 V.
         let code = self.sensor_sum.wrapping_mul(self.reference).checked_div(self.reference_sum >> MEAN_BITS);
         self.temperature = match (code, self.line) {
             (Some(code), Some((cold, kelvin_q16))) if self.analogue_mv != 0 => {

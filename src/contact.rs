@@ -14,17 +14,19 @@ pub use fit::Fit;
 
 use crate::config::Config;
 use crate::frame::Shape;
-use crate::pressure::Picture;
+use crate::pressure::TactileImage;
 use crate::units::{Millimetres, Newtons};
 use equations::{Bits, Misfit};
 use fixed::types::I8F24;
-use prediction::Scale;
+use prediction::PeakScale;
 
 /// Parts of the fit, for other methods that are compared with it. They may change at any time.
 #[doc(hidden)]
 pub mod parts {
     pub use super::equations::{Comparison, Equations, Misfit};
-    pub use super::prediction::{CENTRE_BITS, Guess, PEAK_BITS, Prediction, SLOPE_BITS, Scale, View, interval};
+    pub use super::prediction::{
+        CENTRE_BITS, Guess, PEAK_BITS, PeakScale, Prediction, SLOPE_BITS, ScaledImage, interval,
+    };
     pub use super::{TAXELS_MIN, confidence, covers};
     pub use crate::arith::{Divisor, between, clamp_to, high, root};
     pub use crate::config::array::{ONE, PLACE_BITS, SQUARE_BITS};
@@ -64,7 +66,7 @@ pub struct Contact {
 /// Amount of work per frame for the contact. The numbers are stable: hosts store them.
 ///
 /// A refinement of the model takes each row of the array once. The fit level limits the rows in a frame. A refinement
-/// that is spread over frames begins in a frame of its own. The periods below are for ten rows; an array with fewer
+/// that is spread over frames begins in a separate frame. The periods below are for ten rows; an array with fewer
 /// rows than the level allows has all of them in every frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
@@ -136,7 +138,7 @@ const fn sum_bits(side: usize) -> u32 {
 /// The force is the plain sum of the taxels times their area: right to 0.1 % for a contact that the array covers. It
 /// is never below zero. The centre is that of the pressure, zero without a force.
 pub fn from_sums<const ROWS: usize, const COLUMNS: usize>(
-    picture: &Picture<ROWS, COLUMNS>,
+    picture: &TactileImage<ROWS, COLUMNS>,
     config: &Config,
 ) -> Contact {
     let force = picture.force(config);
@@ -148,7 +150,7 @@ pub fn from_sums<const ROWS: usize, const COLUMNS: usize>(
 fn contact_of_force<const ROWS: usize, const COLUMNS: usize>(
     force: Newtons,
     centre: [Millimetres; 2],
-    picture: &Picture<ROWS, COLUMNS>,
+    picture: &TactileImage<ROWS, COLUMNS>,
     config: &Config,
 ) -> Contact {
     let indentation = config.tip.indentation(force);
@@ -169,7 +171,7 @@ fn contact_of_force<const ROWS: usize, const COLUMNS: usize>(
 /// Centre of pressure as moments over sum; the resolution is 1/2048 of half a pitch.
 #[inline(always)]
 fn centre_of_pressure<const ROWS: usize, const COLUMNS: usize>(
-    picture: &Picture<ROWS, COLUMNS>,
+    picture: &TactileImage<ROWS, COLUMNS>,
     config: &Config,
 ) -> [Millimetres; 2] {
     // All are shifted alike. With ten rows and columns the sum keeps 16 bits and the moment, at most nine times as
@@ -207,7 +209,7 @@ fn overhang<const ROWS: usize, const COLUMNS: usize>(contact: &Contact, config: 
 /// Returns true if the whole contact lies on good taxels of the array.
 pub fn covers<const ROWS: usize, const COLUMNS: usize>(
     contact: &Contact,
-    picture: &Picture<ROWS, COLUMNS>,
+    picture: &TactileImage<ROWS, COLUMNS>,
     config: &Config,
 ) -> bool {
     overhang::<ROWS, COLUMNS>(contact, config) <= 0 && hidden(contact, picture, config).is_none()
@@ -220,7 +222,7 @@ pub fn covers<const ROWS: usize, const COLUMNS: usize>(
 #[inline(never)]
 fn hidden<const ROWS: usize, const COLUMNS: usize>(
     contact: &Contact,
-    picture: &Picture<ROWS, COLUMNS>,
+    picture: &TactileImage<ROWS, COLUMNS>,
     config: &Config,
 ) -> Option<u32> {
     if picture.bad.iter().all(|bad| *bad == 0) {
@@ -256,7 +258,7 @@ fn hidden<const ROWS: usize, const COLUMNS: usize>(
 
 /// Confidence: 255 at no residual, falling to 0 at `RESIDUAL_MAX`. The part of the residual that the converter's
 /// resolution explains is ignored.
-pub fn confidence<const ROWS: usize, const COLUMNS: usize>(misfit: &Misfit, scale: &Scale) -> u8 {
+pub fn confidence<const ROWS: usize, const COLUMNS: usize>(misfit: &Misfit, scale: &PeakScale) -> u8 {
     let mean = |squares: i32, taxels: i32| squares.max(0).unsigned_abs() / taxels.max(1).unsigned_abs();
     // Squares count fewer bits than a share's square.
     let drop = Bits::<ROWS, COLUMNS>::ALL;

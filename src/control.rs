@@ -70,7 +70,7 @@ pub struct SpeedLoop {
 }
 
 impl SpeedLoop {
-    /// At rest.
+    /// Speed loop at rest.
     pub const fn new() -> Self {
         Self { observer: Observer::new(), drive: Drive::new(), schedule: GainSchedule::QUICK, winding: Winding::new() }
     }
@@ -82,7 +82,7 @@ impl SpeedLoop {
         self.drive.duty(supply_mv, config)
     }
 
-    /// The duty for a voltage (g V, Q8 mm/s^2) that no law asks for.
+    /// Duty for a voltage (g V, Q8 mm/s^2) that is set without the control law.
     pub fn push(&mut self, voltage: i32, supply_mv: u16, config: &Config, limits: &mut Limits) -> Duty {
         self.drive.allow(self.winding.share());
         self.drive.apply(voltage, self.back_emf(config), supply_mv, config, limits);

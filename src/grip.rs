@@ -4,7 +4,7 @@
 //! limit.
 //!
 //! A release is planned by geometry: its place of rest is the clearance behind the surface, whatever the array shows
-//! on the way. Noise, creep, temperature and hysteresis can look like a contact in the air; none of them moves that
+//! meanwhile. Noise, creep, temperature and hysteresis can look like a contact in the air; none of them moves that
 //! place. If the surface is not known from the front, because the touch was there before torque was, or if an object
 //! follows the tip, the place of rest moves back as long as each half millimetre lowers the force. A residue does not
 //! do that.
@@ -21,7 +21,7 @@ use fixed::types::I8F24;
 /// Largest depth in the object at which a tip still moves forward at full speed, as a multiple of its indentation: an
 /// object that yields moves with the tip.
 const DEEPER: i32 = 2;
-/// The same multiple on the way back: a force that is too high must not wait.
+/// The same multiple in a retreat: a force that is too high must not wait.
 const DEEPER_BACK: i32 = 5;
 /// Distance added to this depth, for a small indentation: 0.3 mm.
 const YIELDING: Millimetres = Millimetres::from_bits((1 << 24) * 3 / 10);

@@ -1,4 +1,4 @@
-//! The bus: DYNAMIXEL Protocol 2.0, device side, without input or output of its own.
+//! The bus: DYNAMIXEL Protocol 2.0, device side, independent of the port.
 //!
 //! ```text
 //! bytes -> receiver -> packet -> server -> table -> settings -> command, record, actions for the firmware
@@ -17,10 +17,10 @@
 //! | stored registers | written with torque off only; kept over a reset only once `save_parameters` was written |
 //! | value beyond another register's limit, parameters that contradict each other | limit error |
 //! | fault | torque enable and goal force go to 0; torque enable and goals above 0 are refused (result error) until the fault is cleared: `recover` does all that this takes in one write |
-//! | request that cannot be carried out as the loop stands | result error: a tare in a fault that is not cleared by then, a press that measures without torque or tare, a save or Factory Reset while the loop drives or tares. What comes in between shows in `tare_state`, `measure_state` and `saved_state`, also for those whom nothing is answered |
+//! | request that cannot be carried out in the present mode | result error: a tare in a fault that is not cleared by then, a press that measures without torque or tare, a save or Factory Reset while the loop drives or tares. A later failure shows in `tare_state`, `measure_state` and `saved_state`, also after a request without an answer |
 //! | bus watchdog | counts from the last good instruction packet for this device, broadcasts included; on a trip it reads -1, and until 0 is written to it goals are refused (range error, as X-series servos do) and torque enable is (result error) |
 //! | torque off | takes the goal back |
-//! | before the first tare | force and all that goes by it read 0 |
+//! | before the first tare | force and all values computed from it read 0 |
 //! | damaged packet | CRC error where it seems to be for this device, silence otherwise; nothing is done |
 //! | Sync Read, Bulk Read | answered after the status packet of the device before in the list is heard; silent where that one is |
 //! | broadcast Ping | answered after 14 byte times for each lower ID |

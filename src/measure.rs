@@ -133,7 +133,7 @@ impl Ended {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MeasureStatus {
     /// State of the motion.
-    pub state: State,
+    pub state: MeasureState,
     /// Task of the motion.
     pub task: Task,
     /// End of the motion.
@@ -147,7 +147,7 @@ pub struct MeasureStatus {
 /// State of a motion. The numbers are stable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
-pub enum State {
+pub enum MeasureState {
     /// No motion was requested since reset.
     #[default]
     None = 0,
@@ -162,19 +162,20 @@ pub enum State {
 impl MeasureStatus {
     /// Progress of a task that begins.
     pub const fn running(task: Task) -> Self {
-        Self { state: State::Running, task, ended: Ended::Complete, value: 0, progress: 0 }
+        Self { state: MeasureState::Running, task, ended: Ended::Complete, value: 0, progress: 0 }
     }
 
     /// Ends the motion if it is under way.
     pub fn end(&mut self, ended: Ended, value: i32) {
-        if self.state == State::Running {
+        if self.state == MeasureState::Running {
             *self = Self::over(self.task, ended, value);
         }
     }
 
     /// Progress of a task that has ended, or could not begin.
     pub const fn over(task: Task, ended: Ended, value: i32) -> Self {
-        let (state, progress) = if matches!(ended, Ended::Complete) { (State::Done, 100) } else { (State::Ended, 0) };
+        let (state, progress) =
+            if matches!(ended, Ended::Complete) { (MeasureState::Done, 100) } else { (MeasureState::Ended, 0) };
         Self { state, task, ended, value, progress }
     }
 }
@@ -201,7 +202,7 @@ fn millinewtons(force: Newtons) -> i32 {
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Row<'_, ROWS, COLUMNS> {
-    /// Returns if a row of the record begins with this part, and if one ends.
+    /// Returns two flags: a row of the record begins with this part, and a row ends with it.
     pub const fn ends(&self) -> [bool; 2] {
         match self {
             Self::Step(_, part) => [*part == 0, *part + 1 >= press::PARTS],

@@ -3,7 +3,7 @@
 pub mod budget;
 mod requests;
 
-pub use crate::status::{Bridge, Status, Taken, Taring};
+pub use crate::status::{AcknowledgedRequests, Bridge, Status, Taring};
 
 use crate::activity::{Activity, Halt};
 use crate::command::Command;
@@ -16,7 +16,7 @@ use crate::measure::strokes::{self, Kept};
 use crate::measure::{Row, press};
 use crate::pressure::{Array, Calibration};
 use crate::safety::guard::{Guard, Seen};
-use crate::safety::monitor::{self, Monitor, View};
+use crate::safety::monitor::{self, Monitor, MonitorInputs};
 use crate::state::{Fault, Limits, Mode};
 use crate::touch::{Felt, Touch};
 use crate::units::{Duty, Newtons};
@@ -46,7 +46,7 @@ pub struct Pipeline<const ROWS: usize, const COLUMNS: usize> {
     torque: bool,
     motion: SpeedLoop,
     touch: Touch,
-    warmth: TemperatureDrift,
+    temperature_drift: TemperatureDrift,
     monitor: Monitor,
     guard: Guard,
     activity: Activity,
@@ -69,7 +69,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             fit: Fit::default(),
             motion: SpeedLoop::new(),
             touch: Touch::default(),
-            warmth: TemperatureDrift::default(),
+            temperature_drift: TemperatureDrift::default(),
             monitor: Monitor::default(),
             guard: Guard::default(),
             activity: Activity::Off(Halt::OPEN),
@@ -91,7 +91,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         let mut limits = self.count_frames(frame.sequence);
         self.set_fit_level(command, sense, &mut limits);
         self.motion.observe(sense.encoder, &self.config);
-        self.warmth.observe(sense.chip, &self.config);
+        self.temperature_drift.observe(sense.chip, &self.config);
         self.monitor.watch_supply(sense, &self.config);
 
         // The tactile image and the contact in it. A broken array shows none: the contact is then the last one's, and
@@ -201,7 +201,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             return Some(fault);
         }
         let pressed = self.guard.presses_in();
-        let view = View { picture, contact, pressed, sense, motion: &self.motion, command };
+        let view = MonitorInputs { picture, contact, pressed, sense, motion: &self.motion, command };
         let fault = if drives { self.monitor.check(&view, &self.config) } else { None };
         fault.or(unsafe_motion).or_else(|| self.judge_bus(sense, command))
     }
@@ -229,7 +229,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         }
         if let Some(weight) = self.touch.learns(force, ROWS as u32, &self.config) {
             let share = self.array.follow_drift(weight);
-            self.warmth.zero(share);
+            self.temperature_drift.zero(share);
         }
     }
 
@@ -244,7 +244,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         command: &Command,
         limits: &mut Limits,
     ) -> Duty {
-        self.status.drift = self.warmth.force(command.goal, &self.config);
+        self.status.drift = self.temperature_drift.force(command.goal, &self.config);
         let applied = i64::from(self.status.duty.0) * i64::from(sense.supply_mv);
         let Self { activity, motion, touch, config, array, status, step, .. } = self;
         let (picture, supply_mv) = (array.picture(), sense.supply_mv);
@@ -254,7 +254,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
                 grip.reference(&goal, contact, touch, motion, config, limits)
             }
             Activity::Press(press) => {
-                let view = press::View {
+                let view = press::PressInputs {
                     sequence: status.sequence,
                     picture,
                     contact,
@@ -269,7 +269,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             Activity::Strokes(run) => {
                 // The sums of a broken array mean nothing.
                 let force = if sound { contact.force.max(picture.force(config)) } else { contact.force };
-                let view = strokes::View { encoder: sense.encoder, force, supply_mv, applied: (applied >> 13) as i32 };
+                let view =
+                    strokes::StrokeInputs { encoder: sense.encoder, force, supply_mv, applied: (applied >> 13) as i32 };
                 run.observe(&view, &mut status.measure, config);
                 let voltage = config.push(run.voltage_mv());
                 if !run.running() {
@@ -307,7 +308,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             (self.tared, status.tare) = (true, Taring::Done);
             *activity = Activity::Off(*halt);
         }
-        self.warmth.zero(1 << 16);
+        self.temperature_drift.zero(1 << 16);
     }
 
     #[inline(always)]
@@ -387,12 +388,12 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     /// Resets everything but the configuration and the taxels' gains: mode off, not tared, nothing measured. Requests
     /// with the numbers in `taken` count as acknowledged, and `missed_frames` as missed before. The winding's
     /// temperature is restored.
-    pub fn renew(&mut self, taken: Taken, missed_frames: u32, winding: Winding) {
+    pub fn renew(&mut self, taken: AcknowledgedRequests, missed_frames: u32, winding: Winding) {
         self.array.renew();
         self.budget = Budget::new();
         self.fit = Fit::default();
         self.motion = SpeedLoop { winding, ..SpeedLoop::new() };
-        (self.touch, self.warmth) = (Touch::default(), TemperatureDrift::default());
+        (self.touch, self.temperature_drift) = (Touch::default(), TemperatureDrift::default());
         (self.monitor, self.guard) = (Monitor::default(), Guard::default());
         self.activity = Activity::Off(Halt::OPEN);
         self.status = Status { taken, missed_frames, ..Status::default() };

@@ -13,7 +13,7 @@ mod picture;
 mod tare;
 
 pub use calibration::{Calibration, CalibrationError, Gains};
-pub use picture::Picture;
+pub use picture::TactileImage;
 
 use crate::config::Config;
 use crate::frame::{Frame, Shape};
@@ -35,7 +35,7 @@ pub const GAIN_MAX: u16 = (1 << 15) - 1;
 /// Calibration of every taxel, and the tactile image of the last frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Array<const ROWS: usize, const COLUMNS: usize> {
-    picture: Picture<ROWS, COLUMNS>,
+    picture: TactileImage<ROWS, COLUMNS>,
     /// Gains, the reading without contact, and the sag of the last frame.
     rows: [Row<COLUMNS>; ROWS],
     /// A bit for each column that is left out.
@@ -63,7 +63,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         const { Shape::<ROWS, COLUMNS>::CHECKED };
         let [gains, moments] = Calibration::<ROWS, COLUMNS>::NONE.weights[0];
         Self {
-            picture: Picture::EMPTY,
+            picture: TactileImage::EMPTY,
             rows: [Row { gains, moments, tare: [0; COLUMNS], boost: 1 << BOOST_BITS, largest: 0 }; ROWS],
             mask: [0; ROWS],
             tare_lines: [[0; 2]; ROWS],
@@ -76,7 +76,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
     }
 
     /// Tactile image of the last frame.
-    pub fn picture(&self) -> &Picture<ROWS, COLUMNS> {
+    pub fn picture(&self) -> &TactileImage<ROWS, COLUMNS> {
         &self.picture
     }
 
@@ -93,7 +93,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
 
     /// Reads a frame: every taxel, their sums, the peak and the flags. Any codes are accepted: a code that a sound
     /// array cannot show makes its taxel bad.
-    pub fn read(&mut self, frame: &Frame<ROWS, COLUMNS>, config: &Config) -> &Picture<ROWS, COLUMNS> {
+    pub fn read(&mut self, frame: &Frame<ROWS, COLUMNS>, config: &Config) -> &TactileImage<ROWS, COLUMNS> {
         // Without a bad taxel in the last frame none is bad again.
         let mut before = None;
         if self.picture.bad_count != 0 {
@@ -265,7 +265,7 @@ const fn larger_lane(pair: u32) -> u16 {
 fn sixteenths<const ROWS: usize, const COLUMNS: usize>(total: &Total) -> [i32; 3] {
     let sum_bits = const { GAIN_BITS - COARSER - sum_drop(ROWS, COLUMNS) };
     let rounded = |value: i32, bits: u32| (value >> (bits - CODE_BITS - 1)).wrapping_add(1) >> 1;
-    // Row n of ten was in the sum 10 - n times: 11 less twice that is its weight. It may wrap, what is made of it fits.
+    // Row n of ten was added 10 - n times; its weight is 11 less twice that. Sums may wrap; the final result fits.
     let moment_y = (total.first >> 2).wrapping_mul(ROWS as i32 + 1).wrapping_sub(total.running.wrapping_mul(2));
     [
         rounded(total.first, sum_bits),
@@ -290,7 +290,7 @@ fn bad_columns<const COLUMNS: usize>([codes, undriven]: [&[u16; COLUMNS]; 2], co
     each_pair::<COLUMNS>(|at| {
         let (code, undriven) = (codes_at(codes, at), codes_at(undriven, at));
         let net = lanes::sub(code, undriven);
-        // The sign of each lane tells whether its taxel is bad; those of the first place are shifted most.
+        // A lane is negative if its taxel is bad; the signs of the first place are shifted most.
         bad = bad >> 1 | (lanes::sub(net, dead) | lanes::sub(sound, code)) & SIGNS;
     });
     let half = pairs(COLUMNS);

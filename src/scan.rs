@@ -7,7 +7,7 @@ const NS: u64 = 1_000_000_000;
 
 /// Clocks, converters and frame time of a board.
 ///
-/// A board with two converters of 48 MHz and a timer of 150 MHz, which asks for 2,000 frames in a second:
+/// Example: a board with two converters of 48 MHz, a timer of 150 MHz, and 2,000 frames in a second:
 ///
 /// ```
 /// use fingertip::config::Shaped;
@@ -124,7 +124,7 @@ pub enum ScanError {
     Clock {
         /// The field of [`Clocks`].
         name: &'static str,
-        /// Its value.
+        /// Value of the field.
         value: u32,
         /// The least value allowed.
         min: u32,

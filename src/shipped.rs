@@ -36,7 +36,7 @@ pub const CLOCKS: Clocks = Clocks {
 };
 
 impl Config {
-    /// Of this array on this board.
+    /// Configuration of this array on this board.
     ///
     /// # Errors
     /// See [`crate::config::Shaped::new`].
@@ -49,8 +49,8 @@ impl Config {
 pub type Frame = crate::frame::Frame<ROWS, COLUMNS>;
 /// See [`crate::config::Shaped`].
 pub type Config = crate::config::Shaped<ROWS, COLUMNS>;
-/// See [`crate::pressure::Picture`].
-pub type Picture = crate::pressure::Picture<ROWS, COLUMNS>;
+/// See [`crate::pressure::TactileImage`].
+pub type TactileImage = crate::pressure::TactileImage<ROWS, COLUMNS>;
 /// See [`crate::pressure::Gains`].
 pub type Gains = crate::pressure::Gains<ROWS, COLUMNS>;
 /// See [`crate::pressure::Calibration`].

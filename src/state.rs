@@ -127,7 +127,7 @@ impl Limits {
     pub const CURRENT: u16 = 1 << 1;
     /// The speed limit is reached.
     pub const SPEED: u16 = 1 << 2;
-    /// The goal is above the largest force allowed or below the least that is a contact, and was moved to it.
+    /// The goal is above the largest allowed force or below the smallest contact force, and was clamped to it.
     pub const GOAL: u16 = 1 << 3;
     /// The travel's end is reached without contact.
     pub const TRAVEL: u16 = 1 << 4;
@@ -139,9 +139,9 @@ impl Limits {
     pub const FRAME_MISSED: u16 = 1 << 7;
     /// The slew limit delays a change of the voltage.
     pub const SLEW: u16 = 1 << 8;
-    /// There is no time for the requested fit level; see [`crate::pipeline::budget`].
+    /// The requested fit level takes too long; see [`crate::pipeline::budget`].
     pub const FIT_LEVEL: u16 = 1 << 9;
-    /// Something touched the tip during the last tare: what the array shows is less by that, and torque is refused.
+    /// Something touched the tip during the last tare: the readings are too low by that force, and torque is refused.
     pub const TARED_TOUCHING: u16 = 1 << 10;
     /// The force is known only from below (saturated, cut off, or without confidence): the travel since the touch
     /// bounds it from above.

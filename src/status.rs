@@ -8,7 +8,7 @@ use crate::units::{Celsius, Duty, Millimetres, MillimetresPerSecond, Newtons};
 /// Numbers of the requests that the loop acknowledged last. A number of the command that differs still waits, for a
 /// frame or for torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Taken {
+pub struct AcknowledgedRequests {
     /// See [`crate::command::Command::tare_request`].
     pub tare: u8,
     /// See [`crate::command::Command::clear_request`].
@@ -70,17 +70,17 @@ pub struct Status {
     /// State of the tare.
     pub tare: Taring,
     /// Acknowledged requests.
-    pub taken: Taken,
+    pub taken: AcknowledgedRequests,
 }
 
 /// A state of the H-bridge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bridge {
-    /// Its driver sleeps: it reported a fault.
+    /// The driver sleeps after it has reported a fault.
     Asleep,
     /// Both outputs in high impedance: the motor coasts.
     Open,
-    /// The motor is shorted: it resists what turns it.
+    /// The motor is shorted, which brakes it.
     Brakes,
     /// Slow decay with this duty.
     Driven(Duty),
@@ -103,7 +103,7 @@ impl Status {
     }
 }
 
-impl Taken {
+impl AcknowledgedRequests {
     /// Packs the numbers into a word, whose upper byte is 0.
     pub(crate) fn word(self) -> u32 {
         let Self { tare, clear, measure } = self;
@@ -120,7 +120,7 @@ impl Taken {
 impl Status {
     /// Passes every field on as digest fields, with the duty that the step returned.
     pub fn words(&self, duty: Duty, mut each: impl FnMut(u32)) {
-        // Taken apart field by field, so that a field cannot be forgotten.
+        // Destructured field by field, so that a field cannot be forgotten.
         let Self {
             sequence,
             missed_frames,

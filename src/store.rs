@@ -14,7 +14,7 @@
 //!
 //! [`Journal`] has the order of writing and erasing: the sector that holds the newest whole record is never erased. So
 //! a loss of power leaves the old record or the new one. A record that was cut short fails the CRC: the one before it
-//! counts, and [`Loaded::sound`] says that something was lost.
+//! counts, and [`Loaded::sound`] is false.
 
 mod journal;
 
@@ -201,7 +201,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Record<ROWS, COLUMNS> {
 /// Remark about the stored values at a start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Remark {
-    /// There is no whole record, but the flash is not blank: the defaults are used. It is a fault.
+    /// No whole record in a flash that is not blank: the defaults are used. Counts as a fault.
     NoneWhole,
     /// Bytes after the newest whole record are damaged, most likely cut short: the values before them are used. It is
     /// a fault.
@@ -285,7 +285,7 @@ pub fn settle<T>(
     None
 }
 
-/// Sets the parameters that the error names back to their defaults, and all parameters if that is no change.
+/// Resets the parameters that the error names to their defaults, or all parameters if that changes nothing.
 #[inline(never)]
 fn give_up(params: &mut Params, error: ConfigError) {
     let names = match error {

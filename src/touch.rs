@@ -11,8 +11,8 @@
 //! | clear | a release has backed off; what the array still reads is a residue of the contact | a larger reading: held; the next approach: none |
 //!
 //! A force cannot fall by a quarter within a frame: the object would have to leave at metres in a second. Such a step
-//! is withheld: the loop continues with the force before it, and does not press harder. The guard keeps a record of its
-//! own, from raw readings, on purpose.
+//! is withheld: the loop continues with the force before it, and does not press harder. The guard deliberately
+//! keeps a separate record, from raw readings.
 
 use crate::config::Config;
 use crate::contact::Contact;
@@ -20,7 +20,7 @@ use crate::units::{Millimetres, Newtons};
 
 /// A force that falls by more than this part of itself, and `contact_on_mn`, in one frame did not fall at the tip: 1/4.
 const STEP_BITS: u32 = 2;
-/// The longest frame in which no object moves that far, ns.
+/// Longest frame time in which no object moves that far, ns.
 pub const FRAME_NS_MAX: u32 = 500_000;
 /// Time for which a force stays away before the touch is doubtful, or stays before it pushes a tip at rest, ns.
 const DOUBTFUL_NS: u32 = 3_000_000;

@@ -17,7 +17,7 @@ macro_rules! quantities {
             /// Zero.
             pub const ZERO: Self = Self(<$inner>::ZERO);
 
-            /// From the raw integer: the value in units of the last place.
+            /// Converts from the raw integer, the value in units of the last place.
             pub const fn from_bits(bits: i32) -> Self {
                 Self(<$inner>::from_bits(bits))
             }

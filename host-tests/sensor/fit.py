@@ -1,4 +1,4 @@
-"""Fits what the firmware knows of a real sensor to recordings: characteristic or creep (`fit`), gains (`gains`).
+"""Fits the firmware's model of a real sensor to recordings: characteristic or creep (`fit`), gains (`gains`).
 
 `cargo xtask sensor` runs this script. docs/sensor.md describes the recordings, the methods and the results.
 """
@@ -208,7 +208,7 @@ def holds(table):
     weight, time = (table.numbers(name, low=0) for name in HOLDS[1:3])
     g, runs, starts = table.numbers(HOLDS[3]), table.columns["run"], [0]
     for row in range(1, len(runs)):
-        # The time starts again where the same weight is put down again.
+        # The time restarts when the same weight is put down again.
         if (runs[row], weight[row]) != (runs[row - 1], weight[row - 1]) or time[row] <= time[starts[-1]]:
             starts.append(row)
         else:
@@ -278,7 +278,7 @@ def fit_creep(table, other):
     forms = [try_creep(form, found, parts) for form in CREEPS]
     lags = [row for row in forms if row["form"] == "lag" and row["supported"] and row["rates"][0] > 0]
     best = min((row["unseen_rms_percent"] for row in lags), default=0)
-    # Time constants within 5 % of the best are not told apart: the shortest claims least beyond the recording.
+    # Time constants within 5 % of the best are indistinguishable: the shortest extrapolates least beyond the recording.
     chosen = next((row for row in lags if row["unseen_rms_percent"] <= 1.05 * best), forms[0])
     form, rate, judged = CREEPS[forms.index(chosen)], chosen["rates"], None
     if other:
@@ -436,13 +436,13 @@ def short(value):
 
 
 def run(options):
-    """Fits, and returns the answer and what is to be written to which file."""
+    """Fits; returns the answer, and the text of each output file."""
     table = Table(options.fit)
     other = Table(options.judge) if options.judge else None
     if options.command == "gains":
         answer = fit_gains(table, other)
         return answer, {options.json: json.dumps(answer, indent=2) + "\n", options.parameters: parameters(answer)}
-    # The columns say what was recorded.
+    # The columns identify the kind of the recording.
     creep = len({*HOLDS} & {*table.header}) > len({*CYCLES} & {*table.header})
     found = (fit_creep if creep else fit_characteristic)(table, other)
     answer = {"fitted": options.fit, "judged_on": options.judge, **found}

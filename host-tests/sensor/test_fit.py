@@ -1,4 +1,4 @@
-"""Recordings with a known truth: the fit finds it, claims no more than they hold, and refuses what it cannot use."""
+"""Recordings with a known truth: the fit finds it, with honest uncertainties, and refuses unusable recordings."""
 
 import contextlib
 import io
@@ -26,7 +26,7 @@ def pressed(a=40.0, c=0.0, noise=0.1, end=np.inf, seed=1):
 
 
 def held(runs, rate=0.07, seed=1):
-    """Twelve weights and none, each held for 15 s by each run: the creep has a time constant of 10 s."""
+    """Recording of 0 to 12 weights, each held for 15 s in each run; the creep has a time constant of 10 s."""
     random, rows = np.random.default_rng(seed), []
     for run in runs:
         for kg in range(13):
@@ -55,7 +55,7 @@ def array(spread=0.2, noise_n=0.005, presses=24, seed=2):
 
 class Fit(unittest.TestCase):
     def run_script(self, command, text, judge=None):
-        """Returns the exit code, the answer as in the JSON file or None, and what was printed."""
+        """Returns the exit code, the answer of the JSON file or None, and the printed output."""
         with tempfile.TemporaryDirectory() as folder:
             paths = [Path(folder) / name for name in ("fit.csv", "judge.csv", "out.json", "array.toml")]
             paths[0].write_bytes(text if isinstance(text, bytes) else text.encode())

@@ -119,7 +119,7 @@ impl Buffer {
     }
 }
 
-/// Both tables.
+/// Both tables as Markdown.
 pub fn markdown() -> String {
     let column = |feedback_pf: f64, input_pf: f64, noise_gain| Column {
         amplifier: OPA4354,

@@ -127,7 +127,7 @@ pub fn readings(tip: &Tip) -> Vec<(Millimetres, Newtons)> {
 pub struct Modulus {
     /// The modulus.
     pub kpa: f64,
-    /// Its standard uncertainty.
+    /// Standard uncertainty of the modulus.
     pub sigma_kpa: f64,
 }
 

@@ -7,7 +7,7 @@
 use core::f64::consts::{PI, TAU};
 use fastrand::Rng;
 use fingertip::params::Params;
-use fingertip::shipped::{COLUMNS, Config, Picture, ROWS};
+use fingertip::shipped::{COLUMNS, Config, ROWS, TactileImage};
 use sim::mechanics::pressures::Cell;
 use sim::setup::Setup;
 
@@ -32,23 +32,23 @@ pub enum Object {
     Plane,
     /// A plane that ends at a straight edge.
     Edge {
-        /// From the contact's centre to the edge; negative where the centre hangs over.
+        /// Distance from the contact's centre to the edge; negative if the centre is beyond the edge.
         offset_mm: f64,
         /// Direction from the centre to the edge.
         angle_rad: f64,
     },
-    /// A plane under two tips; each taxel feels the deeper one.
+    /// A plane under two tips; each taxel has the pressure of the deeper one.
     Two {
-        /// Indentation of the second.
+        /// Indentation of the second tip.
         d_mm: f64,
-        /// Centre of the second from the first, along the columns.
+        /// Offset of the second tip from the first, along the columns.
         dx_mm: f64,
-        /// Centre of the second from the first, along the rows.
+        /// Offset of the second tip from the first, along the rows.
         dy_mm: f64,
     },
     /// A plane on an array that is bent to a cylinder about an axis under its middle.
     Bent {
-        /// Radius of the bend; negative where the array's sides rise towards the object.
+        /// Radius of the bend; negative if the array's sides rise towards the object.
         radius_mm: f64,
         /// Direction across the axis.
         angle_rad: f64,
@@ -62,9 +62,9 @@ pub struct Scene {
     pub pitch_mm: f64,
     /// Indentation.
     pub d_mm: f64,
-    /// Centre from the array's middle, along the columns.
+    /// Offset of the contact's centre from the array's middle, along the columns.
     pub x_mm: f64,
-    /// Centre from the array's middle, along the rows.
+    /// Offset of the contact's centre from the array's middle, along the rows.
     pub y_mm: f64,
     /// Object that the tip presses against.
     pub object: Object,
@@ -135,7 +135,7 @@ impl Scene {
     /// The core's constants for this array.
     ///
     /// # Panics
-    /// On a pitch outside the parameters' range.
+    /// If the pitch is outside the parameters' range.
     pub fn config(&self) -> Config {
         let pitch_um = (self.pitch_mm * 1e3).round() as i32;
         Config::shipped(&Params { pitch_um, ..Params::DEFAULT }).expect("the pitch is in range")
@@ -260,9 +260,9 @@ impl Reading {
         bad
     }
 
-    /// The picture of pressures on the taxels that are not bad, and how many of these see the contact: those with
-    /// pressure before noise.
-    pub fn picture(&self, pressures: &Pressures, bad: [u32; ROWS], rng: &mut Rng) -> (Picture, usize) {
+    /// Tactile image of the pressures, without the bad taxels; and number of the other taxels that are in contact, with
+    /// a pressure above 0 before noise.
+    pub fn picture(&self, pressures: &Pressures, bad: [u32; ROWS], rng: &mut Rng) -> (TactileImage, usize) {
         let peak = pressures.iter().flatten().fold(0.0, |peak: f64, kpa| peak.max(*kpa));
         let mut seen = 0;
         let mut taxels = [[0; COLUMNS]; ROWS];
@@ -287,9 +287,9 @@ impl Reading {
     }
 }
 
-/// A picture of these taxels with its sums, as the pipeline makes it; bad taxels read 0.
-pub fn picture(taxels: &[[i32; COLUMNS]; ROWS], bad: [u32; ROWS]) -> Picture {
-    let mut picture = Picture { taxels: *taxels, bad, ..Picture::EMPTY };
+/// Tactile image of the taxels with its sums, as the pipeline computes it; bad taxels read 0.
+pub fn picture(taxels: &[[i32; COLUMNS]; ROWS], bad: [u32; ROWS]) -> TactileImage {
+    let mut picture = TactileImage { taxels: *taxels, bad, ..TactileImage::EMPTY };
     for (row, line) in picture.taxels.iter_mut().enumerate() {
         for (column, taxel) in line.iter_mut().enumerate() {
             if bad[row] >> column & 1 != 0 {

@@ -7,7 +7,7 @@ use crate::fit_cases::{Noise, PITCHES_MM, Pressures, Reading, Scene, Steps};
 use crate::page::Page;
 use fastrand::Rng;
 use fingertip::contact::{self, CONFIDENCE_LEAST, Contact, FitLevel};
-use fingertip::shipped::{Config, Fit, Picture};
+use fingertip::shipped::{Config, Fit, TactileImage};
 use images::single::{self, Refined};
 use std::fmt::Write as _;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -30,7 +30,7 @@ pub const EARLIER: [usize; 5] = [6, 12, 24, 36, 48];
 /// Pictures of one kind.
 #[derive(Clone, Copy, Debug)]
 pub struct Series {
-    /// As the tables call it.
+    /// Name in the tables.
     pub name: &'static str,
     /// Draws a scene.
     pub scene: fn(&mut Rng) -> Scene,
@@ -77,7 +77,7 @@ pub struct Case {
     /// Pressures on the taxels.
     pub pressures: Pressures,
     /// Tactile image of it.
-    pub picture: Picture,
+    pub picture: TactileImage,
     /// Share of the seen force that an edge takes; 0 without one.
     pub cut: f64,
     /// Draws that were left out before this one because too few taxels see the contact.
@@ -126,10 +126,10 @@ impl Default for Configs {
 }
 
 impl Configs {
-    /// Those of a scene's array.
+    /// Configuration for a scene's array.
     ///
     /// # Panics
-    /// On a pitch that is not one of [`PITCHES_MM`].
+    /// If the pitch is not one of [`PITCHES_MM`].
     pub fn of(&self, scene: &Scene) -> &Config {
         let found = self.0.iter().find(|(pitch_mm, _)| *pitch_mm == scene.pitch_mm);
         &found.expect("one of the arrays' pitches").1
@@ -225,7 +225,7 @@ pub fn pressed(number: usize, um_per_frame: f64, fit_level: FitLevel, configs: &
     worst
 }
 
-/// Judges `cases` cases of a series on all threads, with this fit level of [`Fit`]; `progress` hears how many are done.
+/// Judges `cases` cases of a series on all threads, with this fit level of [`Fit`]. `progress` gets the number done.
 pub fn judge(series: &Series, cases: usize, fit_level: FitLevel, progress: &(impl Fn(usize) + Sync)) -> Judged {
     let configs = Configs::default();
     let done = AtomicUsize::new(0);

@@ -54,10 +54,9 @@ pub struct Outcome {
     pub name: String,
     /// End state.
     pub cycle: Cycle,
-    /// Inputs that were taken one by one.
+    /// Number of inputs that were applied one by one.
     pub taken: u64,
-    /// The name of each output, its swing within the cycle and the swing that is documented, in units of the last
-    /// place.
+    /// Name, swing within the cycle and documented swing of each output, in units of the last place.
     pub swings: Vec<(&'static str, i64, i64)>,
 }
 
@@ -102,7 +101,7 @@ impl<S: Clone + PartialEq + 'static> Machine<S> {
     /// where the cycle says.
     ///
     /// # Panics
-    /// There is no cycle within `most` steps, or the steps end elsewhere; a machine that overflows panics by itself.
+    /// If there is no cycle within `most` steps, or the single steps end in another state. An overflow also panics.
     pub fn run(&self, most: u64, whole: bool) -> Outcome {
         let found = cycle(&self.start, most, &self.step);
         let (cycle, begin) = found.unwrap_or_else(|| panic!("{}: no cycle within {most} steps", self.name));
@@ -151,11 +150,11 @@ fn frame(codes: u16) -> Frame {
     frame
 }
 
-/// Holds a goal against frames with the given codes on 16 taxels, with an encoder that does not move, until nothing in
-/// the pipeline changes from period to period but the frames' number.
+/// Holds a goal with constant frames, the given codes on 16 taxels and a constant encoder count, until only the frame
+/// number changes in the pipeline from period to period.
 ///
 /// # Panics
-/// Something still changes after `most` steps.
+/// If the state still changes after `most` steps.
 pub fn hold(name: &str, torque: bool, goal_mn: i32, codes: u16, most: u64) -> (Outcome, Status) {
     let mut pipeline = Pipeline::new(&Config::shipped(&cool()).expect("the defaults are allowed"));
     let sense = Sense { supply_mv: 6_000, ..Sense::default() };

@@ -43,11 +43,11 @@ const UNITS: [(&str, f64, &str); 9] = [
 /// An item of the file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Item {
-    /// Of its first byte.
+    /// Address of its first byte.
     pub address: u16,
     /// Number of bytes: 1, 2 or 4.
     pub bytes: u16,
-    /// As a driver asks for it.
+    /// Name by which a driver requests it.
     pub name: String,
     /// Value and unit of one step; `None` for a plain number.
     pub unit: Option<(f64, &'static str)>,

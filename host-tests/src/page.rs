@@ -5,11 +5,11 @@ use fingertip::store::words;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// A page, and what it calls the tables that stand in it between two lines.
+/// A page with generated tables between two marker lines.
 pub struct Page {
-    /// Its path from the repository's root.
+    /// Path of the page from the repository's root.
     pub name: &'static str,
-    /// Name of the tables in the lines around them.
+    /// Name of the tables in the marker lines.
     pub tables: &'static str,
     /// The command that writes them.
     pub command: &'static str,
@@ -19,7 +19,7 @@ impl Page {
     /// The page as it is, and with its tables replaced.
     ///
     /// # Errors
-    /// It cannot be read, or lacks the lines around its tables.
+    /// The page cannot be read, or lacks the marker lines.
     pub fn renewed(&self, tables: &str) -> Result<(String, String), String> {
         let old = fs::read_to_string(self.path()).map_err(|error| format!("{}: {error}", self.name))?;
         let new = self.replaced(&old, tables);

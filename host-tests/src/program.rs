@@ -24,7 +24,7 @@ pub fn ended(result: Result<(), String>) -> ExitCode {
 pub struct Progress(Option<Mutex<Instant>>);
 
 impl Progress {
-    /// Nothing is shown yet.
+    /// Progress that shows nothing yet.
     pub fn begin() -> Self {
         Self(io::stderr().is_terminal().then(|| Mutex::new(Instant::now())))
     }

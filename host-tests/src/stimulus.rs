@@ -16,7 +16,7 @@ use sim::native::bench::Bench;
 
 /// Frames in the recording.
 pub const RECORDS: usize = 10_000;
-/// From here on, a burst of broken records comes every [`BURST_EVERY`] frames.
+/// First frame from which a burst of broken records comes every [`BURST_EVERY`] frames.
 const BROKEN_FROM: usize = 6_000;
 const BURST_EVERY: usize = 250;
 const BURST: usize = 80;

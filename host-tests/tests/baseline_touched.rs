@@ -1,5 +1,5 @@
-//! An object that comes to a released tip, moved by another finger for example: the baseline does not learn it, so the
-//! next press does not press harder by it.
+//! An object that touches a released tip, moved by another finger for example: the baseline must not learn its force,
+//! as the next press would be too hard by that force.
 
 use fastrand::Rng;
 use fingertip::command::Command;
@@ -19,9 +19,9 @@ use sim::plant::Taxel;
 use sim::scene::{Scene, read};
 use sim::setup::Setup;
 
-/// A press of 1 N, released; some time after that the object comes to the tip, this deep, for 5 s; then it is gone, and
-/// the next press has 1 N for its goal. The array's reading at the end of the touch, the true force, and the largest
-/// force of that press.
+/// Presses with 1 N and releases; after a time the object is pushed into the tip by a depth for 5 s and taken away;
+/// then the next press has a goal of 1 N. Returns the array's reading at the end of the touch, the true force then, and
+/// the largest force of the second press.
 fn next_press(torque: bool, after_s: f64, depth_mm: f64) -> [f64; 3] {
     let setup = Setup::default();
     let mut board: Bench = Bench::of(&setup, &config());
@@ -105,7 +105,7 @@ fn a_characteristic_that_is_none_any_more_leaves_nothing() {
             failed.push(format!("off for {off_s} s, goal {goal_mn} mN: {largest:.3} N"));
         }
     }
-    // Nothing touched, only noise of +-3 codes: what one frame's noise was is added up.
+    // No contact, only noise of +-3 codes, which is added up frame by frame.
     for seed in 0..3 {
         let mut rng = fastrand::Rng::with_seed(seed);
         let mut board = bench(&Params { curve_permille: 500, ..Params::DEFAULT });
@@ -143,8 +143,8 @@ fn clear(board: &mut Bench, clear_mm: f64) {
     }
 }
 
-/// `docs/safety.md`, Releasing: a reading that rises above the minimum since the release is a new touch. Something
-/// presses a released tip by more than a quarter of what was held, for 5 s; then by less.
+/// `docs/safety.md`, Releasing: a reading that rises above the minimum since the release is a new touch. Here an
+/// object presses a released tip for 5 s with more than a quarter of the force held before; then with less.
 #[test]
 fn what_presses_for_seconds_is_not_left_of_what_was_held() {
     let mut failed = Vec::new();
@@ -258,8 +258,8 @@ fn scene(x_mm: f64) -> Scene {
     read("t.toml", &text, &[]).unwrap()
 }
 
-/// A contact at the edge was fitted; a press that measures touches in the middle: what its end reads is not that times
-/// the ratio of the contact before.
+/// A contact at the edge was fitted before a measuring press touches in the middle: the force at the end of the press
+/// must not contain the force ratio of the earlier contact.
 #[test]
 fn a_press_that_measures_loses_the_fit() {
     let mut board: Bench<Named> = Bench::new(&scene(6.8)).unwrap();
@@ -352,7 +352,7 @@ fn taxels_that_are_masked_are_no_fault_any_more() {
 /// Arrays of each test.
 const ARRAYS: u64 = 120;
 
-/// An array as it comes, and a finger with it.
+/// A finger with a randomly drawn array.
 struct Finger {
     rng: Rng,
     pipeline: Pipeline,
@@ -499,8 +499,8 @@ fn a_later_tare_under_two_tenths_of_a_newton_and_more_is_flagged_and_a_clean_one
     }
 }
 
-/// An array that is uneven beyond what is usual, by a patch of its own: flagged, so torque is refused until the host
-/// insists.
+/// An unusually uneven array, by a patch of high readings without a touch: the tare is flagged, so torque is refused
+/// until the host forces it.
 #[test]
 fn torque_after_a_flagged_tare_is_refused_unless_it_was_forced() {
     let mut finger = Finger::new(1, 250.0);

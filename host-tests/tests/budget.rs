@@ -13,8 +13,8 @@ const DEADLINE: u32 = 12_568;
 /// Frames of the longest refinement, of which only one is the dearest, and one more.
 const REFINEMENT: u32 = 12;
 
-/// Time that frames take: `rest`, up to `spread` more, and with a contact what the fit level takes, from its least at a
-/// `model_q8` of 0 to its most at 256.
+/// Frame times: `rest`, up to `spread` more, and with a contact the time of the fit level, from its minimum at a
+/// `model_q8` of 0 to its maximum at 256.
 #[derive(Clone, Copy, Debug)]
 struct Stretch {
     frames: u32,
@@ -121,8 +121,8 @@ proptest! {
         }
         prop_assert_eq!(changes, 0, "it hunts");
         let last = last.expect("there were frames");
-        // With a contact the rest is known less well: by what a window's dearest frame may take for the model more than
-        // its least.
+        // With a contact the rest is less certain: by the difference of the model's maximum and minimum in the longest
+        // frame of a window.
         let sure = |fit_level: FitLevel| {
             let blur = if contact { Budget::model_cycles(fit_level.lower()) } else { [0, 0] };
             fits(fit_level, rest + 100 + blur[0] - blur[1])
@@ -134,7 +134,7 @@ proptest! {
 
 #[test]
 fn a_model_dearer_than_estimated_is_tried_ever_less_often() {
-    // Half as dear again: what fits by the estimate does not.
+    // 1.5 times the estimate: a level that fits by the estimate does not fit.
     let dear = Stretch { frames: 0, rest: 6_000, spread: 0, contact: true, model_q8: 384 };
     let mut running = Loop::new();
     let mut rises = [0; 2];
@@ -221,7 +221,7 @@ fn quick_frames_let_it_rise_by_one_in_each_window_up_to_what_was_asked() {
     }
 }
 
-/// Without a contact the model's most comes on top of what a frame took; with one it is in it.
+/// Without a contact the model's maximum is added to the measured frame time; with one the frame time includes it.
 #[test]
 fn it_falls_at_once_where_the_dearest_frame_would_not_fit() {
     for fit_level in [FitLevel::OneRow, FitLevel::TwoRows, FitLevel::FiveRows, FitLevel::AllRows] {
@@ -251,8 +251,8 @@ fn it_rises_where_the_next_effort_fits_with_room() {
     }
 }
 
-/// With a contact the frames at hand took at least the least for the model, so the rest is no more than what they took
-/// less that.
+/// With a contact the measured frames include at least the model's minimum, so the rest is at most the frame time less
+/// that minimum.
 #[test]
 fn with_a_contact_the_models_least_is_taken_off() {
     let (fit_level, next) = (FitLevel::OneRow, FitLevel::TwoRows);
@@ -302,7 +302,7 @@ fn after_each_fall_it_waits_twice_as_long() {
     assert_eq!(rises, Some((WINDOW, FitLevel::AllRows)));
 }
 
-/// A contact that comes or goes makes the frames before worth nothing.
+/// The begin or the end of a contact invalidates the frames before.
 #[test]
 fn a_contact_that_comes_or_goes_begins_the_window_anew() {
     for before in [1, 10, WINDOW - 1] {

@@ -1,6 +1,6 @@
 //! Captures in the core: kept frames come back to the bit, damage is reported, and a replay finds differences.
 
-use fingertip::capture::{Capture, Ended, State};
+use fingertip::capture::{Capture, CaptureState, Ended};
 use fingertip::command::Command;
 use fingertip::config::newtons;
 use fingertip::contact::FitLevel;
@@ -16,7 +16,7 @@ use fingertip::units::{Celsius, CoreCycles, Duty, Newtons};
 use host_tests::finger::config;
 use images::record::Record;
 use proptest::prelude::*;
-use replay::{Field, Frames, Refusal, replay};
+use replay::{Field, Frames, ReplayError, replay};
 use sim::native::bench::Bench;
 use sim::setup::Setup;
 
@@ -45,7 +45,7 @@ impl<const BYTES: usize> Finger<BYTES> {
         self.frame_with(|_| {});
     }
 
-    /// The same, where somebody changes what the core is given.
+    /// Steps a frame whose inputs to the core are changed.
     fn frame_with(&mut self, change: impl FnOnce(&mut Record)) {
         let Self { native, capture } = self;
         if capture.is_due(native.status(), &native.record().command) {
@@ -70,7 +70,7 @@ impl<const BYTES: usize> Finger<BYTES> {
     }
 
     fn until_done(&mut self) {
-        while self.capture.standing().state == State::Recording {
+        while self.capture.standing().state == CaptureState::Recording {
             self.frame();
         }
         assert_eq!(self.capture.standing().ended, Ended::Full);
@@ -162,7 +162,7 @@ proptest! {
         let mut kept = 0;
         for step in &steps {
             capture.record(&step.frame, &step.sense, &step.command, &step.status);
-            kept += usize::from(capture.standing().state == State::Recording);
+            kept += usize::from(capture.standing().state == CaptureState::Recording);
         }
         capture.end(Ended::Asked);
         let (head, frames) = Frames::<ROWS, COLUMNS>::new(capture.data()).expect("a capture");
@@ -223,7 +223,7 @@ fn out_of_turn_nothing_is_kept() {
     assert_eq!((capture.standing(), capture.data()), (Default::default(), &[][..]));
     capture.arm();
     capture.arm();
-    assert_eq!(capture.standing().state, State::Armed);
+    assert_eq!(capture.standing().state, CaptureState::Armed);
     assert!(!capture.is_due(&status, &Command::default()), "nobody tares");
     for mode in [Mode::Fault, Mode::Force, Mode::Tare] {
         assert!(!capture.is_due(&Status { mode, ..status }, &tare), "{mode:?}");
@@ -231,19 +231,19 @@ fn out_of_turn_nothing_is_kept() {
     assert!(capture.is_due(&status, &tare));
     // New parameters do not call it off, the host does.
     capture.end(Ended::Configured);
-    assert_eq!(capture.standing().state, State::Armed);
+    assert_eq!(capture.standing().state, CaptureState::Armed);
     capture.end(Ended::Asked);
-    assert_eq!(capture.standing().state, State::None);
+    assert_eq!(capture.standing().state, CaptureState::None);
     capture.arm();
     capture.begin(&mut pipeline);
     capture.record(&Frame::EMPTY, &Sense::default(), &tare, &status);
     capture.arm();
-    assert_eq!((capture.standing().state, capture.standing().frames), (State::Recording, 1), "armed twice");
+    assert_eq!((capture.standing().state, capture.standing().frames), (CaptureState::Recording, 1), "armed twice");
     assert!(capture.data().is_empty(), "it is not done");
     capture.end(Ended::Stopped);
     capture.end(Ended::Asked);
     let standing = capture.standing();
-    assert_eq!((standing.state, standing.ended, standing.count), (State::Done, Ended::Stopped, 1));
+    assert_eq!((standing.state, standing.ended, standing.count), (CaptureState::Done, Ended::Stopped, 1));
     assert_eq!(capture.data().len(), standing.bytes as usize);
     capture.arm();
     assert!(capture.data().is_empty());
@@ -266,7 +266,7 @@ fn a_frame_takes_what_its_noise_says() {
         capture.arm();
         capture.begin(&mut pipeline);
         let mut frame = Frame::EMPTY;
-        while capture.standing().state == State::Recording {
+        while capture.standing().state == CaptureState::Recording {
             frame.sequence += 1;
             for place in 0..SLOTS * COLUMNS {
                 // Twelve of them make a normal number.
@@ -288,7 +288,7 @@ fn a_frame_takes_what_its_noise_says() {
 
 const DAMAGED_BYTES: usize = 1 << 10;
 
-fn verdict(bytes: &[u8]) -> Result<bool, Refusal> {
+fn verdict(bytes: &[u8]) -> Result<bool, ReplayError> {
     replay::<ROWS, COLUMNS>(bytes, &CLOCKS, |_, _| {}).map(|replayed| replayed.difference.is_none())
 }
 
@@ -311,9 +311,9 @@ fn a_cut_is_told_at_every_length() {
     let finger = Finger::<DAMAGED_BYTES>::pressed();
     let bytes = finger.capture.data();
     for length in 0..bytes.len() {
-        assert_eq!(verdict(&bytes[..length]), Err(Refusal::Cut), "{length} bytes");
+        assert_eq!(verdict(&bytes[..length]), Err(ReplayError::Cut), "{length} bytes");
     }
-    assert_eq!(verdict(&[bytes, &[0]].concat()), Err(Refusal::Longer));
+    assert_eq!(verdict(&[bytes, &[0]].concat()), Err(ReplayError::Longer));
 }
 
 #[test]
@@ -324,16 +324,16 @@ fn others_are_told_apart() {
         bytes[place] = value;
         verdict(&bytes)
     };
-    assert_eq!(changed(0, b'X'), Err(Refusal::NoCapture));
-    assert_eq!(changed(3, 1), Err(Refusal::Version(1)));
-    assert_eq!(changed(4, 8), Err(Refusal::Shape { rows: 8, columns: 10 }));
-    assert_eq!(changed(6, Ended::No as u8), Err(Refusal::Unfinished));
-    assert_eq!(changed(8, 0), Err(Refusal::Layout));
+    assert_eq!(changed(0, b'X'), Err(ReplayError::NoCapture));
+    assert_eq!(changed(3, 1), Err(ReplayError::Version(1)));
+    assert_eq!(changed(4, 8), Err(ReplayError::Shape { rows: 8, columns: 10 }));
+    assert_eq!(changed(6, Ended::No as u8), Err(ReplayError::Unfinished));
+    assert_eq!(changed(8, 0), Err(ReplayError::Layout));
     let slower = Clocks { timer_hz: CLOCKS.timer_hz / 2, core_hz: CLOCKS.core_hz / 2, ..CLOCKS };
     let slower = Box::leak(Box::new(slower));
     let refusal = replay::<ROWS, COLUMNS>(finger.capture.data(), slower, |_, _| {});
-    assert!(matches!(refusal, Err(Refusal::FrameTime { .. })), "{refusal:?}");
-    for refusal in [Refusal::Layout, Refusal::Cut, Refusal::Version(2), Refusal::Frame(7)] {
+    assert!(matches!(refusal, Err(ReplayError::FrameTime { .. })), "{refusal:?}");
+    for refusal in [ReplayError::Layout, ReplayError::Cut, ReplayError::Version(2), ReplayError::Frame(7)] {
         assert!(refusal.to_string().contains("capture"), "{refusal}");
     }
 }
@@ -433,7 +433,7 @@ fn a_fault_is_in_it_and_what_comes_after() {
     assert_eq!(finger.native.status().fault, Some(Fault::SupplyLow));
     finger.capture.end(Ended::Asked);
     assert_eq!(agrees(&finger), 425);
-    // What acts on the loop between steps ends it; what is there replays.
+    // An action on the loop between steps ends the capture; the frames before it replay.
     let mut finger = Finger::<BYTES>::new();
     finger.capture.arm();
     finger.native.command().tare_request += 1;
@@ -441,7 +441,7 @@ fn a_fault_is_in_it_and_what_comes_after() {
     finger.native.pipeline().stop(Fault::LostFrames);
     finger.capture.end(Ended::Stopped);
     (0..20).for_each(|_| finger.frame());
-    assert_eq!(finger.capture.standing().state, State::Done);
+    assert_eq!(finger.capture.standing().state, CaptureState::Done);
     assert_eq!(agrees(&finger), 200);
 }
 

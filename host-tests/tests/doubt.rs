@@ -4,7 +4,7 @@ use core::f64::consts::PI;
 use fastrand::Rng;
 use fingertip::contact::Contact;
 use fingertip::contact::{FitLevel, from_sums};
-use fingertip::shipped::{Fit, Picture, ROWS};
+use fingertip::shipped::{Fit, ROWS, TactileImage};
 use fingertip::units::Millimetres;
 use host_tests::finger::config;
 use host_tests::fit_cases::{Noise, Object, Reading, Scene, Steps};
@@ -17,8 +17,8 @@ fn mm(length: Millimetres) -> f64 {
     length.0.to_num()
 }
 
-/// A plane contact, with what its taxels differ by.
-fn plane(d_mm: f64, [x_mm, y_mm]: [f64; 2], spread: f64, bad: [u32; ROWS], rng: &mut Rng) -> Picture {
+/// Tactile image of a plane contact with a spread of the taxel gains.
+fn plane(d_mm: f64, [x_mm, y_mm]: [f64; 2], spread: f64, bad: [u32; ROWS], rng: &mut Rng) -> TactileImage {
     let scene = Scene { pitch_mm: PITCH_MM, d_mm, x_mm, y_mm, object: Object::Plane };
     let noise = if spread > 0.0 { Noise::OfReading(spread) } else { Noise::None };
     Reading { steps: Steps::Sixteenths, noise, dead: 0 }.picture(&scene.pressures(), bad, rng).0
@@ -52,12 +52,12 @@ fn hidden_shares(contact: &Contact, bad: &[u32; ROWS]) -> [f64; 2] {
     [least[0].min(least[1]), most[0].max(most[1])]
 }
 
-/// The doubt of the sums, by a fit that takes no model.
-fn doubt_of_sums(picture: &Picture) -> u8 {
+/// Uncertainty of the sums, by a fit level without the model.
+fn doubt_of_sums(picture: &TactileImage) -> u8 {
     Fit::new(FitLevel::Moments).read(picture, &config()).doubt
 }
 
-/// The hidden share that a doubt of the sums means, where it is neither none nor all.
+/// Hidden share of the force for an uncertainty of the sums between 1 and 254.
 fn share_of(doubt: u8) -> f64 {
     assert!((1..255).contains(&doubt), "a doubt of {doubt} has no share");
     (1.0 + 3.0 * f64::from(doubt) / 255.0) / 8.0
@@ -114,7 +114,7 @@ fn the_share_that_a_bad_taxel_hides_is_that_of_the_models_pressure() {
     let all: f64 = pressures.iter().flatten().sum();
     let whole = plane(1.5, [0.0, 0.0], 0.0, NONE, &mut rng);
     // The sums stay those of the whole contact: its radius is right.
-    let marked = |bad: [u32; ROWS]| share_of(doubt_of_sums(&Picture { bad, ..whole }));
+    let marked = |bad: [u32; ROWS]| share_of(doubt_of_sums(&TactileImage { bad, ..whole }));
     let ring = |row: usize, column: usize| {
         let distance = |row: usize, column: usize| (2 * row as i32 - 9).pow(2) + (2 * column as i32 - 9).pow(2);
         let mut bad = NONE;
@@ -149,16 +149,17 @@ fn half_of_a_contact_is_hidden_by_half_of_the_rows() {
         let doubts = [0, 1, 2, 3, 4, 5, 6].map(|rows| {
             // The sums stay those of the whole contact: its radius is right.
             let bad = core::array::from_fn(|row| if row < rows { (1 << 10) - 1 } else { 0 });
-            doubt_of_sums(&Picture { bad, ..whole })
+            doubt_of_sums(&TactileImage { bad, ..whole })
         });
         assert!(doubts.is_sorted(), "{d_mm} mm: {doubts:?}");
         assert!(doubts[5] > 220, "{d_mm} mm: {doubts:?}");
     }
 }
 
-/// One bad taxel anywhere under a contact of 42 to 380 mN. The sums miss the share h, so they find a squared radius that is too
-/// small by the root of 1 - h, and a share that is too large by as much; beside that it is right to a tenth. Where the
-/// taxel is not in the middle, the contact that they find is farther from it, and the share smaller by up to a quarter.
+/// One bad taxel anywhere under a contact of 42 to 380 mN. The sums miss the hidden share h, so they estimate a squared
+/// radius that is too small by the root of 1 - h, and a share that is too large by the same factor; apart from that the
+/// share is right to a tenth. If the taxel is not in the middle, the estimated centre moves away from it, and the share
+/// is too small by up to a quarter.
 #[test]
 fn the_share_that_one_bad_taxel_hides_of_a_light_contact_is_right() {
     let mut rng = Rng::with_seed(5);
@@ -187,8 +188,8 @@ fn the_share_that_one_bad_taxel_hides_of_a_light_contact_is_right() {
     assert!(kinds.iter().all(|kind| *kind > 500), "{kinds:?}");
 }
 
-/// A taxel that comes and goes under a contact of 2 mm hides a twentieth of it at most: nothing is doubted, at any fit
-/// level, be it the taxel in the middle or one at the rim.
+/// A flickering taxel under a contact of 2 mm hides at most a twentieth of it: the uncertainty stays 0 at every fit
+/// level, for a taxel in the middle as for one at the rim.
 #[test]
 fn a_taxel_that_flickers_under_a_contact_makes_no_doubt() {
     let config = config();
@@ -209,9 +210,8 @@ fn a_taxel_that_flickers_under_a_contact_makes_no_doubt() {
     }
 }
 
-/// A fit at rest is doubted for how much is hidden, from a ratio of 5/4 to 7/4, times how little it is like, from a
-/// confidence of 160 to
-/// 96. Its own doubt then stands still to the last bit.
+/// The uncertainty of a fit at rest is the product of two terms: the hidden share of the force, from a ratio of 5/4 to
+/// 7/4, and the misfit, from a confidence of 160 down to 96. It then stays constant to the last bit.
 #[test]
 fn a_fit_is_doubted_by_what_is_hidden_and_how_unlike_it_is() {
     let config = config();
@@ -244,12 +244,12 @@ fn a_fit_is_doubted_by_what_is_hidden_and_how_unlike_it_is() {
     assert!(kinds[0] > 50 && kinds[1] > 10 && kinds[3] > 10, "{kinds:?}");
 }
 
-/// An eighth of the way up in each frame, a 64th of the way down.
+/// In each frame the uncertainty rises by an eighth of its distance to the target, or falls by a 64th of it.
 #[test]
 fn doubt_comes_in_some_eight_frames_and_goes_in_some_sixty() {
     let config = config();
     let mut rng = Rng::with_seed(3);
-    // Before the first refinement the doubt follows from the sums. Bad taxels hide a part of the contact, or nearly all of it.
+    // Before the first refinement the sums give the uncertainty. Bad taxels hide a part of the contact, or nearly all.
     let (mut part, mut hidden) = (NONE, NONE);
     part[4..6].fill(0b11_1111);
     hidden[3..7].fill(0b111_1000);
@@ -267,7 +267,7 @@ fn doubt_comes_in_some_eight_frames_and_goes_in_some_sixty() {
         }
     }
     let [_, doubtful] = pictures;
-    // The same contact in full sight: once the refinement under way is over, nothing is doubted.
+    // The same contact without bad taxels: after the present refinement the uncertainty is 0.
     let seen = plane(1.5, [0.0, 0.0], 0.0, NONE, &mut rng);
     let before: Vec<_> = (0..30).map(|_| fit.read(&seen, &config).doubt).collect();
     let mut doubt = f64::from(before[29]);
@@ -281,9 +281,9 @@ fn doubt_comes_in_some_eight_frames_and_goes_in_some_sixty() {
         fit.read(&seen, &config);
     }
     assert_eq!(fit.read(&seen, &config).doubt, 0, "it goes to the last bit");
-    // Without a contact nothing is doubted, from the first frame on.
+    // Without a contact the uncertainty is 0 from the first frame on.
     for _ in 0..10 {
         fit.read(&doubtful, &config);
     }
-    assert_eq!(fit.read(&Picture::EMPTY, &config).doubt, 0);
+    assert_eq!(fit.read(&TactileImage::EMPTY, &config).doubt, 0);
 }

@@ -63,8 +63,8 @@ fn twelve_taxels_dead_or_shorted() {
     }
 }
 
-/// What interference makes of single frames: the motor is shorted for as long, and the contact stays what it was. The
-/// same taxels twice are a fault, and so is half of the array at once.
+/// Interference in a single frame is no fault: the motor is shorted during that frame, and the contact keeps its
+/// values. The same taxels bad twice are a fault, and so is half of the array at once.
 #[test]
 fn taxels_that_are_bad_for_one_frame_are_no_fault() {
     let mut board = holding(1_000);
@@ -119,8 +119,8 @@ fn a_frame_that_reads_too_much_or_too_little_is_forgotten() {
     assert!(failed.is_empty(), "{failed:#?}");
 }
 
-/// As many dead taxels as are allowed, in the middle of the contact: the fit gives the force without them, which stays
-/// what was asked for.
+/// As many dead taxels as allowed in the middle of the contact: the fit estimates the force without them, and the true
+/// force stays at the goal.
 #[test]
 fn taxels_that_die_within_the_contact_do_not_change_the_force() {
     let mut failed = Vec::new();
@@ -245,7 +245,7 @@ fn too_much_force() {
     expect(&mut board, Fault::OverForce, 2);
 }
 
-/// The finger releases the object first, whatever comes over the bus in the meantime.
+/// The finger first completes the release, whatever arrives on the bus meanwhile.
 #[test]
 fn a_silent_bus() {
     let mut board = holding(1_000);

@@ -2,7 +2,7 @@
 
 use fingertip::contact::{CONFIDENCE_LEAST, Contact, FitLevel, from_sums};
 use fingertip::params::Params;
-use fingertip::shipped::{COLUMNS, Config, Fit, Picture, ROWS};
+use fingertip::shipped::{COLUMNS, Config, Fit, ROWS, TactileImage};
 use fingertip::units::{Millimetres, Newtons};
 use host_tests::finger::config;
 use host_tests::fit_cases::{Noise, Object, Reading, Scene, Steps, picture};
@@ -21,8 +21,8 @@ const FIT: usize = WAYS - 1;
 
 type Taxels = [[i32; COLUMNS]; ROWS];
 
-/// What a single look makes of a picture, and every fit level that has seen it long enough: the sums first.
-fn all_ways(picture: &Picture, config: &Config) -> Vec<Contact> {
+/// Contacts of a tactile image by each fit level once it has settled, and by each single-frame method; the sums first.
+fn all_ways(picture: &TactileImage, config: &Config) -> Vec<Contact> {
     let followed = |fit_level| {
         let mut fit = Fit::new(fit_level);
         (0..FRAMES).map(|_| fit.read(picture, config)).last().expect("there are frames")
@@ -43,13 +43,13 @@ fn mm(length: Millimetres) -> f64 {
 }
 
 /// Tactile image of a scene without noise.
-fn still(scene: &Scene, bad: [u32; ROWS]) -> (Picture, usize) {
+fn still(scene: &Scene, bad: [u32; ROWS]) -> (TactileImage, usize) {
     let reading = Reading { steps: Steps::Sixteenths, noise: Noise::None, dead: 0 };
     reading.picture(&scene.pressures(), bad, &mut fastrand::Rng::with_seed(0))
 }
 
-/// Two refinements of one picture, and a fit of any fit level after many frames, keep force and centre within their
-/// bounds.
+/// Checks the bounds of force and centre for two refinements of one tactile image, and for each fit level after many
+/// frames.
 fn holds(scene: &Scene, bad: [u32; ROWS]) {
     let (picture, seen) = still(scene, bad);
     assert!(seen >= 12, "{seen} taxels see {scene:?}");
@@ -70,7 +70,7 @@ fn plane(pitch_mm: f64, d_mm: f64, x_mm: f64, y_mm: f64) -> Scene {
 
 #[test]
 fn nothing_is_no_contact() {
-    for contact in all_ways(&Picture::EMPTY, &config()) {
+    for contact in all_ways(&TactileImage::EMPTY, &config()) {
         assert_eq!(contact, Contact { confidence: 255, ..Contact::default() });
     }
 }
@@ -124,9 +124,9 @@ fn frames_between_the_extremes_leave_nothing_behind() {
     for _ in 0..100 {
         let contact = fit.read(&full, &config);
         assert_eq!(contact.force, from_sums(&full, &config).force, "the first frame of a contact is its sum");
-        assert_eq!(fit.read(&Picture::EMPTY, &config), Contact { confidence: 255, ..Contact::default() });
+        assert_eq!(fit.read(&TactileImage::EMPTY, &config), Contact { confidence: 255, ..Contact::default() });
     }
-    // And a real contact after them is read as if they had never been.
+    // A real contact after them is read as if they had not occurred.
     let scene = plane(1.5, 2.0, 6.0, 0.0);
     let (picture, _) = still(&scene, NONE);
     let mut fresh = Fit::default();
@@ -305,7 +305,7 @@ fn any_config() -> impl Strategy<Value = Config> {
 }
 
 /// All of one kind: an even level, extremes, small values, anything, or a few spikes.
-fn any_picture() -> impl Strategy<Value = Picture> {
+fn any_picture() -> impl Strategy<Value = TactileImage> {
     let extremes = prop_oneof![Just(-LARGEST), Just(0), Just(LARGEST), Just(16), Just(1)];
     let taxel = prop_oneof![
         3 => Just(None),

@@ -1,4 +1,4 @@
-//! The fit's work, spread over frames: when a refinement begins and ends, and what it follows meanwhile.
+//! The work of a fit, spread over frames: begin and end of a refinement, and the force that it follows meanwhile.
 
 use fastrand::Rng;
 use fingertip::command::Command;
@@ -6,7 +6,7 @@ use fingertip::contact::{CONFIDENCE_LEAST, Contact, FitLevel, from_sums};
 use fingertip::frame::Sense;
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
-use fingertip::shipped::{Config, Fit, Frame, Picture, Pipeline, ROWS, TARE_FRAMES};
+use fingertip::shipped::{Config, Fit, Frame, Pipeline, ROWS, TARE_FRAMES, TactileImage};
 use host_tests::finger::config;
 use host_tests::fit_cases::{Noise, Object, Reading, Scene, Steps};
 use images::single::{Refined, read};
@@ -17,7 +17,7 @@ const NONE: [u32; ROWS] = [0; ROWS];
 const BY_MODEL: [(FitLevel, usize); 4] =
     [(FitLevel::OneRow, 11), (FitLevel::TwoRows, 6), (FitLevel::FiveRows, 3), (FitLevel::AllRows, 1)];
 
-fn picture(scene: &Scene, noise: Noise, rng: &mut Rng) -> Picture {
+fn picture(scene: &Scene, noise: Noise, rng: &mut Rng) -> TactileImage {
     Reading { steps: Steps::Sixteenths, noise, dead: 0 }.picture(&scene.pressures(), NONE, rng).0
 }
 
@@ -26,12 +26,12 @@ fn cut_off(d_mm: f64) -> Scene {
     Scene { pitch_mm: 1.5, d_mm, x_mm: 6.0, y_mm: 1.0, object: Object::Plane }
 }
 
-fn still(d_mm: f64) -> Picture {
+fn still(d_mm: f64) -> TactileImage {
     picture(&cut_off(d_mm), Noise::None, &mut Rng::with_seed(0))
 }
 
 /// Number of the frame in which a refinement first gives a result, from 1.
-fn first_refined(fit: &mut Fit, picture: &Picture, config: &Config) -> usize {
+fn first_refined(fit: &mut Fit, picture: &TactileImage, config: &Config) -> usize {
     (1..100).find(|_| fit.read(picture, config).confidence < 255).expect("a refinement")
 }
 
@@ -94,7 +94,7 @@ fn what_was_found_goes_with_the_contact() {
         fit.read(&picture, &config);
     }
     assert!(fit.read(&picture, &config).force > from_sums(&picture, &config).force);
-    fit.read(&Picture::EMPTY, &config);
+    fit.read(&TactileImage::EMPTY, &config);
     for _ in 0..10 {
         let contact = fit.read(&picture, &config);
         assert_eq!((contact.force, contact.confidence), (from_sums(&picture, &config).force, 255));
@@ -128,13 +128,13 @@ fn the_model_is_at_work_where_there_is_a_contact_and_an_effort_for_it() {
             fit.read(&picture, &config);
             assert_eq!(fit.at_work(), fit_level >= FitLevel::OneRow, "{fit_level:?}");
         }
-        fit.read(&Picture::EMPTY, &config);
+        fit.read(&TactileImage::EMPTY, &config);
         assert!(!fit.at_work(), "{fit_level:?}");
     }
 }
 
-/// Within a refinement the indentation goes with the root of the force, so what changes meanwhile is not taken for
-/// another contact.
+/// During a refinement the indentation scales with the root of the force, so a change of force is not taken for another
+/// contact.
 #[test]
 fn a_force_that_changes_within_a_refinement_is_followed() {
     let config = config();
@@ -224,7 +224,7 @@ fn other_parameters_begin_the_fit_anew() {
 #[test]
 fn a_fit_that_is_handed_another_geometry_begins_anew() {
     let mut rng = fastrand::Rng::with_seed(7);
-    let mut picture = Picture::EMPTY;
+    let mut picture = TactileImage::EMPTY;
     let (mut fit, last) = (Fit::default(), with(4_000, 4_000));
     for (pitch_um, tip_radius_um) in [(500, 16_000), (1_500, 10_000), (500, 4_000)] {
         let first = with(pitch_um, tip_radius_um);
@@ -282,7 +282,7 @@ fn a_contact_that_appears_is_fitted_wherever_it_lies() {
 }
 
 /// A contact that reaches over the edge.
-fn cut_off_picture(d_mm: f64, x_mm: f64) -> Picture {
+fn cut_off_picture(d_mm: f64, x_mm: f64) -> TactileImage {
     let scene = Scene { pitch_mm: 1.5, d_mm, x_mm, y_mm: 1.0, object: Object::Plane };
     let reading = Reading { steps: Steps::Sixteenths, noise: Noise::None, dead: 0 };
     reading.picture(&scene.pressures(), NONE, &mut fastrand::Rng::with_seed(0)).0

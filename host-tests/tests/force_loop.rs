@@ -74,7 +74,7 @@ fn a_zero_goal_lets_go_and_stands_clear() {
     assert_eq!((status.mode, status.fault), (Mode::Release, None));
     assert_eq!(trace.last().unwrap().1, 0.0);
     let clear_mm = Setup::default().wall.distance_mm - board.truth().travel_mm;
-    assert!((0.8..=1.3).contains(&clear_mm), "stands {clear_mm} mm clear");
+    assert!((0.8..=1.3).contains(&clear_mm), "{clear_mm} mm clear");
     let before_mm = board.truth().travel_mm;
     run(&mut board, 0, 0.2);
     assert!((board.truth().travel_mm - before_mm).abs() < 0.01);

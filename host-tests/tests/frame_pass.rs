@@ -2,7 +2,7 @@
 
 use fingertip::params::Params;
 use fingertip::pressure::{CODE_BITS, GAIN_MAX, TARE_BITS};
-use fingertip::shipped::{Array, COLUMNS, Calibration, Config, Frame, Picture, ROWS, TARE_FRAMES};
+use fingertip::shipped::{Array, COLUMNS, Calibration, Config, Frame, ROWS, TARE_FRAMES, TactileImage};
 use host_tests::finger::tared;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -84,7 +84,7 @@ proptest! {
             sizes += value + i64::from(tares[place]);
             peak = peak.max(*taxel);
         }
-        let Picture { sum, moment_x, moment_y, .. } = picture;
+        let TactileImage { sum, moment_x, moment_y, .. } = picture;
         // Taxels and their tares are rounded to sixteenths; along the columns, the weighted gains to Q10.
         let bounds = [110, 550 + sizes / 2_048, 550];
         for ((found, exact), bound) in [sum, moment_x, moment_y].into_iter().zip(sums).zip(bounds) {

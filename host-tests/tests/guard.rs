@@ -1,4 +1,4 @@
-//! The guard alone, against any frames, senses and duties: what it promises holds whatever the loop, the array and the
+//! The guard alone, against arbitrary frames, senses and duties: its promises hold whatever the loop, the array and the
 //! host do.
 
 use fastrand::Rng;
@@ -60,8 +60,8 @@ struct RearEnd {
     mm: f64,
     /// Mean force as the guard measures it, Q16 N.
     force: i32,
-    /// Earlier frames that the tip has not been in front of since: the travel, and the least mean force up to that frame.
-    /// The farthest comes first.
+    /// Earlier frames at a larger travel than all later ones: travel, and smallest mean force up to that frame. The
+    /// farthest comes first.
     earlier: Vec<(f64, i32)>,
     pushes: u32,
 }
@@ -147,7 +147,7 @@ fn only_a_push_takes_the_rear_end_along() {
                 guard.check(&Seen { encoder, force, pressing: false, goal: Newtons::ZERO, voltage: 0 }, true, &config);
             (fault, lets_through(&guard)[1])
         };
-        // The tip goes back slowly. The force comes when the tip is back, or is constant from the start.
+        // The tip moves back slowly. The force appears once the tip is back, or is constant from the start.
         let mut travel_mm = 0.0;
         while travel_mm > from_mm {
             assert_eq!(at(travel_mm, if rises { 0 } else { 300 }), (None, true), "{travel_mm} mm");
@@ -168,8 +168,7 @@ fn only_a_push_takes_the_rear_end_along() {
     }
 }
 
-/// A motor, pushed about by somebody who wants to break the envelope: full duty this way and that, for as long as it
-/// pleases.
+/// Adversarial driver of the motor, which tries to break the envelope: full duty in either direction for random times.
 struct Adversary {
     travel_mm: f64,
     speed_mm_per_s: f64,
@@ -300,8 +299,8 @@ fn counts(travel_mm: f64, config: &Config) -> i32 {
     (travel_mm / count_mm(config)).round() as i32
 }
 
-/// The tip goes back no farther behind a touch than the clearance and 1 mm behind the surface; what only looks like a
-/// touch while the host asks for none moves nothing.
+/// After a touch the tip retreats at most to the clearance plus 1 mm behind the surface. A reading that only looks like
+/// a touch moves nothing while the host requests none.
 #[test]
 fn a_touch_bounds_the_retreat() {
     let config = Config::shipped(&Params { clearance_um: 2_000, ..Params::DEFAULT }).expect("allowed");

@@ -31,7 +31,7 @@ impl Finger {
         1.0 / f64::from(self.config.bounds.frames_per_s)
     }
 
-    /// A frame with a voltage beyond what the speed takes, Q8 mm/s^2.
+    /// Steps a frame with a voltage `beyond` the back-EMF of the speed, Q8 mm/s^2.
     fn pushed(&mut self, beyond: i32) -> Option<Fault> {
         self.travel_mm += self.speed_mm_per_s * self.frame_s();
         let count_mm = self.config.mm_per_count_q40 as f64 / 2_f64.powi(40);
@@ -46,8 +46,8 @@ impl Finger {
         self.pushed(0)
     }
 
-    /// Speeds up over 50 ms, so that no change of the speed is large, and goes on for a time: the first fault, and
-    /// when.
+    /// Accelerates over 50 ms, so that no change of the speed is large, and moves on for a time. Returns the first
+    /// fault and its time.
     fn goes(&mut self, speed_mm_per_s: f64, seconds: f64) -> Option<(Fault, f64)> {
         let from = self.speed_mm_per_s;
         let frames = (seconds / self.frame_s()) as u32;
@@ -83,7 +83,8 @@ impl Finger {
     }
 }
 
-/// At rest everything is let through up to the end, one way just beyond it, and 1 mm on it stops.
+/// At rest every duty passes up to the end of the travel; just beyond the end only duty back; 1 mm beyond it is a
+/// fault.
 #[test]
 fn an_end_is_where_it_is_said_to_be() {
     let back_mm: f64 = Finger::new().config.bounds.back.0.to_num();
@@ -207,7 +208,7 @@ fn a_touch_begins_and_ends_with_the_mean_force() {
         }
         assert_eq!(finger.guard.presses(), presses, "{force_mn} mN");
     }
-    // The mean goes 1/16 of the way in a frame: 3 frames of 0 leave 82 % of it, 17 a third.
+    // The mean moves by 1/16 of its distance to the input in a frame: 3 frames of 0 leave 82 % of it, 17 leave a third.
     finger.force = Newtons::ZERO;
     for (frames, presses) in [(3, true), (10, true), (10, false)] {
         for _ in 0..frames {
@@ -225,7 +226,7 @@ fn a_tip_that_stands_is_stopped_from_what_must_be_expected_on() {
             let mut finger = Finger::new();
             finger.force = newtons((force_n * 1e3) as i32);
             let bounds = finger.config.bounds;
-            // What the force takes is what the motor gives, first.
+            // At first the motor balances the force exactly.
             let held = force_n * f64::from(bounds.acceleration_per_n);
             for _ in 0..2_000 {
                 assert_eq!(finger.pushed(held as i32), None);
@@ -260,8 +261,8 @@ fn the_travel_is_that_of_the_encoder() {
     assert!((travel - 3.0).abs() < 1e-3, "{travel} mm");
 }
 
-/// A jump of the encoder before torque (an encoder that comes back, a finger that is carried) is no motion against the
-/// drive.
+/// A jump of the encoder before torque (an encoder that is reconnected, a finger that is moved by hand) does not count
+/// as motion against the drive.
 #[test]
 fn a_jump_before_torque_is_forgotten() {
     for jump_mm in [0.0, 0.5, -0.5, 5.0, -5.0] {

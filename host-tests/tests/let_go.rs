@@ -1,7 +1,7 @@
-//! A goal of 0 lets go, whatever went before.
+//! A goal of 0 releases the object, whatever happened before.
 
 use fingertip::config::newtons;
-use fingertip::measure::{State, Task};
+use fingertip::measure::{MeasureState, Task};
 use fingertip::state::Mode;
 use host_tests::finger::config;
 use sim::effects::{Named, Set};
@@ -66,8 +66,8 @@ fn moved_while_held<E: Set>(board: &mut Bench<E>, goal_mn: i32, moved_mm: f64) -
     kept(board, 2.0).map(|told| format!("goal {goal_mn} mN, {moved_mm} mm: held {held:.3} N, then let go: {told}"))
 }
 
-/// Another finger pushes the object towards this one while both hold it: the loop goes along and holds the force, the
-/// surface stays where it was first touched. Nothing lets go of it then.
+/// Another finger pushes a held object towards this one: the loop follows and holds the force, but the stored surface
+/// stays at the travel of the first touch. A release to that surface once left the object in contact.
 #[test]
 fn an_object_that_came_along_while_it_was_held_is_let_go() {
     let mut failed = Vec::new();
@@ -105,8 +105,8 @@ fn a_press_that_measures_is_let_go() {
     assert!(failed.is_empty(), "{failed:#?}");
 }
 
-/// As `docs/commissioning.md` has it: tare, torque, goal 0, a press. The tip rests at the clearance behind what the press
-/// touched, not where the guard cuts the motor off.
+/// The sequence of `docs/commissioning.md`: tare, torque, goal 0, a press. The tip rests at the clearance behind the
+/// surface that the press touched, not where the guard cuts the motor off.
 #[test]
 fn a_press_from_a_released_tip_ends_at_the_clearance() {
     let mut failed = Vec::new();
@@ -114,12 +114,12 @@ fn a_press_from_a_released_tip_ends_at_the_clearance() {
     board.step();
     board.request(Task::Press);
     board.run(12.0);
-    assert_eq!(board.status().measure.state, State::Done);
+    assert_eq!(board.status().measure.state, MeasureState::Done);
     let behind_mm = 5.0 - board.truth().travel_mm;
     if !(0.75..1.25).contains(&behind_mm) {
         failed.push(format!("{behind_mm:.3} mm behind, {}", told(&mut board)));
     }
-    // What the press touches is nearer than what was touched before.
+    // The press touches a nearer surface than the touch before.
     let mut board = bench();
     board.place_object(10.0);
     board.command().goal = newtons(1_000);
@@ -135,8 +135,8 @@ fn a_press_from_a_released_tip_ends_at_the_clearance() {
     assert!(failed.is_empty(), "{failed:#?}");
 }
 
-/// What a contact left in the array is no object that could be released: parameters are written with torque off, so the
-/// touch is not remembered, and the object is taken away.
+/// A residue of an earlier contact is not released like an object. Here parameters are written with torque off, so the
+/// touch is forgotten, and the object is taken away.
 #[test]
 fn a_residue_from_before_torque_does_not_make_the_tip_go_back() {
     let mut failed = Vec::new();
@@ -163,7 +163,7 @@ fn a_residue_from_before_torque_does_not_make_the_tip_go_back() {
     assert!(failed.is_empty(), "{failed:#?}");
 }
 
-/// The object comes to a released tip, is held, and is released again.
+/// An object is moved to a released tip, is held, and is released again.
 #[test]
 fn what_came_to_a_released_tip_is_held_and_let_go() {
     let mut failed = Vec::new();

@@ -33,8 +33,8 @@ fn the_pipeline_comes_to_rest_under_what_does_not_change() {
     }
 }
 
-/// Whatever the encoder did, the observer comes to rest once the encoder does: also after jumps, and from speeds that
-/// no tip has.
+/// The observer comes to rest once the encoder rests, whatever happened before: also after jumps, and from impossible
+/// speeds.
 #[test]
 fn the_observer_recovers_from_anything() {
     for (settle_ns, sample_cycles, speed_max_um_per_s) in
@@ -73,7 +73,7 @@ fn known_cycles_are_found() {
     assert_eq!(cycle(&0_u64, 100_000, |x| *x += 1), None);
 }
 
-/// A swing beyond what is documented is a failure, one within it is not.
+/// A swing above the documented one is a failure, a smaller one is not.
 #[test]
 fn a_swing_is_measured() {
     let swings = |allowed| Machine {

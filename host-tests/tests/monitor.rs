@@ -6,8 +6,8 @@ use fingertip::contact::Contact;
 use fingertip::control::SpeedLoop;
 use fingertip::frame::Sense;
 use fingertip::pressure::GAIN_ONE;
-use fingertip::safety::monitor::{Monitor, View, array_broken, array_sound};
-use fingertip::shipped::{COLUMNS, Calibration, Frame, Picture, ROWS};
+use fingertip::safety::monitor::{Monitor, MonitorInputs, array_broken, array_sound};
+use fingertip::shipped::{COLUMNS, Calibration, Frame, ROWS, TactileImage};
 use fingertip::state::Fault;
 use fingertip::units::{Millimetres, MillimetresPerSecond2, Newtons};
 use host_tests::finger::{config, tared};
@@ -16,7 +16,7 @@ use sim::plant::{Plant, Setup};
 /// Readings of a sound finger that presses with 1 N.
 #[derive(Clone, Copy)]
 struct Shown {
-    picture: Picture,
+    picture: TactileImage,
     contact: Contact,
     pressed: bool,
     sense: Sense,
@@ -27,7 +27,7 @@ struct Shown {
 impl Shown {
     fn sound() -> Self {
         Self {
-            picture: Picture { sum: 1_000, moment_x: 50, moment_y: -50, ..Picture::EMPTY },
+            picture: TactileImage { sum: 1_000, moment_x: 50, moment_y: -50, ..TactileImage::EMPTY },
             contact: Contact { force: newtons(1_000), ..Contact::default() },
             pressed: true,
             sense: Sense { supply_mv: 6_000, ..Sense::default() },
@@ -36,9 +36,9 @@ impl Shown {
         }
     }
 
-    fn view(&self) -> View<'_, ROWS, COLUMNS> {
+    fn view(&self) -> MonitorInputs<'_, ROWS, COLUMNS> {
         let Self { picture, contact, pressed, sense, motion, command } = self;
-        View { picture, contact, pressed: *pressed, sense, motion, command }
+        MonitorInputs { picture, contact, pressed: *pressed, sense, motion, command }
     }
 
     fn at(mut self, um: i32) -> Self {
@@ -110,8 +110,8 @@ fn load(mn: i32) -> i32 {
     (i64::from(config().bounds.acceleration_per_n) * i64::from(mn) / 1_000) as i32
 }
 
-/// A tip that moves forward by this many micrometres in each frame over a picture that stays the same, while the motor's
-/// load grows by this much in all of 0.1 mm: the travel at which it is stopped.
+/// Moves the tip forward by `um_per_frame` in each frame with a constant tactile image, while the motor's load grows by
+/// `load_mn` per 0.1 mm. Returns the travel at which the monitor stops it.
 fn stopped_um(um_per_frame: i32, load_mn: i32, force_mn: i32, goal_mn: i32) -> Option<i32> {
     let config = config();
     let mut monitor = restarted(5_000);
@@ -122,8 +122,8 @@ fn stopped_um(um_per_frame: i32, load_mn: i32, force_mn: i32, goal_mn: i32) -> O
     })
 }
 
-/// A motor that pushes more, by 0.25 N and half of the force, over a picture that stays the same: within 0.2 mm and what
-/// the load's mean is late by. Without more load the object may move: 4 mm.
+/// With a constant tactile image, a motor that pushes harder by 0.25 N plus half of the force is stopped within 0.2 mm
+/// and the lag of the mean load. Without more load the object may be moving: then it is stopped after 4 mm.
 #[test]
 fn an_array_that_shows_the_same_while_the_tip_presses_on_stops() {
     for force_mn in [100, 1_000, 3_000] {
@@ -147,8 +147,8 @@ fn a_force_that_is_held_may_stay_the_same() {
     }
 }
 
-/// Every change of the picture counts, and so does what makes an unchanged picture no wonder: a tip that does not press,
-/// hardly any force, and the way back.
+/// No fault if the tactile image changes at all, or if an unchanged one is plausible: the tip does not press, the force
+/// is small, or the tip moves back.
 #[test]
 fn an_array_that_shows_any_change_or_no_contact_does_not() {
     let config = config();
@@ -208,16 +208,14 @@ fn an_array_that_reads_less_than_at_its_tare_is_broken() {
     }
 }
 
-/// Taxels that are masked, or that fail after the tare, take what they read at the tare with them; a contact beside
-/// them is no less than nothing.
-/// Sums of consecutive frames while 1 N is requested; the frame of the fault.
+/// Checks consecutive frames with these sums and numbers of bad taxels at a goal; returns the frame of the fault.
 fn stopped_by_sums(goal_mn: i32, sums: impl Iterator<Item = (i32, u16)>) -> Option<usize> {
     let config = config();
     let mut shown = Shown::sound();
     shown.command.goal = newtons(goal_mn);
     let mut monitor = restarted(0);
     let mut fault = |(sum, bad_count)| {
-        shown.picture = Picture { sum, bad_count, moment_x: sum, ..shown.picture };
+        shown.picture = TactileImage { sum, bad_count, moment_x: sum, ..shown.picture };
         let fault = monitor.check(&shown.view(), &config);
         assert!(matches!(fault, None | Some(Fault::ArrayBroken)), "{fault:?}");
         fault
@@ -244,6 +242,8 @@ fn an_array_that_reads_much_more_within_a_frame_is_broken() {
     assert_eq!(stopped_by_sums(1_000, grows), None);
 }
 
+/// Taxels that are masked, or that fail after the tare, lose their baseline, too: the sum of the others stays above
+/// that of an array without contact.
 #[test]
 fn an_array_without_some_of_its_taxels_does_not_read_less() {
     let config = config();
@@ -298,7 +298,7 @@ fn an_array_is_broken_from_the_very_limit_on() {
         (0, 0, stuck + 1, Some(Fault::RowStuck), false),
         (51, 51, stuck + 1, Some(Fault::RowStuck), false),
     ] {
-        let picture = Picture { bad_count, bad_again, undriven_max, ..Picture::EMPTY };
+        let picture = TactileImage { bad_count, bad_again, undriven_max, ..TactileImage::EMPTY };
         let found = (array_broken(&picture, &config), array_sound(&picture, &config));
         assert_eq!(found, (fault, sound), "{bad_count} bad, {bad_again} again, {undriven_max} codes");
     }

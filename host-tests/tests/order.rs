@@ -14,7 +14,7 @@ struct Stage {
     uses: Vec<(String, PathBuf)>,
 }
 
-/// The stages in their order, the first one first; what they use is a stage or another crate of this workspace.
+/// Stages in their order; each uses only stages or other crates of this workspace.
 fn stages(core: &Path) -> io::Result<Vec<Stage>> {
     let whole = fs::read_to_string(core.join("lib.rs"))?;
     let names: Vec<_> = whole.lines().filter_map(|line| line.strip_prefix("pub mod ")?.strip_suffix(';')).collect();

@@ -28,7 +28,7 @@ fn root() -> PathBuf {
     PathBuf::from(env!("FINGERTIP_ROOT"))
 }
 
-/// The files below a folder that end so, what is built and hidden aside.
+/// Files below a folder with one of these endings, without built and hidden ones.
 fn files(folder: &Path, ends: &[&str], found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("a folder of the repository").map(|entry| entry.expect("its entry").path())
     {
@@ -43,7 +43,7 @@ fn files(folder: &Path, ends: &[&str], found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Path and text of each page; the changelog may name what is gone.
+/// Path and text of each page, without the changelog, which may name removed things.
 fn pages() -> Vec<(PathBuf, String)> {
     let mut paths = Vec::new();
     files(&root(), &[".md"], &mut paths);
@@ -178,7 +178,7 @@ impl Programs {
     }
 }
 
-/// True if a letter goes on with the name of a flag.
+/// True if a letter continues the name of a flag.
 fn in_a_word(letter: char) -> bool {
     letter.is_alphanumeric() || letter == '-'
 }

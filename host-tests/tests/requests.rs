@@ -1,9 +1,9 @@
-//! Requests in the loop: what comes in one frame is done, and what cannot be done leaves a word. The first frame with
-//! torque.
+//! Requests in the loop: all requests of one frame are executed, and refused ones are reported. Also the first frame
+//! with torque.
 
 use fingertip::config::newtons;
 use fingertip::contact::Contact;
-use fingertip::measure::{Ended, MeasureStatus, State, Task};
+use fingertip::measure::{Ended, MeasureState, MeasureStatus, Task};
 use fingertip::params::Params;
 use fingertip::pipeline::{Bridge, Taring};
 use fingertip::pressure::TARE_BITS;
@@ -39,7 +39,7 @@ fn faulted() -> Bench {
     board
 }
 
-/// What makes a step a fault.
+/// Change of a record that makes a step a fault.
 type Spoil = fn(&mut Record);
 
 /// A fault that is found before the contact is estimated, and one that is found later.
@@ -246,13 +246,13 @@ fn a_press_without_a_tare_is_refused() {
 fn a_press_in_the_frame_in_which_another_ends_has_its_outcome() {
     let refused_at = {
         let mut board = measuring();
-        (1..20_000).find(|_| board.step().measure.state != State::Running).expect("an end")
+        (1..20_000).find(|_| board.step().measure.state != MeasureState::Running).expect("an end")
     };
     let mut board = measuring();
     for _ in 1..refused_at {
         assert_eq!(board.step().measure, RUNNING);
     }
-    for outcome in [(State::Ended, Ended::NoContact), (State::Running, Ended::Complete)] {
+    for outcome in [(MeasureState::Ended, Ended::NoContact), (MeasureState::Running, Ended::Complete)] {
         board.request(Task::Press);
         let status = board.step();
         assert_eq!((status.measure.state, status.measure.ended), outcome);
@@ -307,7 +307,7 @@ fn torque_waits_until_the_tip_is_slow() {
             let status = moves(&mut board, speed);
             assert_eq!((status.mode, status.bridge()), (Mode::Off, Bridge::Brakes), "at {speed} mm/s");
         }
-        // Half of 30 mm/s, give or take what the encoder's counts leave of the speed.
+        // Half of 30 mm/s, within the resolution of the encoder's speed.
         let mut slower = speed;
         while moves(&mut board, slower).mode == Mode::Off {
             slower *= 0.999;
@@ -321,7 +321,7 @@ fn torque_waits_until_the_tip_is_slow() {
     }
 }
 
-/// Torque drives nothing before somebody confirmed which way the motor goes, and the reason is reported.
+/// Torque is refused until the motor direction is confirmed, and the reason is reported.
 #[test]
 fn torque_is_refused_before_the_direction_is_confirmed() {
     let config = Config::shipped(&Params::DEFAULT).expect("the defaults are allowed");
@@ -335,8 +335,8 @@ fn torque_is_refused_before_the_direction_is_confirmed() {
     }
 }
 
-/// A caller that holds torque and a goal since before it asks for the tare does not start an approach by it, but once torque
-/// was off.
+/// Torque and a goal that were set before the tare request do not start an approach after the tare; torque must be
+/// turned off first.
 #[test]
 fn torque_that_was_on_before_the_tare_drives_nothing_until_it_was_off() {
     for (off_first, frames) in [(0, 0), (0, 1), (0, 100), (1, 1), (1, 100)] {
@@ -362,7 +362,7 @@ fn torque_that_was_on_before_the_tare_drives_nothing_until_it_was_off() {
     }
 }
 
-/// Torque that is turned on in the frame that asks for the tare, or while it is under way, is taken up after it.
+/// Torque that is turned on in the frame of a tare request, or during the tare, takes effect after the tare.
 #[test]
 fn torque_that_comes_with_a_tare_or_during_it_waits_for_its_end() {
     for after in [0, 1, TARE_FRAMES / 2, TARE_FRAMES] {
@@ -423,8 +423,8 @@ fn torque_at_a_wrong_supply_is_a_fault_before_it_drives() {
     }
 }
 
-/// The offsets of an array that was not tared look like a contact: none is reported, whatever presses, only what is wrong
-/// with the array.
+/// Before a tare the offsets of the array look like a contact. So no contact is reported, whatever presses; only
+/// defects of the array are.
 #[test]
 fn before_a_tare_no_contact_is_reported() {
     let mut board = at(-2.0);

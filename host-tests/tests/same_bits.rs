@@ -14,7 +14,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-/// Lists what is there already, without computing anything.
+/// Functions that only return stored values, without a computation.
 const ACCESSORS: [&str; 6] = ["radius", "modulus", "depth_max", "force_max", "settled", "fmt"];
 
 /// The public functions of a file.

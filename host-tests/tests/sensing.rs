@@ -1,4 +1,4 @@
-//! Codes to contact: the plant's electrical model against what the core reads back.
+//! From codes to contact: the plant's electrical model against the readings of the core.
 
 use fingertip::config::ConfigError;
 use fingertip::contact::{Contact, from_sums};
@@ -227,9 +227,9 @@ fn the_force_that_is_seen_whole_is_one_of_the_tips() {
     }
 }
 
-// An array whose characteristic is no line: codes to force, drift, bad taxels, and what is refused.
+// An array with a nonlinear characteristic: codes to force, drift, bad taxels, and refused parameters.
 
-/// At the full range a code means so much more than at none.
+/// Ratio of the pressure per code at full range to that at zero.
 const GROWTH: f64 = 3.3;
 
 /// An array of this growth, and a configuration of this one.

@@ -1,4 +1,4 @@
-//! Doubtful configurations: what is warned of, and that the line for the pitch separates good fits from bad ones.
+//! Questionable configurations: the warnings, and the pitch limit, which must separate good fits from bad ones.
 
 use fingertip::command::Command;
 use fingertip::config::{Shaped, Warning, newtons};

@@ -11,7 +11,7 @@ use proptest::test_runner::RngSeed;
 use sim::native::bench::Bench;
 use sim::setup::Setup;
 
-/// Only a winding's own lag, of a small motor: what is judged needs no more.
+/// Parameters with the thermal lag of a winding only, of a small motor: enough for these tests.
 const QUICK: Params = Params { housing_k_per_w: 0, winding_k_per_w: 46, winding_time_ms: 2_000, ..images::CONFIRMED };
 
 fn config(params: Params) -> Config {
@@ -58,7 +58,7 @@ impl Truth {
         self.ambient_c + self.above_k[0] + self.above_k[1]
     }
 
-    /// Current under a voltage at a motor at rest: the warm winding takes less.
+    /// Applies a voltage to a motor at rest: a warm winding draws less current.
     fn pass(&mut self, volts: f64, seconds: f64) {
         let warm_ohm = self.ohm * (1.0 + 0.0039 * (self.degrees() - 25.0));
         let watts = volts * volts / warm_ohm;
@@ -125,7 +125,7 @@ fn after_a_reset_it_is_as_warm_as_a_housing_can_be_and_cools() {
     assert!((later - 40.0 - 48.04 * (-0.8_f64).exp()).abs() < 0.1, "{later}");
 }
 
-/// What a controller lets through is what warms the motor: it pushes as hard as it may for as long as it takes.
+/// The current that the controller allows heats the motor model: full load until the temperature has settled.
 #[test]
 fn it_never_passes_its_largest_temperature() {
     for params in [images::CONFIRMED, QUICK, Params { current_max_ma: 20_000, winding_max_c: 85, ..images::CONFIRMED }]
@@ -133,7 +133,7 @@ fn it_never_passes_its_largest_temperature() {
         let config = config(params);
         let mut motion = SpeedLoop::new();
         let mut truth = Truth::of(&params);
-        // As warm as after hours at the limit.
+        // The housing temperature after hours at the limit.
         let room_k = f64::from(params.winding_max_c - params.ambient_c);
         truth.above_k[1] = (room_k * truth.k_per_w[1] / (truth.k_per_w[0] + truth.k_per_w[1])).min(room_k - 24.0);
         let (mut warmest, mut truly, mut held) = (0.0_f64, 0.0_f64, 0);
@@ -166,7 +166,7 @@ proptest! {
         ohm in 0.93..1.1, k_per_w in 0.8..1.15, tau in 0.85..1.2, colder in 0.0..5.0, housed: bool,
         pattern in proptest::collection::vec((0.0..1.0, 0.02..4.0), 3..12),
     ) {
-        // The housing starts warm, which hides much: without one nothing is hidden.
+        // A warm housing hides errors of the winding model; a motor without a housing model hides none.
         let params = if housed { images::CONFIRMED } else { QUICK };
         let config = config(params);
         let mut truth = Truth::of(&params);
@@ -220,8 +220,8 @@ proptest! {
     }
 }
 
-/// Where the current is held back the tip cannot be braked as usual, so it must not be driven as usual either. As if it
-/// could: 5.2 N for a goal of 3 N, and the contact was lost on the way to less.
+/// A limited current brakes the tip less, so the tip must also be driven less. Without that the force overshot to 5.2 N
+/// for a goal of 3 N, and the contact was lost after a step to a lower goal.
 #[test]
 fn a_motor_that_may_hardly_be_driven_presses_no_harder_and_lets_go_no_farther() {
     let hot = Params { winding_max_c: 85, ambient_c: 60, winding_time_ms: 2_000, ..images::CONFIRMED };

@@ -23,9 +23,9 @@ const BLOCK: usize = 8;
 #[repr(C, align(4))]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Codes<const ROWS: usize, const COLUMNS: usize> {
-    /// With this row driven, see [`place`].
+    /// Codes with each row driven, see [`place`].
     pub rows: [[u16; COLUMNS]; ROWS],
-    /// With none.
+    /// Codes with no row driven.
     pub undriven: [u16; COLUMNS],
 }
 
@@ -33,7 +33,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Codes<ROWS, COLUMNS> {
     /// Zeros.
     pub const ZERO: Self = Self { rows: [[0; COLUMNS]; ROWS], undriven: [0; COLUMNS] };
 
-    /// With this row driven, or with none where it is one more than there are.
+    /// Codes of a slot: with the row of this number driven, or with none for the number of rows.
     #[inline(always)]
     pub fn slot(&self, slot: usize) -> Option<&[u16; COLUMNS]> {
         if slot == ROWS { Some(&self.undriven) } else { self.rows.get(slot) }
@@ -167,7 +167,7 @@ pub struct Total {
 
 /// 1 / (1 - x) in Q28, for x in Q32 from -0.32 to 0.32.
 ///
-/// It is (1 + x)(1 + x^2)(1 + x^4 + x^8), which leaves out x^12 of itself and less: 2^-20 at the ends, 2^-46 at 7 %.
+/// Computed as (1 + x)(1 + x^2)(1 + x^4 + x^8), with a relative error of x^12: 2^-20 at the ends, 2^-46 at 7 %.
 #[inline(always)]
 fn boost(x: i32) -> i32 {
     let x2 = portable::add_high(0, x, x);
@@ -185,8 +185,8 @@ fn taxel(net: i16, gain: i16, boost: i32, tare: i32) -> i32 {
     (boosted as i32).wrapping_sub(tare >> (TARE_BITS - CODE_BITS))
 }
 
-/// From codes to `taxels`, row by row: net codes, the row's sag by their sum, each column by its gain and the row's
-/// boost, less its tare; and the rows' sums by the same gains and boosts, which are not rounded taxel by taxel.
+/// Converts codes to `taxels`, row by row: net codes times column gain and row boost, less the tare; the row's sag, by
+/// the sum of its codes, gives the boost. Also sums the rows with the same factors, without rounding taxel by taxel.
 #[inline(always)]
 pub fn portable_pass<const ROWS: usize, const COLUMNS: usize>(
     codes: &Codes<ROWS, COLUMNS>,

@@ -48,9 +48,9 @@ impl AddAssign for Cycles {
 pub struct Executed {
     /// The instruction.
     pub instruction: Instruction,
-    /// Its address.
+    /// Address of the instruction.
     pub address: u32,
-    /// Its condition did not hold.
+    /// True if its condition did not hold.
     pub skipped: bool,
     /// Significant bits of a division's quotient.
     pub quotient_bits: u32,
@@ -61,9 +61,9 @@ pub struct Executed {
 /// An access to memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Touched {
-    /// Its address.
+    /// Address of the access.
     pub address: u32,
-    /// Its length in bytes.
+    /// Length in bytes.
     pub bytes: u32,
 }
 
@@ -79,7 +79,7 @@ impl Executed {
 pub struct Next {
     /// The next instruction's address.
     pub address: u32,
-    /// It is 32 bits long.
+    /// True if it is 32 bits long.
     pub wide: bool,
 }
 
@@ -135,7 +135,7 @@ impl Core {
         Cycles::new(self.dividing, self.dividing, 0)
     }
 
-    /// Without waiting for what came before.
+    /// Cycles of an instruction without waits for earlier ones.
     fn alone(&self, executed: &Executed, next: Next) -> Cycles {
         let went_on = next.address == executed.address.wrapping_add(executed.instruction.size());
         let words = |count: u8| 1 + u64::from(count);

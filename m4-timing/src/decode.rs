@@ -29,7 +29,7 @@ pub const fn is_wide(first: u16) -> bool {
 /// Decodes the bytes of one instruction, little-endian.
 ///
 /// # Errors
-/// It is no instruction of a Cortex-M4F.
+/// The bytes are no instruction of a Cortex-M4F.
 pub fn decode(bytes: &[u8]) -> Result<Instruction, Unknown> {
     let halfword = |place: usize| Some(u16::from_le_bytes([*bytes.get(place)?, *bytes.get(place + 1)?]));
     let first = halfword(0).unwrap_or(0xffff);

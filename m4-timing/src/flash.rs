@@ -39,9 +39,9 @@ pub struct Flash {
     data: Cache,
     /// The line that the core executes from.
     current: Option<u32>,
-    /// The line on its way, and when it arrives.
+    /// Line being fetched, and cycle of its arrival.
     ahead: Option<(u32, u64)>,
-    /// When the flash is free for another access.
+    /// Cycle from which the flash is free for another access.
     free: u64,
     now: u64,
 }
@@ -126,7 +126,7 @@ fn is_flash(line: u32) -> bool {
 struct Cache {
     lines: Vec<usize>,
     size: usize,
-    /// For each line of the flash when it was last used; 0 where it is not cached.
+    /// Last use of each line of the flash; 0 if it is not cached.
     used: Vec<u64>,
     uses: u64,
 }

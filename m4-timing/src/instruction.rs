@@ -186,7 +186,7 @@ pub fn holds(condition: u8, xpsr: u32) -> bool {
 pub struct IfThen(u8);
 
 impl IfThen {
-    /// As an IT instruction sets it.
+    /// State that an IT instruction sets.
     pub const fn new(state: u8) -> Self {
         Self(state)
     }

@@ -10,7 +10,7 @@ use std::fmt;
 /// A place in the guest's code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Site {
-    /// Its address.
+    /// Address of the place.
     pub address: u32,
     /// Instruction at the address.
     pub code: Result<Instruction, Unknown>,
@@ -31,18 +31,18 @@ pub trait Registers {
     fn xpsr(&mut self) -> u32;
 }
 
-/// Why a measurement was given up.
+/// Reason why a measurement was aborted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Refusal {
+pub enum MeterError {
     /// Machine code that this core does not have.
     Unknown(u32, Unknown),
     /// An instruction that waits, traps or calls the debugger.
     Untimed(u32),
     /// Execution went elsewhere without a branch: an exception or a fault.
     Interrupted {
-        /// After the instruction here.
+        /// Address of the last instruction before.
         after: u32,
-        /// To here.
+        /// Address at which execution continued.
         to: u32,
     },
     /// A region began within a region.
@@ -53,7 +53,7 @@ pub enum Refusal {
     NotEnded(u32),
 }
 
-impl fmt::Display for Refusal {
+impl fmt::Display for MeterError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Unknown(at, code) => write!(f, "unknown instruction {code} at {at:#010x}"),
@@ -66,7 +66,7 @@ impl fmt::Display for Refusal {
     }
 }
 
-impl std::error::Error for Refusal {}
+impl std::error::Error for MeterError {}
 
 /// A pass under way.
 #[derive(Clone, Debug)]
@@ -89,7 +89,7 @@ pub struct Meter {
 }
 
 impl Meter {
-    /// Nothing measured.
+    /// Meter without measurements.
     pub fn new(settings: Settings) -> Self {
         Self { pass: None, flash: Flash::new(settings), regions: BTreeMap::new() }
     }
@@ -103,22 +103,22 @@ impl Meter {
     ///
     /// # Errors
     /// The region cannot be measured.
-    pub fn execute(&mut self, site: &Site, registers: &mut impl Registers) -> Result<(), Refusal> {
+    pub fn execute(&mut self, site: &Site, registers: &mut impl Registers) -> Result<(), MeterError> {
         let address = site.address;
         let Some(pass) = &mut self.pass else {
             match &site.code {
                 Ok(Instruction { kind: Kind::Begin, .. }) => self.begin(registers.core(0)),
-                Ok(Instruction { kind: Kind::End, .. }) => return Err(Refusal::NotBegun(address)),
+                Ok(Instruction { kind: Kind::End, .. }) => return Err(MeterError::NotBegun(address)),
                 _ => {}
             }
             return Ok(());
         };
 
-        let instruction = site.code.as_ref().map_err(|unknown| Refusal::Unknown(address, *unknown))?;
+        let instruction = site.code.as_ref().map_err(|unknown| MeterError::Unknown(address, *unknown))?;
         pass.retire(Next { address, wide: instruction.wide && !site.is_marker() }, &mut self.flash)?;
         match instruction.kind {
-            Kind::Begin => return Err(Refusal::Nested(address)),
-            Kind::Untimed => return Err(Refusal::Untimed(address)),
+            Kind::Begin => return Err(MeterError::Nested(address)),
+            Kind::Untimed => return Err(MeterError::Untimed(address)),
             Kind::End => {
                 self.end();
                 return Ok(());
@@ -145,8 +145,8 @@ impl Meter {
     ///
     /// # Errors
     /// A region did not end.
-    pub fn finish(&self) -> Result<&BTreeMap<u32, Region>, Refusal> {
-        self.pass.as_ref().map_or(Ok(&self.regions), |pass| Err(Refusal::NotEnded(pass.number)))
+    pub fn finish(&self) -> Result<&BTreeMap<u32, Region>, MeterError> {
+        self.pass.as_ref().map_or(Ok(&self.regions), |pass| Err(MeterError::NotEnded(pass.number)))
     }
 
     fn begin(&mut self, number: u32) {
@@ -174,11 +174,11 @@ impl Meter {
 
 impl Pass {
     /// Counts the instruction before, now that it is known where it led.
-    fn retire(&mut self, next: Next, flash: &mut Flash) -> Result<(), Refusal> {
+    fn retire(&mut self, next: Next, flash: &mut Flash) -> Result<(), MeterError> {
         let Some(last) = &self.last else { return Ok(()) };
         let follows = last.address.wrapping_add(last.instruction.size()) == next.address;
         if !follows && (last.skipped || !last.instruction.branches()) {
-            return Err(Refusal::Interrupted { after: last.address, to: next.address });
+            return Err(MeterError::Interrupted { after: last.address, to: next.address });
         }
         let cycles = self.core.retire(last, next);
         self.cycles += cycles;
@@ -232,7 +232,7 @@ impl Figures {
     /// The names of the figures, in their order.
     pub const NAMES: [&str; 5] = ["instructions", "low", "estimate", "high", "flash"];
 
-    /// In the order of [`Figures::NAMES`].
+    /// Values in the order of [`Figures::NAMES`].
     pub const fn values(&self) -> [u64; 5] {
         let Self { instructions, cycles: Cycles { low, estimate, high }, flash } = *self;
         [instructions, low, estimate, high, flash]

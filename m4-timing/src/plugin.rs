@@ -6,7 +6,7 @@
 use crate::core::Touched;
 use crate::decode::{decode, is_wide};
 use crate::flash::Settings;
-use crate::meter::{Meter, Refusal, Registers, Site};
+use crate::meter::{Meter, MeterError, Registers, Site};
 use crate::report;
 use std::collections::HashMap;
 use std::ffi::{CStr, c_char, c_int, c_uint, c_void};
@@ -279,7 +279,7 @@ fn with<T>(work: impl FnOnce(&mut Plugin) -> T) -> T {
     work(&mut plugin.lock().unwrap_or_else(PoisonError::into_inner))
 }
 
-fn refuse(refusal: &Refusal) -> ! {
+fn refuse(refusal: &MeterError) -> ! {
     fail(&format!("not measured: {refusal}"))
 }
 

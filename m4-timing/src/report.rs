@@ -51,7 +51,7 @@ fn totals(regions: &BTreeMap<u32, Region>) -> [u64; 5] {
 /// A region of a report.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Measured {
-    /// Its number.
+    /// Number of the region.
     pub region: u32,
     /// Passes through it.
     pub passes: u64,

@@ -5,7 +5,7 @@ use m4_timing::core::Touched;
 use m4_timing::decode::{decode, is_wide};
 use m4_timing::flash::{Flash, Settings};
 use m4_timing::meter::Summary;
-use m4_timing::meter::{Meter, Refusal, Registers, Site};
+use m4_timing::meter::{Meter, MeterError, Registers, Site};
 
 const BEGIN: [u16; 2] = [0xf3af, 0x8040];
 const END: [u16; 2] = [0xf3af, 0x8041];
@@ -44,7 +44,7 @@ enum Step<'a> {
 use Step::{Do, Goto, Touch};
 
 /// Executes steps in a region of their own: low, estimate and high cycles.
-fn run(guest: Guest, steps: &[Step]) -> Result<[u64; 3], Refusal> {
+fn run(guest: Guest, steps: &[Step]) -> Result<[u64; 3], MeterError> {
     let mut meter = Meter::new(Settings::STM32F4);
     let mut guest = guest;
     let mut address = RAM;
@@ -196,18 +196,18 @@ fn the_bounds_enclose_the_estimate() {
 #[test]
 fn what_cannot_be_measured_is_refused() {
     let refused = |steps: &[Step]| run(Guest::default(), steps).expect_err("refused");
-    assert!(matches!(refused(&[Do(&[0xee31, 0x0b02])]), Refusal::Unknown(..)));
-    assert!(matches!(refused(&[Do(&[0xbe00])]), Refusal::Untimed(_)));
-    assert!(matches!(refused(&[Do(&BEGIN)]), Refusal::Nested(_)));
-    assert!(matches!(refused(&[Do(&END)]), Refusal::NotBegun(_)));
-    assert!(matches!(refused(&[NOP, Goto(RAM + 64), NOP]), Refusal::Interrupted { .. }));
+    assert!(matches!(refused(&[Do(&[0xee31, 0x0b02])]), MeterError::Unknown(..)));
+    assert!(matches!(refused(&[Do(&[0xbe00])]), MeterError::Untimed(_)));
+    assert!(matches!(refused(&[Do(&BEGIN)]), MeterError::Nested(_)));
+    assert!(matches!(refused(&[Do(&END)]), MeterError::NotBegun(_)));
+    assert!(matches!(refused(&[NOP, Goto(RAM + 64), NOP]), MeterError::Interrupted { .. }));
 
     let mut meter = Meter::new(Settings::STM32F4);
     let mut guest = Guest::default();
     guest.core[0] = 7;
     assert_eq!(meter.execute(&site(RAM, &BEGIN), &mut guest), Ok(()));
-    assert_eq!(meter.finish().expect_err("not ended"), Refusal::NotEnded(7));
-    assert_eq!(Refusal::Untimed(16).to_string(), "the instruction at 0x00000010 waits, traps or calls the debugger");
+    assert_eq!(meter.finish().expect_err("not ended"), MeterError::NotEnded(7));
+    assert_eq!(MeterError::Untimed(16).to_string(), "the instruction at 0x00000010 waits, traps or calls the debugger");
 }
 
 /// Instructions of 32 bits in straight code, a cycle each.

@@ -1,4 +1,4 @@
-"""Parameters: shown, changed all or none, put back.
+"""Parameters: shown, changed (all or none), and restored.
 
     python parameters.py --port /tmp/finger
     python parameters.py --port /tmp/finger --set modulus_pa=300000 --save

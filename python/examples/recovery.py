@@ -1,4 +1,4 @@
-"""Holds a force, and recovers from what stops the motor: says what it was, clears it, tares where it must, goes on.
+"""Holds a force, and recovers from a fault: reports it, clears it, tares if necessary, and continues.
 
     python recovery.py --port /tmp/finger --newtons 1.0 --seconds 30
 

@@ -7,7 +7,7 @@
         finger.press(1.5)                # returns at once; approaches, touches, holds 1.5 N
         for state in finger.stream(rate_hz=10, seconds=1.0):
             print(state.time_s, state.force_n)
-        finger.release()                 # lets go, torque off
+        finger.release()                 # releases the object, torque off
 
 The end of the `with`, an exception and the end of the program let go too. Times are the controller's own; registers and their units are in `fingertip.registers`.
 """

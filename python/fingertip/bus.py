@@ -36,7 +36,7 @@ def _exit(number: int, frame: Any) -> None:
 
 
 def _catch_signals() -> None:
-    """Makes SIGTERM and SIGHUP end the program as `sys.exit` does, where nobody else handles them."""
+    """Makes SIGTERM and SIGHUP end the program as `sys.exit` does, unless the program handles them."""
     if threading.current_thread() is not threading.main_thread():
         return  # Python sets handlers in the main thread only
     for name in ["SIGTERM", "SIGHUP"]:
@@ -112,7 +112,7 @@ class Bus:
         _live.add(self)
 
     def finger(self, device_id: int = 1) -> Finger:
-        """The finger with this ID; raises `NoAnswer` where there is none."""
+        """The finger with this ID; raises `NoAnswer` if no device answers."""
         if device_id not in self.fingers:
             self.fingers[device_id] = Finger(self, device_id)
         return self.fingers[device_id]
@@ -125,7 +125,7 @@ class Bus:
         return [device_id for device_id in sorted(found) if found[device_id] == MODEL and self.finger(device_id)]
 
     def states(self, pressures: bool = False) -> Dict[int, State]:
-        """The states of all fingers, by ID, in one exchange; raises what is wrong with the first that has none."""
+        """The states of all fingers, by ID, in one exchange; raises the error of the first finger without a state."""
         states = {}
         for device_id, state in self._look(self.fingers, pressures).items():
             if isinstance(state, FingertipError):
@@ -155,7 +155,7 @@ class Bus:
             try:
                 self.release(rest, _RELEASE_S)
             except FingertipError:
-                pass  # the first failure tells more
+                pass  # the first failure is more informative
             raise
 
     def release(self, ids: Optional[Iterable[int]] = None, within_s: float = PATIENCE_S) -> None:
@@ -225,13 +225,13 @@ class Bus:
             self.line.feed_s = min(self._silence_s.values()) / 4 if self._silence_s else None
 
     def _look(self, ids: Iterable[int], pressures: bool = False) -> "Dict[int, Union[State, FingertipError]]":
-        """The states of these fingers, or why there is none."""
+        """The states of these fingers; for a finger without one the error."""
         wanted, size = list(ids), length(pressures)
         data: Dict[int, bytes] = {}
         found: Dict[int, Union[State, FingertipError]] = {}
         with self.line.lock:  # threads must count the time in the order of their reads
             at_once = _CHUNK // (size + 4)
-            # One that is not there also silences those after it. Then each is asked by itself.
+            # A missing finger also silences those after it. Then each finger is read separately.
             there = [device_id for device_id in wanted if device_id not in self._absent]
             for part in (there[at : at + at_once] for at in range(0, len(there), at_once)):
                 if len(part) > 1:
@@ -253,7 +253,7 @@ class Bus:
         return found
 
     def _tell(self, register: reg.Register, values: Mapping[int, int]) -> None:
-        """Writes a register of several fingers in one packet, which nobody answers."""
+        """Writes a register of several fingers in one packet, without an answer."""
         for device_id in values:
             self.touch(self.fingers[device_id])
         data = {device_id: encoded(register, value) for device_id, value in values.items()}
@@ -261,7 +261,7 @@ class Bus:
             self.line.sync_write(register.address, register.width, data)
 
     def _set(self, register: reg.Register, values: Mapping[int, int]) -> Dict[int, FingertipError]:
-        """Writes a register of several fingers at once, then of each by itself, which it answers; what failed."""
+        """Writes a register of several fingers at once, then of each one with an answer. Returns the failures."""
         self._tell(register, values if len(values) > 1 else {})
         failed: Dict[int, FingertipError] = {}
         for device_id, value in values.items():
@@ -280,7 +280,7 @@ class Bus:
         return failed
 
     def _rest(self, ids: Iterable[int], within_s: float) -> Dict[int, FingertipError]:
-        """Takes the tips off what they press, and waits for that by the controllers' clocks; what failed."""
+        """Releases the tips, and waits for the end by the controllers' clocks. Returns the failures."""
         until = time.monotonic() + PATIENCE_S + self.line.timeout_ms * 1e-3
         missed = dict.fromkeys(ids, 0)  # reads in a row without an answer, of the fingers that may still press
         failed: Dict[int, FingertipError] = {}

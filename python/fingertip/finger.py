@@ -125,7 +125,7 @@ class Finger(Device):
         self.bus.press({self.device_id: newtons}, silence_s)
 
     def ready(self, goal_mn: int) -> bool:
-        """Raises what keeps the finger from pressing with this force. Returns True where torque is on already."""
+        """Raises an error if the finger cannot press with this force. Returns True if torque is already on."""
         if self.read(reg.FAULT):
             raise FingertipError(f"ID {self.device_id} is stopped by {Fault(self.read(reg.FAULT)).name}: call recover()")
         if self.read(reg.LIMITS) & Limits.NOT_TARED:
@@ -145,7 +145,7 @@ class Finger(Device):
         self.release(0.5)
 
     def recover(self) -> Fault:
-        """Clears what stopped the motor; torque is off then, and the goal 0. Returns what it was."""
+        """Clears the fault and returns it; torque is off then, and the goal 0."""
         fault = Fault(self.read(reg.FAULT))
         try:
             self.write(reg.RECOVER, 1)

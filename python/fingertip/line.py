@@ -26,7 +26,7 @@ _POLL_S = 0.01  # longest wait for bytes before the time-out is looked at
 _WRITE_S = 5.0  # longest wait until the port takes a packet
 _LATE_MS = 100.0  # longest wait for an answer that is later than the time-out
 _PACKET_MAX = 1024  # bytes of the longest packet that the SDK takes
-# A Sync Write for no device. It is a broadcast, so every controller counts it as a sign of life, and none answers.
+# A Sync Write for no device. It is a broadcast: it feeds the watchdog of every controller, and none answers.
 _KEEP_ALIVE = bytes([0xFF, 0xFF, 0xFD, 0, _BROADCAST, 7, 0, 0x83, 0, 0, 0, 0])
 _PORT_ERRORS: Tuple[Type[Exception], ...] = (OSError,)
 try:
@@ -63,7 +63,7 @@ class _Babble(Exception):
 
 class _Socket(protocol_socket.Serial):  # type: ignore[misc, unused-ignore]
     def reset_input_buffer(self) -> None:
-        """Keeps what is there when the port is opened: what a served finger tells a second client."""
+        """Keeps the bytes received before the port was opened: a served finger sends a second client a refusal."""
 
 
 class Line(PortHandler):  # type: ignore[misc]
@@ -78,7 +78,7 @@ class Line(PortHandler):  # type: ignore[misc]
         self.timeout_ms = timeout_ms  # beyond the SDK's: a controller behind USB or on a busy machine may be late
         self.feed_s: Optional[float] = None  # time between two keep-alive packets; None: no watchdog is on
         self._fed_s = 0.0
-        self._owed_ms: Optional[float] = None  # longest time in which an answer may still come; None: there is none
+        self._owed_ms: Optional[float] = None  # longest time until a late answer; None: none is due
         self._heard, self._again = b"", b""  # bytes of this exchange, and those to be read a second time
         self._looked, self._beyond = False, 0  # after the time-out: looked at the port once more, bytes since then
         crc = self.packets.updateCRC(0, _KEEP_ALIVE, len(_KEEP_ALIVE))
@@ -91,7 +91,7 @@ class Line(PortHandler):  # type: ignore[misc]
             raise FingertipError(f"cannot open {name} at {baud} baud")
 
     def exchange(self, doing: str, device_id: int, call: Any, *arguments: Any) -> Any:
-        """One exchange with a device. Returns what the SDK's call returns in front of result and error."""
+        """One exchange with a device. Returns the data of the SDK's call, without result and error."""
 
         def action() -> Tuple[Any, int]:
             *data, result, error = call(self, device_id, *arguments)
@@ -103,12 +103,12 @@ class Line(PortHandler):  # type: ignore[misc]
         return data
 
     def sync_write(self, address: int, width: int, data: Mapping[int, bytes]) -> None:
-        """Writes a register of several devices in one packet, which nobody answers."""
+        """Writes a register of several devices in one packet, without an answer."""
         flat = [byte for device_id, own in data.items() for byte in (device_id, *own)]
         self._run("sync write", lambda: (None, self.packets.syncWriteTxOnly(self, address, width, flat, len(flat))))
 
     def sync_read(self, address: int, length: int, ids: Iterable[int]) -> Dict[int, bytes]:
-        """Reads the same bytes of several devices by Fast Sync Read; the parts that came, where all parts came."""
+        """Reads the same bytes of several devices by Fast Sync Read; returns the parts if all of them arrived."""
         wanted, part = list(ids), length + 4  # error, ID and CRC
 
         def action() -> Tuple[bytes, int]:
@@ -137,7 +137,7 @@ class Line(PortHandler):  # type: ignore[misc]
         self._run("keep alive", lambda: (None, COMM_SUCCESS))
 
     def keep_alive(self) -> None:
-        """Feeds the bus watchdogs of all controllers by a broadcast, where it is time to."""
+        """Feeds the bus watchdogs of all controllers by a broadcast, if it is due."""
         if self.feed_s is not None and time.monotonic() - self._fed_s > self.feed_s:
             self._fed_s = time.monotonic()
             self.ser.write(self._keep_alive)
@@ -154,7 +154,7 @@ class Line(PortHandler):  # type: ignore[misc]
                 came, result = action()
                 self._owed_ms = None if result == COMM_SUCCESS else min(_LATE_MS, self.timeout_ms)
             except (_Babble, IndexError, serial.SerialTimeoutException):
-                self._owed_ms = min(_LATE_MS, self.timeout_ms)  # junk, of which the SDK may take a packet apart that is too short; or nobody takes what is sent
+                self._owed_ms = min(_LATE_MS, self.timeout_ms)  # too short a packet in junk, or bytes not sent
             except PortLost:
                 self.closePort()
                 raise
@@ -185,7 +185,7 @@ class Line(PortHandler):  # type: ignore[misc]
         """The answer that came was another one's: the right one is still owed."""
         self._owed_ms, self._heard = self.timeout_ms, b""
 
-    # The SDK calls what follows.
+    # The SDK calls the following methods.
 
     def setupPort(self, cflag_baud: int) -> bool:
         name = self.port_name
@@ -211,8 +211,8 @@ class Line(PortHandler):  # type: ignore[misc]
         for _ in range(_PACKET_MAX):
             if not self.ser.in_waiting:
                 break
-            # What a served finger tells a second client may be there already. Behind it the connection ends: a longer
-            # read would only report that.
+            # A served finger's refusal of a second client may be there already. The connection ends after it: a longer
+            # read would only report that end.
             self.readPort(len(_BUSY))
 
     def readPort(self, length: int) -> bytes:
@@ -222,7 +222,7 @@ class Line(PortHandler):  # type: ignore[misc]
         data = bytes(self.ser.read(length))
         self._heard += data
         if data.startswith(_BUSY):
-            # A served finger tells a second client in words that the port is in use.
+            # A served finger refuses a second client with a line of text: the port is in use.
             raise PortLost(f"{self.port_name}: {(data + self.ser.readline()).decode(errors='replace').strip()}")
         beyond_ms = self.getTimeSinceStart() - self.packet_timeout
         if beyond_ms > 0:

@@ -22,7 +22,7 @@ _NAME = "fingertip.exe" if os.name == "nt" else "fingertip"
 
 
 def program() -> Path:
-    """Where the program is: beside this Python, where the wheel put it, or in the path."""
+    """Path of the program: next to this Python, as the wheel installs it, or from the search path."""
     installed = Path(sysconfig.get_path("scripts")) / _NAME
     found = installed if installed.is_file() else shutil.which(_NAME)
     if not found:
@@ -57,7 +57,7 @@ def run(*arguments: str, port: str, device_id: int = 1, within_s: Optional[float
 
 
 def _error(complained: str) -> str:
-    """The error that the program tells as the last line of standard error."""
+    """The error that the program reported in the last line of standard error."""
     last = (complained.strip().splitlines() or ["it said nothing"])[-1]
     try:
         return str(json.loads(last)["error"])

@@ -1,4 +1,4 @@
-"""What the controller says of itself."""
+"""State of the controller."""
 
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
@@ -8,7 +8,7 @@ from . import registers as reg
 from .device import numbers
 from .line import FingertipError
 
-FIRST, _LAST = reg.PICTURE_TIME_US, reg.PRESSURES  # a state is what lies between them
+FIRST, _LAST = reg.PICTURE_TIME_US, reg.PRESSURES  # first and last register of a state
 
 
 def length(pressures: bool) -> int:
@@ -89,11 +89,11 @@ class State:
     mode: Mode
     fault: Fault
     limits: Limits
-    pressures_kpa: Tuple[Tuple[float, ...], ...]  # row by row; none where they were not read
+    pressures_kpa: Tuple[Tuple[float, ...], ...]  # row by row; empty if they were not read
 
     @classmethod
     def of(cls, data: bytes, columns: int, time_s: float) -> "State":
-        """The state that these bytes tell, with the pressures where there are any."""
+        """The state in these bytes, with the pressures if they are included."""
 
         def at(register: reg.Register) -> int:
             return number(register, data)

@@ -3,8 +3,8 @@
     python lost_reads.py --serve target/host/serve --tool target/host/fingertip --reads 100000 package sdk tool
 
 Serves a finger, keeps some processes busy beside it, and reads 54 bytes of the state again and again without a pause:
-by this package, by `dynamixel-sdk` alone, by `fingertip latency`. Needs Linux: `/proc/PID/schedstat` tells for how long
-client and server were ready to run and did not get a processor.
+by this package, by `dynamixel-sdk` alone, by `fingertip latency`. Needs Linux: `/proc/PID/schedstat` has the time
+for which client and server were ready to run and did not get a processor.
 """
 
 import argparse
@@ -39,7 +39,7 @@ class Counting(PortHandler):  # type: ignore[misc]
 
 
 def waited_s(process: int) -> float:
-    """Time that a process was ready to run and had no processor; what it waits just now is not yet in it."""
+    """Time for which a process was ready to run without a processor; a present wait is not included."""
     with open(f"/proc/{process}/schedstat") as file:
         return int(file.read().split()[1]) * 1e-9
 

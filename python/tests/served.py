@@ -1,4 +1,4 @@
-"""Served fingers for the tests: started, told what to break, and asked what is true of them."""
+"""Served fingers for the tests: start, injected faults, and their true state."""
 
 import os
 import re
@@ -18,10 +18,10 @@ from fingertip import Bus, Fingertip, FingertipError, PortLost
 
 SERVE = os.environ.get("FINGERTIP_SERVE", "")
 PYTHON = Path(__file__).resolve().parents[1]
-PATIENT_MS = 60_000.0  # the slowest machine answers by then
-SOON_MS = 2_000.0  # for what does not answer
+PATIENT_MS = 60_000.0  # time within which the slowest machine answers
+SOON_MS = 2_000.0  # time-out for devices that do not answer
 LONG_S = 2.54  # bus watchdog that does not trip on a busy machine
-RESIDUAL_N = 0.05  # a tip that presses with less has let go
+RESIDUAL_N = 0.05  # a tip that presses with less counts as released
 
 
 class Truth(NamedTuple):
@@ -97,7 +97,7 @@ class Cable:
 
 @unittest.skipUnless(SERVE, "FINGERTIP_SERVE names the program `serve` that `cargo xtask serve` builds")
 class OnServed(unittest.TestCase):
-    """A test with a served finger of its own."""
+    """A test with its own served finger."""
 
     ARGUMENTS: Tuple[str, ...] = ("wall", "--set", "hand.fingers=2")
 

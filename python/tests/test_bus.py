@@ -9,7 +9,7 @@ from fingertip import registers as reg
 
 from served import LONG_S, PATIENT_MS, SOON_MS, OnServed
 
-# Two fingers press; the program then does what the test wants.
+# Two fingers press; then the program executes the code of the test.
 CHILD = """
 import sys
 from fingertip import Bus
@@ -186,7 +186,7 @@ class Group(OnServed):
         time.sleep(0.3)
         child.kill()
         child.communicate()
-        # A packet for a third ID is no sign of life for these two, and nobody answers it: the server tells the time.
+        # A packet for a third ID feeds neither watchdog and gets no answer, so the server is asked for the modes.
         while any(truth.mode != "Fault" for truth in self.served.truths().values()):
             time.sleep(0.01)
         self.assert_released(ids=[1, 2])
@@ -231,7 +231,7 @@ class Broken(OnServed):
 
         for broken in [close, junk, other_id, kill]:
             for number in range(13):
-                # A finger of its own: late answers to what broke before would be taken for answers to this one.
+                # A new finger each time: late answers to an earlier exchange would be taken for answers to this one.
                 self.served.stop()
                 self.served = self.serve(*self.ARGUMENTS)
                 bus = self.open_bus(tared=False)

@@ -1,4 +1,4 @@
-"""Tests of one finger, of what ends its program, and of a controller that starts again."""
+"""Tests of one finger, of the ends of its program, and of a controller that restarts."""
 
 import signal
 import threading
@@ -10,7 +10,7 @@ from fingertip import registers as reg
 
 from served import LONG_S, OnServed
 
-# Presses, says so, and goes on as the test wants it.
+# Presses, reports it, and executes the code of the test.
 CHILD = """
 import sys
 from fingertip import Fingertip, registers
@@ -23,7 +23,7 @@ GO_ON = "while True: finger.state()"
 
 
 def restart(finger: Finger) -> None:
-    """A broadcast, which nobody answers."""
+    """Restarts the controller by a broadcast, which has no answer."""
     packets, line = finger.line.packets, finger.line
 
     def action() -> Tuple[None, int]:
@@ -77,7 +77,7 @@ class Ends(OnServed):
         self.assertEqual(self.left(), [0, 0, 0, Fault.NONE])
 
     def test_a_forked_child_leaves_the_finger_to_its_parent(self) -> None:
-        # The child exits as a program does: it runs what is registered for the exit.
+        # The child exits like a program: it calls the registered exit functions.
         then = "import os\nif os.fork(): print(os.wait()[1], finger.read(registers.TORQUE_ENABLE))"
         self.assertEqual(self.child(then), 0)
         self.assertEqual(self.said, "0 1\n")
@@ -110,7 +110,7 @@ class Moves(OnServed):
     def test_wrong_numbers_move_nothing(self) -> None:
         finger = self.open()
         finger.tare()
-        # Beyond what the register takes, beyond force_max_mn, and no number at all.
+        # Outside the range of the register, above force_max_mn, and not a number.
         for newtons, kind in [(-1.0, ValueError), (1e6, ValueError), (100.0, FingertipError), (float("nan"), ValueError)]:
             self.refused(kind, finger.press, newtons)
             self.assertEqual(finger.read(reg.TORQUE_ENABLE), 0)
@@ -119,7 +119,7 @@ class Moves(OnServed):
         for rate_hz, seconds in [(float("nan"), 1.0), (-1.0, 1.0), (1e-30, 1.0), (100.0, float("nan")), (100.0, -1.0)]:
             self.refused(ValueError, lambda: next(finger.stream(rate_hz, seconds)))
         self.assertGreater(len(list(finger.stream(0, 0.05, pressures=False))), 1, "0 is as fast as it goes")
-        # A number is written as it is read, in the register's unit.
+        # A number is written in the unit in which it is read.
         finger.write(reg.BUS_WATCHDOG, 500)
         self.assertEqual(finger.read(reg.BUS_WATCHDOG), 500)
         for value in [10, 2560, -20]:

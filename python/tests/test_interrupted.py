@@ -50,7 +50,7 @@ class Interrupted(OnServed):
     ARGUMENTS = (*OnServed.ARGUMENTS, "--tcp", "0")
 
     def begin(self, name: str, port: str, draw: random.Random) -> "subprocess.Popen[str]":
-        """Starts a program, and comes back at an instant behind its first motion."""
+        """Starts a program, and returns at a random time after its first motion began."""
         child = self.python(*(port if argument == "PORT" else argument for argument in PROGRAMS[name]))
         while child.poll() is None and self.served.truths()[1].mode in ["Off", "Tare"]:
             time.sleep(0.005)

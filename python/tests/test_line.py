@@ -27,7 +27,7 @@ def answer(*data: int, device_id: int = 1) -> bytes:
 
 
 def status(*after: int, device_id: int = 1) -> bytes:
-    """A status packet with these bytes behind its instruction: none makes it too short for one."""
+    """A status packet with these bytes after the instruction; without any it is too short."""
     packet = [0xFF, 0xFF, 0xFD, 0, device_id, len(after) + 3, 0, 0x55, *after]
     crc = PacketHandler(2.0).updateCRC(0, packet, len(packet))
     return bytes([*packet, crc & 0xFF, crc >> 8])
@@ -60,7 +60,7 @@ class FakeSerial:
 
 
 class Babbling(FakeSerial):
-    """A port on which this comes without an end, at 1 Mbaud."""
+    """A port that receives this junk endlessly, at 1 Mbaud."""
 
     def __init__(self, junk: Iterator[int]) -> None:
         super().__init__()

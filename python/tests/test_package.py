@@ -1,4 +1,4 @@
-"""The package as a whole: its types, and its wheel. Nothing is fetched: `cargo xtask test` has installed what it takes."""
+"""The package as a whole: its types, and its wheel. Nothing is downloaded: `cargo xtask test` installs the tools."""
 
 import os
 import subprocess
@@ -15,7 +15,7 @@ class Package(OnServed):
     ARGUMENTS = ("wall",)
 
     def done(self, *command: "str | Path", cwd: Optional[Path] = None) -> str:
-        """What a program says that runs without the package's source in its path."""
+        """Output of a program that runs without the package's source in its path."""
         environment = {**os.environ, "PYTHONPATH": sysconfig.get_path("purelib")}
         done = subprocess.run(command, cwd=cwd, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         self.assertEqual(done.returncode, 0, done.stdout)

@@ -68,7 +68,7 @@ pub fn creep(series: &HeldSeries) -> Result<Creep, NoDrift> {
         let off = readings.iter().map(|[time_s, force_n]| (model(time_s - begin_s) - force_n / first_n) / 1e-3);
         DVector::from_iterator(readings.len(), off)
     };
-    // Beside the unknowns a weak bound holds the time constant near to what the hold shows.
+    // A weak prior keeps the time constant near the length of the hold.
     let lag = |x: &DVector<f64>| {
         let model = |time_s: f64| x[0] * (1.0 + x[1] * (1.0 - (-time_s / x[2].exp()).exp()));
         off(&model).push((x[2] - (0.3 * long_s).ln()) / 2.0)
@@ -98,7 +98,7 @@ pub struct Temperature {
 
 /// Change of the array's gain with the chip's temperature (FlexiForce A201: 0.36 %/K), from two presses at the same place.
 ///
-/// Both presses are solved for the modulus; what the two have in common, radius and gains, cancels in their ratio.
+/// Both presses are solved for the modulus; errors in radius and gains, common to both, cancel in the ratio.
 pub fn temperature(cold: &Press, warm: &Press) -> Result<Temperature, NoDrift> {
     let mean_c = |press: &Press| {
         let known: Vec<f64> = press.steps.iter().filter_map(|step| step.chip_c).collect();

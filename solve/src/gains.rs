@@ -1,6 +1,6 @@
 //! Poses and taxel gains of all presses together.
 //!
-//! On the way in, taxel i reads at step k of a press
+//! While it loads, taxel i reads at step k of a press
 //!
 //! ```text
 //! u_ik = g_i y_k m_i(x_k; pose)
@@ -29,7 +29,7 @@ pub enum Condition {
     Sound,
     /// No press reached it: it keeps its gain.
     Unreached,
-    /// Reads less than a quarter of what it should, or the chip counted it as bad in most steps.
+    /// Reads less than a quarter of the expected value, or the chip counted it as bad in most steps.
     Dead,
     /// Reads, but does not follow the model: left out.
     Odd,
@@ -44,7 +44,7 @@ pub struct Gain {
     pub sigma: f64,
     /// Condition.
     pub condition: Condition,
-    /// Its highest reading, codes.
+    /// Highest reading of the taxel, codes.
     pub highest: f64,
 }
 
@@ -112,8 +112,8 @@ pub enum NoGains {
     /// The judgement of a press.
     #[error("{0}")]
     Judged(Verdict),
-    /// Number of steps on the way in that touch.
-    #[error("{0} steps of the way in touch the plate; 5 are needed: press deeper")]
+    /// Number of loading steps that touch.
+    #[error("{0} loading steps touch the plate; 5 are needed: press deeper")]
     Steps(usize),
     /// Number of sound taxels that were pressed.
     #[error("{0} sound taxels were pressed; 8 are needed: press deeper or nearer the middle")]
@@ -190,7 +190,7 @@ pub(crate) fn settle(presses: &[Press]) -> Result<Settled, NoGains> {
 mod tests {
     use super::*;
 
-    /// With the factor, a code that the chip multiplies and then puts through the characteristic reads what it should.
+    /// The chip applies the factor before the characteristic: a corrected code must still give the true pressure.
     #[test]
     fn the_factor_goes_through_the_characteristic() {
         for (curve_permille, reads) in [(0, 1.2), (500, 1.2), (3_000, 0.8), (8_000, 1.2)] {

@@ -77,7 +77,7 @@ pub fn joint(presses: &[Press], yield_usual: f64) -> Result<Gains, NoGains> {
 #[derive(Clone)]
 struct Unknowns {
     poses: Vec<Pose>,
-    /// Of each step that is used, kPa.
+    /// Stiffness at each used step, kPa.
     stiffness: Vec<f64>,
     gains: Vec<f64>,
 }
@@ -91,7 +91,7 @@ struct Joint<'a> {
     /// Taxels that the chip counted as bad in most steps.
     bad: Vec<bool>,
     conditions: Vec<Condition>,
-    /// Standard deviation of the residuals, in what is expected of them.
+    /// Standard deviation of the residuals, relative to the expected one.
     scale: f64,
     damping: f64,
     yield_usual: f64,
@@ -294,7 +294,7 @@ impl<'a> Joint<'a> {
         Ok((0.0, residuals))
     }
 
-    /// Huber's cost with what is usual.
+    /// Huber's cost of the residuals, plus the prior of gains and plate.
     fn cost(&self, residuals: &[Residual]) -> f64 {
         let off: f64 = residuals.iter().map(|residual| huber_cost(residual.value / self.scale)).sum();
         let gains: f64 = self.now.gains.iter().map(|gain| ((gain - 1.0) / GAIN_USUAL).powi(2)).sum();

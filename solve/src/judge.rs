@@ -1,10 +1,10 @@
 //! Judgement of a press: was the plate hard, and did it stand still?
 //!
 //! The shape of the tactile image shows how deep the tip is, whatever gains, creep and relaxation do to the force: pressures
-//! under the rim against those in the middle. For each step the shift of the contact that the image asks for, beyond the
+//! under the rim against those in the middle. For each step the shift of the contact in the image, beyond the
 //! encoder's travel, follows from the residuals by least squares, together with the step's stiffness. A plate that yields
-//! shifts in proportion to the force, a plate that moves shifts with time. So a yielding plate is told from a tip that relaxes,
-//! which bent lines of force (the chip's present method) cannot do.
+//! shifts in proportion to the force, a plate that moves shifts with time. This separates a yielding plate from a
+//! relaxing tip, which is impossible from the force curves alone (the chip's present method).
 
 use crate::gains::{Condition, Gain};
 use crate::model::{Pose, Square};
@@ -12,7 +12,7 @@ use crate::press::{Press, Step};
 use crate::robust::median;
 use nalgebra::{Matrix3, Vector3};
 
-/// Shift of the contact that a step asks for.
+/// Shift of the contact that the image of a step shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shift {
     /// Middle of the step, s.
@@ -25,7 +25,7 @@ pub struct Shift {
     pub expected_n: f64,
     /// Travel minus depth of the contact, mm.
     pub shift_mm: f64,
-    /// Its standard deviation, mm.
+    /// Standard deviation of the shift, mm.
     pub sigma_mm: f64,
 }
 
@@ -76,7 +76,7 @@ const SIGMAS: f64 = 3.0;
 /// Depth from which on a step without force counts as lost, as a share of the deepest.
 const LOST_FROM: f64 = 0.5;
 
-/// Shift of the contact that each step of a press in contact asks for.
+/// Shifts of the contact, by the image, for all steps of a press that touch.
 pub fn shifts(press: &Press, pose: &Pose, taxels: &[Gain], forces_n: &[f64]) -> Vec<Shift> {
     let array = &press.array;
     let squares: Vec<_> = (0..array.taxels()).map(|taxel| Square::new(pose, &press.tip, array, taxel)).collect();

@@ -1,4 +1,5 @@
-//! The force that an array reads over a press: elastic, less what the tip forgets, through the ink's hysteresis and creep.
+//! Model of the force that an array reads in a press: elastic force, relaxation of the tip, and the ink's hysteresis
+//! and creep.
 //!
 //! In the order in which they act:
 //!
@@ -14,7 +15,7 @@
 use crate::press::{Press, Step};
 use std::f64::consts::PI;
 
-/// The creep's time constants, s. The reading that `codes_per_kpa` stands for is the one within the first millisecond.
+/// Time constants of the creep, s. `codes_per_kpa` refers to the reading within the first millisecond.
 const CREEP_S: [f64; 7] = [1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3];
 /// Rings of equal area, counted over the largest contact: the play acts on each.
 const RINGS: usize = 16;
@@ -30,11 +31,11 @@ pub struct Memory {
     pub creep: f64,
     /// Share s of the force that the tip forgets in the end.
     pub relaxation: f64,
-    /// Its time constant, s.
+    /// Time constant of the relaxation, s.
     pub relaxation_s: f64,
 }
 
-/// Travel over time: three places for each step of a press, and the way to its begin.
+/// Travel over time: three places for each step of a press, and the approach before the first.
 #[derive(Clone, Debug)]
 pub struct Motion {
     /// Time, s, and travel, mm.
@@ -155,7 +156,7 @@ struct LowPass {
 /// Coefficients of a low-pass for a step, independent of its input.
 #[derive(Clone, Copy, Debug)]
 struct Coefficients {
-    /// Share of the way to a constant input.
+    /// Share of the distance to a constant input that a step covers.
     gone: f64,
     /// Share of the input at the end of the step.
     straight: f64,

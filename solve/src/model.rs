@@ -58,7 +58,7 @@ impl Pose {
 pub struct Share {
     /// The pressure.
     pub value: f64,
-    /// Its slopes.
+    /// Derivatives of the pressure by the unknowns.
     pub slopes: [f64; UNKNOWNS],
 }
 

@@ -13,8 +13,9 @@ use crate::robust::{Fit, minimise};
 use nalgebra::DVector;
 use std::f64::consts::PI;
 
-/// Usual widths of what is remembered; they only matter where a press does not show it. Hysteresis up to 10 %, creep
-/// under 5 % a decade (Interlink FSR 400 guide); silicones forget 5 to 20 %, most of it within a second or two (Fung, 7.6).
+/// Usual sizes of hysteresis, creep and relaxation; they only matter if a press does not determine these. Hysteresis up
+/// to 10 %, creep under 5 % a decade (Interlink FSR 400 guide); silicones relax by 5 to 20 %, mostly within two seconds
+/// (Fung, 7.6).
 const HYSTERESIS_USUAL: f64 = 0.1;
 const CREEP_USUAL: f64 = 0.03;
 const RELAXATION_USUAL: f64 = 0.1;
@@ -33,7 +34,7 @@ const UNKNOWNS: usize = 5;
 pub struct OfPress {
     /// Young's modulus, kPa.
     pub kpa: f64,
-    /// Its standard uncertainty from the residuals, kPa.
+    /// Standard uncertainty of the modulus from the residuals, kPa.
     pub sigma_kpa: f64,
     /// Travel at which the tip touches, mm.
     pub touch_mm: f64,

@@ -123,7 +123,7 @@ pub struct Press {
 }
 
 impl Press {
-    /// Steps of the way in, each deeper than the one before: all taxels load.
+    /// Loading steps, each deeper than the one before: all taxels load.
     pub fn inward(&self) -> impl Iterator<Item = &Step> {
         let mut before_mm = f64::NEG_INFINITY;
         self.steps.iter().filter(move |step| {
@@ -150,8 +150,8 @@ const BESIDE: usize = 4;
 /// Force of each step, N: what the sound taxels read, gains taken off, times what the model has under the whole contact over
 /// what it has under them. So the missing force of dead taxels, and of what lies off the array, is filled by the model.
 ///
-/// Near the contact the ratio is that of a quarter of the depth: there and in the air, readings that creep leaves are forces
-/// too, by which [`crate::modulus()`] tells creep from relaxation.
+/// Near the contact and in the air, the ratio is the one at a quarter of the depth: the readings that creep leaves
+/// there count as forces too, and [`crate::modulus()`] needs them to separate creep from relaxation.
 pub fn forces(press: &Press, pose: &Pose, taxels: &[Gain]) -> Vec<f64> {
     let Press { tip, array, .. } = press;
     let sound = |taxel: usize| matches!(taxels[taxel].condition, Condition::Sound | Condition::Unreached);

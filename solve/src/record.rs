@@ -80,7 +80,7 @@ pub enum NoRecord {
     #[error("the series has {1} bytes where its head says {0}: it was cut or joined")]
     Length(u64, usize),
     /// Check by the head, and check of the body.
-    #[error("the check of the body is {1:08x} where the head says {0:08x}: bytes were changed on the way")]
+    #[error("the check of the body is {1:08x} where the head says {0:08x}: bytes were changed in transfer")]
     Check(u32, u32),
     /// The frame time is 0.
     #[error("the head says a frame time of 0")]
@@ -162,8 +162,8 @@ pub fn press(bytes: &[u8], params: &Params) -> Result<Press, NoRecord> {
     Ok(Press { tip, array, steps, ended: head.ended })
 }
 
-/// Strokes of a series. The resistance is that of the parameters, with an uncertainty of 2.2 %: who has measured it better
-/// overwrites it.
+/// Strokes of a series. The resistance is that of the parameters, with an uncertainty of 2.2 %; a caller with a better
+/// measurement overwrites it.
 pub fn strokes(bytes: &[u8], params: &Params) -> Result<Record, NoRecord> {
     params.check()?;
     let (head, body) = Head::of(bytes, Kind::Strokes)?;

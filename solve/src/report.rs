@@ -5,7 +5,7 @@ use crate::gains::{Condition, Gains};
 use crate::modulus::Modulus;
 use crate::record::{Ended, Kind, Reason};
 use crate::scale::Scale;
-use crate::strokes::Drive;
+use crate::strokes::MeasuredDrive;
 use std::fmt::{Display, Formatter, Result};
 
 /// The uncertainty with two digits, the value with as many decimals.
@@ -78,8 +78,8 @@ impl Display for Ended {
             }
             Reason::Stalled => write!(
                 f,
-                "the tip stopped at {thousandths:.2} mm before it was deep enough: is current_max_ma too small, or the way \
-                 blocked?"
+                "the tip stopped at {thousandths:.2} mm before it was deep enough: is current_max_ma too small, or the \
+                 tip blocked?"
             ),
             Reason::Full => write!(
                 f,
@@ -193,7 +193,7 @@ impl Display for Temperature {
     }
 }
 
-impl Display for Drive {
+impl Display for MeasuredDrive {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
         let [forward, back] = self.friction.each_ref().map(|friction| times(&friction.torque_nm, 1e6));
         let [slowest, fastest] = self.speeds_rad_per_s;
@@ -213,7 +213,7 @@ impl Display for Drive {
 pub struct Value {
     /// The estimate.
     pub value: f64,
-    /// Its standard uncertainty.
+    /// Standard uncertainty of the estimate.
     pub sigma: f64,
 }
 

@@ -15,8 +15,8 @@ use crate::Value;
 use crate::robust::{Fit, minimise};
 use nalgebra::DVector;
 
-/// Goals before a held force, as shares of it: one above, then one below. An array with hysteresis reads less on the way up
-/// than on the way down; these bring the reading between the two.
+/// Goals before a held force, as shares of it: one above, then one below. An array with hysteresis reads less while
+/// the force rises than while it falls; these goals bring the reading between the two.
 pub const SWINGS: [f64; 2] = [1.06, 0.98];
 
 /// A force that was held on a scale.

@@ -8,16 +8,16 @@
 //! a w' = V - k w - V_f(w)      a = R J / k      V_f = R T_f / k
 //! ```
 //!
-//! so k, a and the friction voltage V_f can be seen, and tau = a / k = R J / k^2; J = a k / R and T_f = V_f k / R
-//! need R. At a speed w only the sum k w + V_f(w) can be seen. Friction that grows in proportion to the speed
-//! (viscous, b) can therefore not be told from back-EMF: k + R b / k is found. Friction that falls with speed,
+//! so k, a and the friction voltage V_f are observable, and tau = a / k = R J / k^2; J = a k / R and T_f = V_f k / R
+//! need R. At a speed w only the sum k w + V_f(w) is observable. Friction that grows in proportion to the speed
+//! (viscous, b) is therefore indistinguishable from back-EMF: k + R b / k is found. Friction that falls with speed,
 //!
 //! ```text
 //! V_f(w) = V_c + V_s share(w / w_s)
 //! ```
 //!
-//! is separated from k by strokes at several speeds, because it is gone at high speed. Where the strokes were all
-//! slow it is not separated, and the standard uncertainty of k is as large as that leaves it.
+//! is separated from k by strokes at several speeds, because it vanishes at high speed. If all strokes were
+//! slow it is not separated, and the standard uncertainty of k is large.
 //!
 //! The parameters of all strokes are fitted together by nonlinear least squares over the samples, with Huber
 //! weights. Each stroke has its own angle and speed at its first fitted sample, so what happens at standstill is
@@ -46,8 +46,8 @@ use nalgebra::SVector;
 pub const VOLTAGE: f64 = 0.008;
 /// Standard uncertainty of the moment at which a voltage acts, s: the time constant of the winding, L / R, adds to tau.
 pub const TIMING_S: f64 = 20e-6;
-/// What friction may fall by beside its form, as a share of its voltage, up to the speed of the fastest stroke. Beyond
-/// [`SETTLED`] it is less by the square of the speed.
+/// Largest fall of friction that the form does not describe, up to the speed of the fastest stroke, as a share of the
+/// friction voltage. Above [`SETTLED`] the allowance falls with the square of the speed.
 pub const UNSEEN: f64 = 0.1;
 /// Speed beyond which friction of brushes and bearings hardly falls, rad/s.
 pub const SETTLED: f64 = 30.0;
@@ -62,7 +62,8 @@ const FAST: f64 = 0.4;
 /// A force that depends on the place is refused above this, N, where it is this many times its uncertainty.
 const PUSH_N: f64 = 0.05;
 const PUSH_SIGMAS: f64 = 4.0;
-/// The count may jump by these counts, and by this many times what the voltage can make of the speed between samples.
+/// Allowed jump of the count between samples: a number of counts, plus a multiple of the largest change that the
+/// voltage can cause.
 const JUMP_COUNTS: f64 = 3.0;
 const JUMP: f64 = 3.0;
 
@@ -108,7 +109,7 @@ impl Stroke {
 pub struct Record {
     /// Time between samples, s.
     pub sample_s: f64,
-    /// From a sample's count to the moment at which the voltage made in the same frame acts, s.
+    /// Delay from a sample's count to the effect of the voltage computed in the same frame, s.
     pub delay_s: f64,
     /// Encoder counts for a turn of the motor.
     pub counts_per_turn: f64,
@@ -124,7 +125,7 @@ pub struct Record {
 
 /// Reason why there is no drive, with the number behind it.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum Refusal {
+pub enum NoDrive {
     /// The chip ended the motions early.
     #[error("the strokes were ended early: {0}")]
     Ended(#[from] Ended),
@@ -156,17 +157,17 @@ pub enum Refusal {
 /// Friction in one direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Friction {
-    /// V_c: its voltage at high speed, V.
+    /// V_c: friction voltage at high speed, V.
     pub voltage_v: Value,
-    /// V_s: what standstill adds, V.
+    /// V_s: additional friction voltage at standstill, V.
     pub standstill_v: Value,
-    /// Its torque at high speed, N m, with the caller's resistance.
+    /// Friction torque at high speed, N m, with the caller's resistance.
     pub torque_nm: Value,
 }
 
 /// A drive as measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Drive {
+pub struct MeasuredDrive {
     /// k, N m/A: the back-EMF constant in V s/rad.
     pub torque_constant: Value,
     /// tau = R J / k^2, s.
@@ -187,13 +188,13 @@ pub struct Drive {
     pub speeds_rad_per_s: [f64; 2],
 }
 
-/// Drive of a record.
+/// Drive that a record shows.
 ///
 /// # Errors
-/// [`Refusal`] where the motions were ended early or the samples do not follow the model.
-pub fn solve(record: &Record) -> Result<Drive, Refusal> {
+/// [`NoDrive`] if the motions were ended early or the samples do not follow the model.
+pub fn solve(record: &Record) -> Result<MeasuredDrive, NoDrive> {
     match record.ended {
-        // The motions went on after the memory was full: what it holds counts, but for the stroke that was cut.
+        // The motions continued after the memory was full: all strokes in it are used except the last, which was cut.
         Some(Ended { reason: Reason::Full, .. }) => {
             let strokes = record.strokes.split_last().map_or(Vec::new(), |(_, strokes)| strokes.to_vec());
             return solve(&Record { strokes, ended: None, ..record.clone() });
@@ -205,9 +206,9 @@ pub fn solve(record: &Record) -> Result<Drive, Refusal> {
     let gone = || record.strokes.iter().map(Stroke::gone);
     let (least, most) = (gone().min().unwrap_or(0), gone().max().unwrap_or(0));
     if -least >= STILL_COUNTS {
-        return Err(Refusal::Reversed(-least));
+        return Err(NoDrive::Reversed(-least));
     } else if most < STILL_COUNTS {
-        return Err(Refusal::Still(most));
+        return Err(NoDrive::Still(most));
     }
     let places = || record.strokes.iter().flat_map(|stroke| &stroke.samples).map(|sample| f64::from(sample.count));
     let rad = core::f64::consts::TAU / record.counts_per_turn;
@@ -219,28 +220,28 @@ pub fn solve(record: &Record) -> Result<Drive, Refusal> {
     for side in 0..2 {
         let strokes = paths.iter().flat_map(|parts| parts.first()).filter(|path| path.side == side).count();
         if strokes < STROKES_MIN {
-            return Err(Refusal::Few(strokes));
+            return Err(NoDrive::Few(strokes));
         }
     }
     let paths: Vec<Path> = paths.into_iter().flatten().collect();
     if fastest < SPEEDS * slowest {
-        return Err(Refusal::Slow(fastest / slowest));
+        return Err(NoDrive::Slow(fastest / slowest));
     }
-    // Changes of speed between samples, counts; the largest is compared with what the largest voltage can make of it, or
-    // with the others where nothing can be fitted.
+    // Changes of speed between samples, counts. The largest is compared with the largest change that the voltage can
+    // cause, or with the usual change if the fit fails.
     let samples = record.strokes.iter().flat_map(|stroke| stroke.samples.windows(3));
     let mut jumps: Vec<i32> = samples.map(|part| (part[2].count - 2 * part[1].count + part[0].count).abs()).collect();
     jumps.sort_unstable();
     let jump = jumps.last().copied().unwrap_or(0);
     let fits = Fit::all(&paths, record, slowest).map_err(|refusal| {
         let usual = jumps.get(jumps.len() * 9 / 10).copied().map_or(0.0, f64::from);
-        if f64::from(jump) > JUMP_COUNTS + JUMP * usual { Refusal::Astray(jump) } else { refusal }
+        if f64::from(jump) > JUMP_COUNTS + JUMP * usual { NoDrive::Astray(jump) } else { refusal }
     })?;
     let best = &fits[0];
     let most_v = paths.iter().map(|path| path.voltage_v).fold(0.0, f64::max);
     let most = most_v / best.p[index::A].exp() * record.sample_s.powi(2) / rad;
     if f64::from(jump) > JUMP_COUNTS + JUMP * most {
-        return Err(Refusal::Astray(jump));
+        return Err(NoDrive::Astray(jump));
     }
     let newtons = best.p[index::K].exp() / resistance.value * record.rad_per_mm * 1e3;
     let pushes = [index::FRONT, index::SPRING].map(|force| {
@@ -249,7 +250,7 @@ pub fn solve(record: &Record) -> Result<Drive, Refusal> {
     });
     let force_n = if pushes[0].value > pushes[1].value { pushes[0] } else { pushes[1] };
     if force_n.value > PUSH_N && force_n.value > PUSH_SIGMAS * force_n.sigma {
-        return Err(Refusal::Pushed(force_n.value));
+        return Err(NoDrive::Pushed(force_n.value));
     }
 
     // A friction that falls evenly with speed: k is found lower, and friction higher.
@@ -295,7 +296,7 @@ pub fn solve(record: &Record) -> Result<Drive, Refusal> {
         }
     });
     let both = [(index::A, 1.0), (index::K, 1.0)];
-    Ok(Drive {
+    Ok(MeasuredDrive {
         torque_constant: logarithm(k, &[(index::K, 1.0)], VOLTAGE),
         time_constant_s: logarithm(a / k, &[(index::A, 1.0), (index::K, -1.0)], TIMING_S * k / a),
         inertia_kg_m2: logarithm(a * k / resistance.value, &both, resistance.relative().hypot(2.0 * VOLTAGE)),

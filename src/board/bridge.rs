@@ -39,7 +39,7 @@ pub fn is_safe() -> bool {
 
 /// The bridge's inputs.
 pub struct Bridge {
-    /// When nSLEEP went high, while it is high.
+    /// Time at which nSLEEP went high, while it is high.
     woken: Option<u32>,
     ready: bool,
     driving: bool,

@@ -20,8 +20,8 @@ bind_interrupts!(struct Irqs {
 
 /// Takes the end of what comes in, and of what goes out.
 ///
-/// A read of the data register takes a byte that the DMA has not yet fetched, and no flag tells. But the flags of the
-/// receiver are cleared by nothing else. So the register is read here only: where the line has just fallen idle, and
+/// A read of the data register takes a byte that the DMA has not yet fetched, and no flag reports it. But nothing else
+/// clears the flags of the receiver. So the register is read here only: where the line has just fallen idle, and
 /// the next byte takes longer to arrive than this takes to run, or with a byte in error.
 ///
 /// The line is given back here, at the end of the last stop bit. The task would come after control, up to a frame
@@ -32,7 +32,7 @@ fn USART2() {
     let error = status.fe() || status.ne() || status.ore();
     if error || status.idle() {
         pac::USART2.dr().read();
-        // An error that nobody has taken yet is not covered by an idle line.
+        // A signaled error must reach the task: an idle line must not overwrite it.
         if error || !RECEIVED.signaled() {
             RECEIVED.signal(status);
         }
@@ -143,7 +143,7 @@ impl Bus {
     /// Waits for bytes: until the line falls idle, or half of the ring is full.
     ///
     /// # Errors
-    /// Framing, noise or overrun; the next call goes on.
+    /// Framing, noise or overrun; the next call continues.
     pub async fn receive(&mut self, bytes: &mut [u8]) -> Result<usize, usart::Error> {
         loop {
             let stored = RING.len() - usize::from(pac::DMA1.st(RX_STREAM).ndtr().read().ndt());
@@ -174,8 +174,8 @@ impl Bus {
     /// The port's own.
     pub async fn send(&mut self, bytes: &[u8]) -> Result<(), usart::Error> {
         self.transmit_enable.set_high();
-        // The flag of the last transmission still stands, as the DMA alone does not clear it: the line would be given
-        // back early.
+        // The DMA does not clear the flag of the last transmission: with the flag still set, the line would be released
+        // early.
         forget_completion();
         SENT.reset();
         cortex_m::interrupt::free(|_| pac::USART2.cr1().modify(|w| w.set_tcie(true)));

@@ -1,11 +1,11 @@
-//! Control's side of a capture: it keeps frames while nobody else reaches the memory, then leaves it to the link.
+//! Control's side of a capture: control alone fills the memory with frames, then hands the memory to the link.
 
 use core::sync::atomic::{AtomicU8, Ordering};
 
-use fingertip::capture::{CaptureStatus, Ended, State};
+use fingertip::capture::{CaptureState, CaptureStatus, Ended};
 use fingertip::command::Command;
 use fingertip::frame::Sense;
-use fingertip::measure::{State as Motion, Task};
+use fingertip::measure::{MeasureState, Task};
 use fingertip::pipeline::Status;
 use fingertip::shipped::{Frame, Pipeline};
 
@@ -41,7 +41,7 @@ impl Keeper {
         match ASKED.load(Ordering::Relaxed) {
             NOTHING => return,
             // The link may be reading the one before: then in a later turn.
-            ARM if self.standing.state == State::Done => {
+            ARM if self.standing.state == CaptureState::Done => {
                 if CAPTURE.take(|_| ()).is_none() {
                     return;
                 }
@@ -55,7 +55,7 @@ impl Keeper {
 
     /// Returns true if the next step is the first one to keep.
     pub fn is_due(&mut self, status: &Status, command: impl FnOnce() -> Command) -> bool {
-        if self.standing.state != State::Armed {
+        if self.standing.state != CaptureState::Armed {
             return false;
         }
         let (mut due, command) = (false, command());
@@ -71,7 +71,7 @@ impl Keeper {
 
     /// Keeps a step, where one is to be kept.
     pub fn record(&mut self, frame: &Frame, sense: &Sense, command: &Command, status: &Status) {
-        if self.standing.state == State::Recording {
+        if self.standing.state == CaptureState::Recording {
             self.work(|capture| capture.record(frame, sense, command, status));
         }
     }
@@ -79,13 +79,13 @@ impl Keeper {
     /// Keeps the record of a motion that measures.
     pub fn follow(&mut self, pipeline: &Pipeline) {
         let motion = pipeline.status().measure;
-        let runs = motion.state == Motion::Running && motion.task != Task::Jog;
+        let runs = motion.state == MeasureState::Running && motion.task != Task::Jog;
         if !runs && !self.measures {
             return;
         }
         // The link may be reading what was kept before: then in the next frame. A motion whose record was ended early
         // ends in the capture too, or the next one would have no record.
-        if self.standing.state == State::Done && runs != self.measures && CAPTURE.take(|_| ()).is_none() {
+        if self.standing.state == CaptureState::Done && runs != self.measures && CAPTURE.take(|_| ()).is_none() {
             return;
         }
         self.work(|capture| capture.follow(pipeline));
@@ -94,7 +94,7 @@ impl Keeper {
 
     /// Ends it.
     pub fn end(&mut self, why: Ended) {
-        if matches!(self.standing.state, State::Armed | State::Recording) {
+        if matches!(self.standing.state, CaptureState::Armed | CaptureState::Recording) {
             self.work(|capture| capture.end(why));
         }
     }
@@ -107,7 +107,7 @@ impl Keeper {
             capture.standing()
         });
         self.standing = standing.unwrap_or(self.standing);
-        if self.standing.state == State::Done {
+        if self.standing.state == CaptureState::Done {
             CAPTURE.fill(|_| ());
         }
     }

@@ -15,8 +15,8 @@ use embassy_stm32::{Config, Peripherals};
 /// Number of checks for the external clock: for about 0.4 s, at 16 MHz and about 6 cycles a check.
 const LOOKS: u32 = 1_000_000;
 
-/// Starts the external clock and its guard, and says whether it is there. Comes before [`init`], which would wait for
-/// it for ever.
+/// Starts the external clock and its guard; returns true if the clock runs. Must precede [`init`], which would wait
+/// for ever for a missing clock.
 pub fn start_external() -> bool {
     pac::RCC.cr().modify(|w| w.set_hsebyp(true));
     pac::RCC.cr().modify(|w| w.set_hseon(true));

@@ -50,7 +50,7 @@ pub struct Control {
 /// Runs for ever.
 #[embassy_executor::task]
 pub async fn run(control: Control) {
-    let mut state = State::new(control);
+    let mut state = ControlTask::new(control);
     state.start();
     loop {
         WAKE.wait().await;
@@ -60,7 +60,7 @@ pub async fn run(control: Control) {
     }
 }
 
-struct State {
+struct ControlTask {
     parts: Control,
     frame: Frame,
     seen: u32,
@@ -75,7 +75,7 @@ struct State {
     keeper: Keeper,
 }
 
-impl State {
+impl ControlTask {
     fn new(parts: Control) -> Self {
         Self {
             parts,
@@ -257,7 +257,7 @@ pub struct FrameClock {
 }
 
 impl FrameClock {
-    /// From 0 on.
+    /// Clock that starts at 0.
     pub const fn new() -> Self {
         Self { last: 0, part_ticks: 0, time_us: 0 }
     }
@@ -309,7 +309,7 @@ impl BusClock {
     }
 }
 
-impl State {
+impl ControlTask {
     fn rest(&mut self) {
         self.parts.scan.stop();
         guard::rest();
@@ -368,7 +368,7 @@ impl State {
     }
 }
 
-/// A function of its own, because a configuration is large and takes stack only here.
+/// Applies parameters. Not inlined: a configuration is large and takes stack only here.
 #[inline(never)]
 fn set_config(pipeline: &mut Pipeline, params: &Params) -> bool {
     Config::shipped(params).is_ok_and(|config| {

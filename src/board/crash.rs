@@ -148,10 +148,10 @@ unsafe fn NonMaskableInt() -> ! {
     end(CrashCause::Clock, 0, 0)
 }
 
-/// Gives the handler a stack of its own where the fault was the stack's overflow, and passes on the exception's frame.
+/// Switches to a separate stack if the fault was a stack overflow, and passes on the exception's frame.
 ///
 /// # Safety
-/// For the vector table only.
+/// Only the vector table may refer to it.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
 unsafe extern "C" fn HardFault() -> ! {

@@ -66,15 +66,15 @@ pub struct Heard {
     pub packets: u32,
 }
 
-/// All that the bus may read of a frame, with the report made of it.
-pub struct Picture {
+/// Values of a frame that the bus may read, with the report made of it.
+pub struct BusSnapshot {
     /// The report; none before the first.
     pub report: Option<Report>,
     /// The frame.
     pub frame: Frame,
-    /// Its taxels, sixteenths of a corrected code above tare.
+    /// Taxels of the frame, sixteenths of a corrected code above tare.
     pub taxels: [[i32; COLUMNS]; ROWS],
-    /// Pressure in Pa for such a sixteenth, Q32.
+    /// Pressure of a sixteenth of a code, Pa, Q32.
     pub pascals_per_sum_q32: i64,
     /// Readings of the taxels without contact, corrected codes with [`fingertip::pressure::TARE_BITS`] fractional
     /// bits.
@@ -94,7 +94,7 @@ pub static SAVE: Mailbox<Record> = Mailbox::new(Record::DEFAULT);
 /// See [`SAVE`].
 pub static SAVED: Signal<CriticalSectionRawMutex, Result<(), NotSaved>> = Signal::new();
 /// Newest snapshot; control does not change it while the link answers from it.
-pub static PICTURE: Mailbox<Picture> = Mailbox::full(Picture {
+pub static PICTURE: Mailbox<BusSnapshot> = Mailbox::full(BusSnapshot {
     report: None,
     frame: Frame::EMPTY,
     taxels: [[0; COLUMNS]; ROWS],
@@ -159,19 +159,19 @@ impl<T> Mailbox<T> {
         self.turn(FULL, EMPTY, read)
     }
 
-    /// Changes the value where the box is empty, and leaves it so: for who alone fills it.
+    /// Changes the value of an empty box, which stays empty: for the only task that fills the box.
     pub fn work<R>(&self, act: impl FnOnce(&mut T) -> R) -> Option<R> {
         self.turn(EMPTY, EMPTY, act)
     }
 
-    /// Looks at the value, or replaces it, where the box is full, and leaves it there.
+    /// Reads or replaces the value of a full box, which stays full.
     pub fn visit<R>(&self, act: impl FnOnce(&mut T) -> R) -> Option<R> {
         self.turn(FULL, FULL, act)
     }
 
     fn turn<R>(&self, from: u8, to: u8, act: impl FnOnce(&mut T) -> R) -> Option<R> {
         self.state.compare_exchange(from, BUSY, Ordering::Acquire, Ordering::Relaxed).ok()?;
-        // SAFETY: the exchange above was won, so nobody else reaches the value until the store below.
+        // SAFETY: the exchange above succeeded, so no other task accesses the value until the store below.
         let result = act(unsafe { &mut *self.value.get() });
         self.state.store(to, Ordering::Release);
         Some(result)

@@ -51,7 +51,7 @@ impl Store {
     /// most 100 us: the motor must be off and the scan stopped, and `between` must feed the watchdog.
     ///
     /// # Errors
-    /// There is no room, or the flash does not hold the record afterwards.
+    /// The sectors are full, or the flash does not hold the record afterwards.
     pub fn save(&mut self, record: &Record, between: impl FnMut()) -> Result<(), SaveError> {
         self.journal.save(&mut self.chip, record, between)
     }

@@ -2,7 +2,7 @@
 //!
 //! Control has three quarters of a frame time to answer a frame, and each answer moves the guard to the instant at
 //! which the next one is due: one and three quarters frame times after this frame's end. When that passes, the
-//! interrupt of the highest priority cuts the bridge, tells the control task, and sets the next deadline, so that
+//! interrupt of the highest priority cuts the bridge, signals the control task, and sets the next deadline, so that
 //! control runs on (without frames) and can see to the bridge, the watchdog and the scan's restart.
 
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -28,12 +28,12 @@ pub const TICKS_PER_US: u32 = HZ / 1_000_000;
 pub struct Stopwatch(pub u32);
 
 impl Stopwatch {
-    /// From an instant to now.
+    /// Time from an instant to now.
     pub fn since(from: u32) -> Self {
         Self(now().wrapping_sub(from))
     }
 
-    /// From a frame's end to the end of the time in which the next one is to be answered.
+    /// Time from the end of a frame to the deadline for the answer to the next one.
     const fn to_next_answer(timing: ScanTiming) -> Self {
         Self(frame(timing) + timing.deadline.0 / (CLOCKS.core_hz / HZ))
     }

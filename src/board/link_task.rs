@@ -10,7 +10,7 @@ use fingertip::shipped::{CLOCKS, Record, Server, Snapshot};
 use super::bus::Bus;
 use super::capture;
 use super::crash::{self, Boot};
-use super::exchange::{CAPTURE, GAINS, HEARD, Heard, NotSaved, PARAMS, PICTURE, Picture, SAVE, SAVED};
+use super::exchange::{BusSnapshot, CAPTURE, GAINS, HEARD, Heard, NotSaved, PARAMS, PICTURE, SAVE, SAVED};
 use super::guard::{self, Stopwatch};
 use super::health;
 use super::log::log_save_error;
@@ -136,8 +136,8 @@ async fn save(record: &Record) -> bool {
 }
 
 /// Snapshot for the bus, from the newest data.
-fn snapshot(picture: &Picture, boot: Boot) -> Snapshot<'_> {
-    let Picture { report, frame, taxels, pascals_per_sum_q32, tare } = picture;
+fn snapshot(picture: &BusSnapshot, boot: Boot) -> Snapshot<'_> {
+    let BusSnapshot { report, frame, taxels, pascals_per_sum_q32, tare } = picture;
     let report = report.unwrap_or_default();
     Snapshot {
         status: report.status,

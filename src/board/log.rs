@@ -80,7 +80,7 @@ const PERIOD_MS: u64 = 20;
 /// 5 Hz.
 const BLINK_PERIODS: u32 = 5;
 
-/// On with torque, fast blink on fault, off otherwise.
+/// Drives the LED: on with torque, fast blink in a fault, off otherwise.
 #[embassy_executor::task]
 pub async fn run(mut led: Output<'static>) {
     let mut last = LoopState::default();

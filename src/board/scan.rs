@@ -112,8 +112,8 @@ impl Scan {
         start_timer();
     }
 
-    /// Copies the frame, or says that it is not whole: a bank is missing, the banks and the rows are out of step, or
-    /// the DMA was in this half meanwhile.
+    /// Copies the frame. Returns false if it is not whole: a bank is missing, banks and rows are out of step, or the
+    /// DMA wrote to this half meanwhile.
     pub fn copy(&mut self, completed: Completed, frame: &mut Frame) -> bool {
         let half = completed.sequence as usize & 1;
         let arrived = bank_a_completed(half) && !overrun() && in_step();
@@ -219,8 +219,8 @@ const SCANNING: [Adc; 2] = [pac::ADC3, pac::ADC2];
 const HALF_LEN: u16 = (SLOTS * BANK_COLUMNS) as u16;
 const BUFFER_LEN: u16 = 2 * HALF_LEN;
 
-/// Words that the slots write to the port's set/reset register: their row set, the others reset; in the last all rows
-/// reset, and the frame's trace pin set.
+/// Words that the slots write to the port's set/reset register. A slot sets its row and resets all others; the last
+/// slot resets all rows and sets the frame's trace pin.
 ///
 /// Atomic so that it lies in RAM: a flash that is being programmed would make the DMA wait.
 static ROW_WORDS: [AtomicU32; SLOTS] = {
@@ -236,7 +236,7 @@ static ROW_WORDS: [AtomicU32; SLOTS] = {
 /// The rows, and the frame's trace pin.
 const ALL_PINS: u32 = ((1 << ROWS) - 1) | (1 << trace::FRAME);
 
-/// Stops the timer first, so that nothing asks for DMA any more, then all that hung on it. No row stays driven.
+/// Stops the timer first, which requests the DMA, then converters and streams. No row stays driven.
 fn stop() {
     pac::TIM8.cr1().write(|w| w.set_cen(false));
     pac::TIM8.dier().write(|_| ());
@@ -336,7 +336,7 @@ fn set_timer(timing: ScanTiming) {
     timer.egr().write(|w| w.set_ug(true));
 }
 
-/// From the first row.
+/// Starts the timer at the first row.
 fn start_timer() {
     let timer = pac::TIM8;
     timer.dier().write(|w| w.set_ude(true));
@@ -356,9 +356,9 @@ fn written_half(stream: usize) -> usize {
 
 /// Returns true if the codes belong to the rows under which they are stored.
 ///
-/// In the slot that the rows' stream has set last, each bank has completed as many slots of the frame as came before
-/// it, or one more. A trigger that was lost leaves the banks behind the rows for good; only a new start brings them
-/// together.
+/// While slot n of a frame is set, each bank has completed n slots of this frame, or n + 1. A lost trigger leaves the
+/// banks behind the rows permanently; only a restart of the scan aligns them
+/// again.
 fn in_step() -> bool {
     let slots = SLOTS as u16;
     let current = (2 * slots - pac::DMA2.st(STREAM_ROWS).ndtr().read().ndt() - 1) % slots;

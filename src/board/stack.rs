@@ -9,7 +9,7 @@ use cortex_m::peripheral::MPU;
 
 /// 16 KiB up to the start of RAM. The factory's calibration words lie below them.
 const FOOT: u32 = 0x1FFF_C000;
-/// Its size as a power of two, less one; no access, nothing to execute.
+/// Region attributes: size as a power of two, less one; no access, not executable.
 const ATTRIBUTES: u32 = 13 << 1 | 1 | 1 << 28;
 /// On, with the usual map for all else. Off in the hard fault's handler.
 const CONTROL: u32 = 1 | 1 << 2;
@@ -27,10 +27,10 @@ unsafe extern "C" {
 /// Words of paint in a look: some 20 us.
 const PIECE: usize = 512;
 
-/// The paint that is left, looked at piece by piece: all of it at once would hold the bus up.
+/// Check of the remaining stack paint in pieces: a check of all of it at once would delay the bus.
 #[derive(Default)]
 pub struct Paint {
-    /// Found whole so far, from the lower end.
+    /// Number of words found unchanged so far, from the lower end.
     words: usize,
 }
 

@@ -23,13 +23,13 @@ pub enum Pin {
 }
 
 impl Pin {
-    /// From now on.
+    /// Sets the pin high.
     #[inline(always)]
     pub fn high(self) {
         pac::GPIOB.bsrr().write(|w| w.0 = 1 << self as u32);
     }
 
-    /// From now on.
+    /// Sets the pin low.
     #[inline(always)]
     pub fn low(self) {
         pac::GPIOB.bsrr().write(|w| w.0 = 1 << (16 + self as u32));

@@ -1,9 +1,9 @@
 //! Two watchdogs: one on the bus clock, which ends a hang within about a millisecond, and an independent one behind it,
 //! which also sees that clock stop.
 //!
-//! The one on the bus clock is the window watchdog, with its window open. It bites between `count` and `count + 1`
-//! of its ticks after it was fed, and nothing stops it once it runs: so it starts after all that takes long at a start,
-//! and what takes long later first asks for the longest time.
+//! The one on the bus clock is the window watchdog, with its window open. It resets between `count` and `count + 1`
+//! of its ticks after it was fed, and cannot be stopped. So it starts after the long steps of a start, and each later
+//! long operation first sets the longest time.
 
 use embassy_stm32::pac;
 use embassy_stm32::pac::iwdg::vals::{Key, Pr};

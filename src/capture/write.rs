@@ -6,7 +6,7 @@
 //! many low bits as the width (a Rice code). A number that would take [`ESCAPE`] ones or more is written as these ones
 //! and all its bits.
 
-use super::{CaptureStatus, Ended, Head, Last, State, digest_step, digest_words, short_digest, width};
+use super::{CaptureState, CaptureStatus, Ended, Head, Last, digest_step, digest_words, short_digest, width};
 use crate::command::Command;
 use crate::frame::{Frame, Sense};
 use crate::measure::series::{CHECK, HEAD, Head as Series, Out};
@@ -41,7 +41,7 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Default for Ca
 impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, COLUMNS, BYTES> {
     /// Capture before any request. All its bytes are zero.
     pub const NEW: Self = Self {
-        standing: CaptureStatus { state: State::None, ended: Ended::No, count: 0, frames: 0, bytes: 0 },
+        standing: CaptureStatus { state: CaptureState::None, ended: Ended::No, count: 0, frames: 0, bytes: 0 },
         place: Place::START,
         last: Last::NONE,
         series: Series::NONE,
@@ -58,22 +58,24 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
 
     /// Bytes of the capture once it is done; none before.
     pub fn data(&self) -> &[u8] {
-        let bytes = if self.standing.state == State::Done { self.standing.bytes as usize } else { 0 };
+        let bytes = if self.standing.state == CaptureState::Done { self.standing.bytes as usize } else { 0 };
         self.bytes.get(..bytes).unwrap_or_default()
     }
 
     /// Arms the capture: it begins at the next tare, and drops what was kept before. Has no effect while frames are
     /// being kept.
     pub fn arm(&mut self) {
-        if self.standing.state != State::Recording {
+        if self.standing.state != CaptureState::Recording {
             self.standing =
-                CaptureStatus { state: State::Armed, count: self.standing.count, ..CaptureStatus::default() };
+                CaptureStatus { state: CaptureState::Armed, count: self.standing.count, ..CaptureStatus::default() };
         }
     }
 
     /// Returns true if the capture should begin: it is armed, and the next step would acknowledge a tare.
     pub fn is_due(&self, status: &Status, command: &Command) -> bool {
-        self.standing.state == State::Armed && status.mode == Mode::Off && command.tare_request != status.taken.tare
+        self.standing.state == CaptureState::Armed
+            && status.mode == Mode::Off
+            && command.tare_request != status.taken.tare
     }
 
     /// Begins, and resets the pipeline; the next step is the first one kept. That takes as long as a frame. A board
@@ -84,7 +86,7 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
         let array = pipeline.array();
         let known = places.all(|(row, column)| gains.set(row * COLUMNS + column, array.gain(row, column)));
         if !known || BYTES < Head::<ROWS, COLUMNS>::BYTES {
-            self.standing.state = State::None;
+            self.standing.state = CaptureState::None;
             return;
         }
         let Status { missed_frames, taken, .. } = *pipeline.status();
@@ -108,12 +110,12 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
         self.place = Place::START;
         self.last = Last { digest: head.seed(), ..Last::NONE };
         let count = self.standing.count.wrapping_add(1);
-        self.standing = CaptureStatus { state: State::Recording, count, ..CaptureStatus::default() };
+        self.standing = CaptureStatus { state: CaptureState::Recording, count, ..CaptureStatus::default() };
     }
 
     /// Keeps the inputs and the results of a step.
     pub fn record(&mut self, frame: &Frame<ROWS, COLUMNS>, sense: &Sense, command: &Command, status: &Status) {
-        if self.standing.state != State::Recording || self.series.kind != 0 {
+        if self.standing.state != CaptureState::Recording || self.series.kind != 0 {
             return;
         }
         let body = self.bytes.get_mut(Head::<ROWS, COLUMNS>::BYTES..).unwrap_or_default();
@@ -150,10 +152,10 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
     /// capture, begins and ends with the motion, and has no effect while frames are being kept.
     pub fn follow(&mut self, pipeline: &Pipeline<ROWS, COLUMNS>) {
         let motion = pipeline.status().measure;
-        let runs = motion.state == measure::State::Running;
+        let runs = motion.state == measure::MeasureState::Running;
         let ran = core::mem::replace(&mut self.ran, runs);
         let begins = runs && !ran;
-        if begins && motion.task != Task::Jog && self.standing.state != State::Recording {
+        if begins && motion.task != Task::Jog && self.standing.state != CaptureState::Recording {
             let press = motion.task == Task::Press;
             self.series = Series {
                 kind: if press { 1 } else { 2 },
@@ -168,7 +170,7 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
             };
             self.length = HEAD;
             let count = self.standing.count.wrapping_add(1);
-            self.standing = CaptureStatus { state: State::Recording, count, ..CaptureStatus::default() };
+            self.standing = CaptureStatus { state: CaptureState::Recording, count, ..CaptureStatus::default() };
         }
         let Self { series: head, length, bytes, row: begun, .. } = self;
         if head.kind == 0 {
@@ -199,27 +201,27 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
         let head = Series { ended, value, ..core::mem::replace(&mut self.series, Series::NONE) }.bytes();
         self.bytes.iter_mut().zip(head).for_each(|(to, byte)| *to = byte);
         let ended = if ended == measure::Ended::Full { Ended::Full } else { Ended::Asked };
-        self.standing = CaptureStatus { state: State::Done, ended, bytes: self.length as u32, ..self.standing };
+        self.standing = CaptureStatus { state: CaptureState::Done, ended, bytes: self.length as u32, ..self.standing };
     }
 
     /// Ends the capture, or cancels it if it has not begun.
     pub fn end(&mut self, why: Ended) {
         match self.standing.state {
-            State::Armed if why == Ended::Asked => self.standing.state = State::None,
+            CaptureState::Armed if why == Ended::Asked => self.standing.state = CaptureState::None,
             // A motion continues if the array was broken for a part of a frame.
-            State::Recording if self.series.kind != 0 && why == Ended::Cut => {}
-            State::Recording if self.series.kind != 0 => self.end_series(measure::Ended::Interrupted, 0),
-            State::Recording => {
+            CaptureState::Recording if self.series.kind != 0 && why == Ended::Cut => {}
+            CaptureState::Recording if self.series.kind != 0 => self.end_series(measure::Ended::Interrupted, 0),
+            CaptureState::Recording => {
                 let (bits, frames) = (self.place.bits(), self.standing.frames);
                 let digest = digest_words(self.last.digest, core::iter::once(why as u32));
                 let (head, body) = self.bytes.split_at_mut(Head::<ROWS, COLUMNS>::BYTES.min(BYTES));
                 let check = Writer::new(body, self.place).finish();
                 Head::<ROWS, COLUMNS>::close(head, why, [frames, bits, digest, check]);
-                self.standing.state = State::Done;
+                self.standing.state = CaptureState::Done;
                 self.standing.ended = why;
                 self.standing.bytes = head.len() as u32 + bits.div_ceil(8);
             }
-            State::None | State::Armed | State::Done => {}
+            CaptureState::None | CaptureState::Armed | CaptureState::Done => {}
         }
     }
 }

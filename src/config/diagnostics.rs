@@ -22,9 +22,9 @@ pub enum ConfigError {
     Seen {
         /// [`Params::codes_per_kpa_milli`](crate::params::Params::codes_per_kpa_milli).
         codes_per_kpa_milli: i32,
-        /// Largest force that the converter sees whole, mN, rounded down.
+        /// Largest force without saturation of the converter, mN, rounded down.
         seen_mn: i32,
-        /// The least that it must see, mN.
+        /// Required force without saturation, mN.
         least_mn: i32,
     },
 }

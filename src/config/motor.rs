@@ -160,8 +160,8 @@ impl Heat {
             Lag { gain, rise_q31: q31(MARGIN * share), fall_q31: q31(share / MARGIN) }
         };
         let room_k = (p.winding_max_c - p.ambient_c) as f32;
-        // As if the motor had been at its largest temperature for long, and the winding had cooled to the housing
-        // since.
+        // Start values of a motor that was at its largest temperature for a long time, and whose winding has cooled to
+        // the housing since.
         let both = (p.winding_k_per_w + p.housing_k_per_w).max(1) as f32;
         let start_k = (room_k * p.housing_k_per_w as f32 / both).min(room_k - START_K);
         Self {

@@ -4,7 +4,9 @@
 //! s^2. A reading's error grows with the reading, so a taxel's weight falls with the model's pressure, from 1 to 1/4 at
 //! the peak.
 
-use super::prediction::{CENTRE_BITS, Guess, PEAK_BITS, Prediction, SLOPE_BITS, Scale, TaxelModel, View, square};
+use super::prediction::{
+    CENTRE_BITS, Guess, PEAK_BITS, PeakScale, Prediction, SLOPE_BITS, ScaledImage, TaxelModel, square,
+};
 use crate::arith::{Divisor, clamp_to, high};
 use crate::config::array::{Geometry, PLACE_BITS};
 
@@ -98,7 +100,7 @@ pub struct Comparison<'a, const ROWS: usize, const COLUMNS: usize> {
     /// Prediction of each taxel from the guess.
     pub prediction: &'a Prediction<ROWS, COLUMNS>,
     /// Tactile image.
-    pub view: &'a View<'a, ROWS, COLUMNS>,
+    pub view: &'a ScaledImage<'a, ROWS, COLUMNS>,
     /// Geometry of the taxels.
     pub geometry: &'a Geometry,
 }
@@ -243,7 +245,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Equations<ROWS, COLUMNS> {
     }
 
     /// Solves for the next guess.
-    pub fn solve(&self, guess: &Guess, scale: &Scale, geometry: &Geometry) -> Guess {
+    pub fn solve(&self, guess: &Guess, scale: &PeakScale, geometry: &Geometry) -> Guess {
         let [ss, sx, sy, xx, xy, yy] = self.matrix;
         let [s, x, y] = self.right;
         let divisor = |left: i32, of: i32| Divisor::new(left.max(of >> GUARD_BITS).max(1).unsigned_abs().into());

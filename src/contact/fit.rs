@@ -1,13 +1,13 @@
 //! A contact followed from frame to frame, with little work in each.
 //!
-//! A refinement is spread over frames: it begins in a frame of its own, takes each row of the array once, as many
+//! A refinement is spread over frames: it begins in a separate frame, takes each row of the array once, as many
 //! rows in a frame as the fit level allows, and is solved with the last of them. Its result is the ratio of the
 //! contact's force to the sum of the taxels over those frames: 1 if the array sees all of the contact. The ratio
 //! changes slowly, while the sum follows every frame. So the force is the sum times the last ratio, as quick as the
 //! sum itself.
 
 use super::equations::{Comparison, Equations};
-use super::prediction::{Guess, Prediction, Scale, View};
+use super::prediction::{Guess, PeakScale, Prediction, ScaledImage};
 use super::{
     CONFIDENCE_LEAST, Contact, FitLevel, TAXELS_MIN, confidence, contact_of_force, covers, from_sums, hidden, overhang,
 };
@@ -15,7 +15,7 @@ use crate::arith::{Divisor, clamp_to};
 use crate::config::array::ONE;
 use crate::config::{Config, Shaped};
 use crate::frame::Shape;
-use crate::pressure::Picture;
+use crate::pressure::TactileImage;
 use crate::units::{Millimetres, Newtons};
 use fixed::types::I16F16;
 
@@ -72,7 +72,7 @@ pub struct Fit<const ROWS: usize, const COLUMNS: usize> {
     /// Prediction of the taxels by the guess.
     prediction: Prediction<ROWS, COLUMNS>,
     /// Scale by the peak when the refinement began.
-    scale: Scale,
+    scale: PeakScale,
     /// Force by the sum when the refinement began.
     force: Newtons,
     /// Sum of the forces of the refinement's frames, in units of the last place.
@@ -113,7 +113,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
             covered: true,
             guess: Guess { height: 0, x: 0, y: 0 },
             prediction: Prediction::NONE,
-            scale: Scale::NONE,
+            scale: PeakScale::NONE,
             force: Newtons::ZERO,
             forces: 0,
             follows: 0,
@@ -146,7 +146,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
     ///
     /// Without a contact, and until a refinement has some confidence, the result is that of [`from_sums`]. Confidence
     /// is that of the last refinement, 255 before the first.
-    pub fn read(&mut self, picture: &Picture<ROWS, COLUMNS>, config: &Shaped<ROWS, COLUMNS>) -> Contact {
+    pub fn read(&mut self, picture: &TactileImage<ROWS, COLUMNS>, config: &Shaped<ROWS, COLUMNS>) -> Contact {
         let force = picture.force(config);
         self.at_work = false;
         // The bound of the sums holds for one table of nodes, which depends on the pitch.
@@ -172,7 +172,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
             return *sums;
         }
         self.at_work = true;
-        // A refinement that is spread over frames has a frame of its own for its start.
+        // A refinement that is spread over frames starts in a separate frame.
         if !begins || self.fit_level.rows(ROWS) == ROWS {
             self.take(force, picture, config);
             if usize::from(self.frames) * self.fit_level.rows(ROWS) >= ROWS {
@@ -190,8 +190,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
     }
 
     /// Begins a refinement. Returns false if the peak is too low for the model.
-    fn start(&mut self, sums: &Contact, picture: &Picture<ROWS, COLUMNS>, config: &Shaped<ROWS, COLUMNS>) -> bool {
-        let Some(scale) = Scale::new(picture.peak, &config.geometry) else {
+    fn start(&mut self, sums: &Contact, picture: &TactileImage<ROWS, COLUMNS>, config: &Shaped<ROWS, COLUMNS>) -> bool {
+        let Some(scale) = PeakScale::new(picture.peak, &config.geometry) else {
             return false;
         };
         // For a contact that is cut off, the sums' centre lies too far in and their radius is too small: the fit is
@@ -214,8 +214,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
     }
 
     /// Adds the frame's share of the rows.
-    fn take(&mut self, force: Newtons, picture: &Picture<ROWS, COLUMNS>, config: &Shaped<ROWS, COLUMNS>) {
-        let view = View { picture, scale: self.scale };
+    fn take(&mut self, force: Newtons, picture: &TactileImage<ROWS, COLUMNS>, config: &Shaped<ROWS, COLUMNS>) {
+        let view = ScaledImage { picture, scale: self.scale };
         self.prediction.height = self.followed(&self.guess, force);
         let comparison = Comparison { prediction: &self.prediction, view: &view, geometry: &config.geometry };
         let (rows, frame) = (self.fit_level.rows(ROWS), usize::from(self.frames));
@@ -294,7 +294,12 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
     }
 
     /// Uncertainty of the force in this frame.
-    fn target_doubt(&self, contact: &Contact, picture: &Picture<ROWS, COLUMNS>, config: &Shaped<ROWS, COLUMNS>) -> u8 {
+    fn target_doubt(
+        &self,
+        contact: &Contact,
+        picture: &TactileImage<ROWS, COLUMNS>,
+        config: &Shaped<ROWS, COLUMNS>,
+    ) -> u8 {
         match self.fitted {
             _ if self.covered => 0,
             Some(fitted) => doubt_of_fit(fitted.ratio, self.confidence),
@@ -343,7 +348,7 @@ impl Fitted {
     fn contact<const ROWS: usize, const COLUMNS: usize>(
         self,
         force: Newtons,
-        picture: &Picture<ROWS, COLUMNS>,
+        picture: &TactileImage<ROWS, COLUMNS>,
         config: &Config,
     ) -> Contact {
         let wide = (i64::from(force.to_bits()) * i64::from(self.ratio)) >> RATIO_BITS;
@@ -372,7 +377,7 @@ fn doubt_of_fit(ratio: i32, confidence: u8) -> u8 {
 /// while bad taxels hide an eighth of the force, full if they hide half of it.
 fn doubt_of_sums<const ROWS: usize, const COLUMNS: usize>(
     sums: &Contact,
-    picture: &Picture<ROWS, COLUMNS>,
+    picture: &TactileImage<ROWS, COLUMNS>,
     config: &Config,
 ) -> u8 {
     let hidden = ramp(hidden(sums, picture, config).unwrap_or(0).cast_signed(), HIDDEN);

@@ -4,7 +4,7 @@ use crate::arith::{between, clamp_to, high, reciprocal, root};
 use crate::config::Shaped;
 use crate::config::array::{Geometry, NODE_BITS, NODES, Node, ONE, PLACE_BITS, SQUARE_BITS};
 use crate::model::Tip;
-use crate::pressure::{CODE_BITS, Picture};
+use crate::pressure::{CODE_BITS, TactileImage};
 use crate::units::Millimetres;
 
 /// Fractional bits of a centre.
@@ -122,7 +122,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Prediction<ROWS, COLUMNS> {
     };
 
     /// Predicts the taxels from a guess, in shares of this scale's peak.
-    pub fn new(guess: &Guess, scale: &Scale, config: &Shaped<ROWS, COLUMNS>) -> Self {
+    pub fn new(guess: &Guess, scale: &PeakScale, config: &Shaped<ROWS, COLUMNS>) -> Self {
         let geometry = &config.geometry;
         // The rim's radius, widened by what a taxel's size adds to its mean squared distance, Q15.
         let widened = guess.rim_square() + high(geometry.pitch, geometry.pitch) / 12 * 16;
@@ -206,16 +206,16 @@ const MODULUS_MAX: u32 = 1 << (PEAK_BITS + 9);
 const MODULUS_MIN: u32 = 1 << (PEAK_BITS - 1);
 
 /// Tactile image and its scale.
-pub struct View<'a, const ROWS: usize, const COLUMNS: usize> {
+pub struct ScaledImage<'a, const ROWS: usize, const COLUMNS: usize> {
     /// Tactile image.
-    pub picture: &'a Picture<ROWS, COLUMNS>,
+    pub picture: &'a TactileImage<ROWS, COLUMNS>,
     /// Scale by the image's peak.
-    pub scale: Scale,
+    pub scale: PeakScale,
 }
 
 /// Scale of an image to shares of its highest taxel: 2^14 is the peak, so products fit 32 bits whatever the load.
 #[derive(Clone, Copy, Debug)]
-pub struct Scale {
+pub struct PeakScale {
     /// 2^34 over the peak.
     inverse_peak: i32,
     /// Y in shares of the peak, Q14.
@@ -226,7 +226,7 @@ pub struct Scale {
     pub inverse_modulus: u32,
 }
 
-impl<const ROWS: usize, const COLUMNS: usize> View<'_, ROWS, COLUMNS> {
+impl<const ROWS: usize, const COLUMNS: usize> ScaledImage<'_, ROWS, COLUMNS> {
     /// Returns a taxel as a share of the peak, Q14. Taxels below -2^18 have no meaning.
     #[inline(always)]
     pub fn share(&self, taxel: i32) -> i32 {
@@ -234,7 +234,7 @@ impl<const ROWS: usize, const COLUMNS: usize> View<'_, ROWS, COLUMNS> {
     }
 }
 
-impl Scale {
+impl PeakScale {
     /// Scale of no contact.
     pub const NONE: Self = Self { inverse_peak: 0, modulus: 0, modulus_shift: 0, inverse_modulus: 0 };
 

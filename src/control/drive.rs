@@ -164,7 +164,7 @@ pub struct Winding {
 }
 
 impl Winding {
-    /// Before the first frame.
+    /// Winding before the first frame.
     pub const fn new() -> Self {
         Self { squares: 0, frames: 0, lags: [0; 2], started: false, share: WHOLE }
     }

@@ -29,7 +29,7 @@ pub struct Observer {
 }
 
 impl Observer {
-    /// At rest at zero.
+    /// Observer at rest at zero.
     pub const fn new() -> Self {
         Self {
             travel: Millimetres::ZERO,
@@ -39,7 +39,7 @@ impl Observer {
         }
     }
 
-    /// At rest, with zero travel at this count.
+    /// Observer at rest, with zero travel at this count.
     pub const fn zeroed_at(encoder: i32) -> Self {
         Self { origin: encoder, ..Self::new() }
     }

@@ -78,9 +78,9 @@ pub mod instruction {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum StatusError {
-    /// It was understood but could not be carried out just now.
+    /// The request was understood but cannot be carried out now.
     Result = 1,
-    /// There is no such instruction here, or not under this ID.
+    /// The instruction is unknown, or not supported under this ID.
     Instruction = 2,
     /// The packet arrived damaged.
     Crc = 3,
@@ -311,7 +311,7 @@ impl<'r> Sender<'r> {
         sender
     }
 
-    /// Begins a status packet; `alert` says that the hardware error status is not zero.
+    /// Begins a status packet; `alert` is true if the hardware error status is not zero.
     pub fn status(reply: &'r mut Reply, id: u8, error: Option<StatusError>, alert: bool) -> Self {
         let mut sender = Self::new(reply, id, instruction::STATUS);
         sender.push(error_byte(error, alert));

@@ -83,8 +83,8 @@ pub struct Health {
     /// Longest delay of a frame's end at the processor: critical sections, and interrupts of the same or a higher
     /// priority.
     pub late_ns: u16,
-    /// Frames that were there and not whole, by what was wrong first: a bank was missing, the banks were out of step
-    /// with the rows, a converter had overrun, or the next frame came over it.
+    /// Numbers of incomplete frames by the first defect: a bank was missing, the banks were out of step with the rows,
+    /// a converter had overrun, or the next frame had overwritten it.
     pub broken_frames: [u16; 4],
     /// Errors of the scan's transfers: on the memory's bus, and of the stream itself.
     pub transfer_errors: [u16; 2],
@@ -96,7 +96,7 @@ pub struct Health {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum ResetCause {
-    /// Not known.
+    /// Unknown cause.
     #[default]
     Unknown = 0,
     /// The supply came up.
@@ -117,14 +117,14 @@ pub enum ResetCause {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum CrashCause {
-    /// It did not.
+    /// No crash.
     #[default]
     None = 0,
     /// A panic.
     Panic = 1,
     /// A hard fault.
     HardFault = 2,
-    /// It hung until the watchdog's reset.
+    /// A hang, ended by the watchdog's reset.
     Hang = 3,
     /// The external clock failed.
     Clock = 4,

@@ -8,7 +8,7 @@ use crate::capture;
 use crate::command::Command;
 use crate::measure::Task;
 use crate::params::Params;
-use crate::pipeline::Taken;
+use crate::pipeline::AcknowledgedRequests;
 use crate::state::{Fault, Limits, Mode};
 use crate::units::Newtons;
 
@@ -23,7 +23,7 @@ pub(super) struct Stand {
     pub faulted: bool,
     /// True if it is the fault of the bus watchdog.
     pub bus_silent: bool,
-    taken: Taken,
+    taken: AcknowledgedRequests,
     mode: Mode,
     tared: bool,
     tared_touching: bool,
@@ -57,7 +57,7 @@ impl Stand {
             tared_touching: status.limits.has(Limits::TARED_TOUCHING),
             supply_mv: snapshot.supply_mv,
             bad_taxels: status.contact.bad_taxels,
-            captures: snapshot.capture.standing.state == capture::State::Recording,
+            captures: snapshot.capture.standing.state == capture::CaptureState::Recording,
         }
     }
 
@@ -97,9 +97,9 @@ impl Stand {
     /// Refuses requests of a write that cannot be carried out.
     ///
     /// # Errors
-    /// A goal above 0 in a fault, which lets go; a tare in one that is not to be cleared; a press without torque or
-    /// tare; a jog or strokes with torque, in a fault or without a tare; a save while the loop drives, is about to or
-    /// tares, when it must not wait for the flash.
+    /// A goal above 0 in a fault, which releases the object. A tare in a fault that this write does not clear. A press
+    /// without torque or tare. A jog or strokes with torque, in a fault or without a tare. A save while the loop
+    /// drives, is about to or tares, when it must not wait for the flash.
     pub fn check(&self, before: &Command, after: &Command, actions: Actions) -> Result<(), StatusError> {
         let goal = after.goal == Newtons::ZERO || !self.faulted;
         let stopped = self.faulted && after.clear_request == self.taken.clear;

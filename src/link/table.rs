@@ -124,7 +124,7 @@ pub(super) fn check_read<const ROWS: usize, const COLUMNS: usize>(
 
 /// Sends the bytes of a read that [`check_read`] let through; 0 where there is no register.
 pub(super) fn read<const ROWS: usize, const COLUMNS: usize>(
-    view: View<'_, ROWS, COLUMNS>,
+    view: TableView<'_, ROWS, COLUMNS>,
     address: u16,
     length: u16,
     mut put: impl FnMut(u8),
@@ -257,12 +257,12 @@ pub(super) const fn thousandths(value: i32, fraction_bits: u32) -> i32 {
 
 /// Data of a read: the device's own state, and the snapshot of the loop.
 #[derive(Clone, Copy)]
-pub(in crate::link) struct View<'a, const ROWS: usize, const COLUMNS: usize> {
+pub(in crate::link) struct TableView<'a, const ROWS: usize, const COLUMNS: usize> {
     pub state: &'a Device<ROWS, COLUMNS>,
     pub snapshot: &'a Snapshot<'a, ROWS, COLUMNS>,
 }
 
-impl<'a, const ROWS: usize, const COLUMNS: usize> View<'a, ROWS, COLUMNS> {
+impl<'a, const ROWS: usize, const COLUMNS: usize> TableView<'a, ROWS, COLUMNS> {
     fn settings(&self) -> &'a Settings<ROWS, COLUMNS> {
         &self.state.settings
     }
@@ -317,7 +317,7 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> View<'a, ROWS, COLUMNS> {
     fn measure_state(&self) -> u32 {
         let status = &self.snapshot.status;
         if self.settings().command.measure_request != status.taken.measure {
-            return measure::State::Running as u32;
+            return measure::MeasureState::Running as u32;
         }
         status.measure.state as u32
     }
@@ -325,7 +325,7 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> View<'a, ROWS, COLUMNS> {
     /// Returns the state of the capture, where a new request counts already.
     fn capture_state(&self) -> u32 {
         let state = self.snapshot.capture.standing.state;
-        if self.state.actions().capture == Some(true) { capture::State::Armed as u32 } else { state as u32 }
+        if self.state.actions().capture == Some(true) { capture::CaptureState::Armed as u32 } else { state as u32 }
     }
 
     /// A byte of the capture.

@@ -13,7 +13,7 @@ use super::{BuiltIn, Ended, MeasureStatus};
 use crate::config::Config;
 use crate::contact::Contact;
 use crate::control::{Reference, SpeedLoop};
-use crate::pressure::Picture;
+use crate::pressure::TactileImage;
 use crate::state::Limits;
 use crate::units::{Celsius, Millimetres, MillimetresPerSecond};
 
@@ -58,7 +58,7 @@ pub struct Press {
     phase: Phase,
     /// Travel at which the tip touched, by the force and the configured modulus.
     touch: Millimetres,
-    /// Depth of the quick way.
+    /// Depth of the quick cycle.
     deepest: Millimetres,
     /// Travel at which the step under way began.
     step_from: Millimetres,
@@ -74,7 +74,7 @@ pub struct Press {
     part: Option<u8>,
     /// True if the next frame begins a step.
     fresh: bool,
-    /// Number of complete steps of this way.
+    /// Number of complete steps of this motion.
     steps: u8,
 }
 
@@ -82,31 +82,31 @@ pub struct Press {
 enum Phase {
     /// Backs off until nothing touches.
     Retreat,
-    /// Approaches until something does.
+    /// Approaches until something touches.
     Seek,
-    /// Backs off to where the ways begin.
+    /// Backs off to the travel at which the loading cycles begin.
     Before,
-    In(Pace),
+    In(Cycle),
     Hold,
-    Back(Pace),
-    /// The last step is handed over.
+    Back(Cycle),
+    /// The last step is being recorded.
     Last,
-    /// Nothing is left to do.
+    /// The press has ended.
     Over,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Pace {
+enum Cycle {
     Quick,
     Slow,
 }
 
 /// Inputs of a press in a frame.
-pub struct View<'a, const ROWS: usize, const COLUMNS: usize> {
+pub struct PressInputs<'a, const ROWS: usize, const COLUMNS: usize> {
     /// Number of the frame.
     pub sequence: u32,
     /// Tactile image.
-    pub picture: &'a Picture<ROWS, COLUMNS>,
+    pub picture: &'a TactileImage<ROWS, COLUMNS>,
     /// Contact by the plain sum.
     pub contact: &'a Contact,
     /// Count of the encoder.
@@ -160,7 +160,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Step<ROWS, COLUMNS> {
     };
 
     /// Takes a frame; a fresh one begins the step.
-    fn take(&mut self, view: &View<ROWS, COLUMNS>, fresh: bool, back: bool) {
+    fn take(&mut self, view: &PressInputs<ROWS, COLUMNS>, fresh: bool, back: bool) {
         if fresh {
             (self.frames[0], self.counts[0]) = (view.sequence, view.encoder);
             (self.frames[1], self.counts[1], self.chip) = (view.sequence, view.encoder, view.chip);
@@ -223,7 +223,7 @@ impl Press {
     #[inline(never)]
     pub fn observe<const ROWS: usize, const COLUMNS: usize>(
         &mut self,
-        view: &View<ROWS, COLUMNS>,
+        view: &PressInputs<ROWS, COLUMNS>,
         step: &mut Step<ROWS, COLUMNS>,
         standing: &mut MeasureStatus,
         config: &Config,
@@ -241,7 +241,7 @@ impl Press {
         let at_end = config.travel_max.0.saturating_sub(travel.0).to_bits() < END;
         let force = view.contact.force;
         let measured = view.motion.observer.measured(view.encoder, config);
-        // Something pushes back: the grip that follows releases it faster than a way back would.
+        // Something pushes back: the grip that follows releases it faster than this motion would.
         if force > config.force_max && matches!(self.phase, Phase::In(_) | Phase::Hold | Phase::Back(_)) {
             self.phase = Phase::Over;
             return standing.end(Ended::Touched, super::millinewtons(force));
@@ -257,17 +257,17 @@ impl Press {
             }
             Phase::Seek if at_end => self.end(standing, Ended::NoContact, travel),
             Phase::Seek => {}
-            Phase::Before if travel <= self.start(config) => self.next(Phase::In(Pace::Quick), measured, standing),
+            Phase::Before if travel <= self.start(config) => self.next(Phase::In(Cycle::Quick), measured, standing),
             Phase::Before => {}
-            Phase::In(pace) => {
+            Phase::In(cycle) => {
                 let depth = Millimetres(measured.0.saturating_sub(self.touch.0));
-                let most = if pace == Pace::Quick { depth_goal(config) } else { self.deepest };
+                let most = if cycle == Cycle::Quick { depth_goal(config) } else { self.deepest };
                 let pressed = force.0 >= config.force_max.0 - (config.force_max.0 >> 3);
                 let turns = bad || at_end || pressed || depth >= most;
                 self.sample(view, step, measured, turns, config);
                 if turns {
-                    let after = if pace == Pace::Quick { Phase::Back(Pace::Quick) } else { Phase::Hold };
-                    self.deepest = if pace == Pace::Quick { depth } else { self.deepest };
+                    let after = if cycle == Cycle::Quick { Phase::Back(Cycle::Quick) } else { Phase::Hold };
+                    self.deepest = if cycle == Cycle::Quick { depth } else { self.deepest };
                     self.next(after, measured, standing);
                 }
             }
@@ -279,16 +279,16 @@ impl Press {
                 (self.fresh, self.part) = (complete, complete.then_some(0));
                 self.holds += u8::from(complete);
                 if usize::from(self.holds) >= HOLDS_MS.len() {
-                    self.next(Phase::Back(Pace::Slow), measured, standing);
+                    self.next(Phase::Back(Cycle::Slow), measured, standing);
                 }
             }
-            Phase::Back(pace) => {
+            Phase::Back(cycle) => {
                 let turns = travel <= self.start(config);
                 self.sample(view, step, measured, turns, config);
-                match (turns, pace) {
+                match (turns, cycle) {
                     (false, _) => {}
-                    (true, Pace::Quick) => self.next(Phase::In(Pace::Slow), measured, standing),
-                    (true, Pace::Slow) => self.phase = Phase::Last,
+                    (true, Cycle::Quick) => self.next(Phase::In(Cycle::Slow), measured, standing),
+                    (true, Cycle::Slow) => self.phase = Phase::Last,
                 }
             }
         }
@@ -297,26 +297,26 @@ impl Press {
     /// Returns the speed reference.
     pub fn reference(&self, motion: &mut SpeedLoop, config: &Config, limits: &mut Limits) -> Reference {
         let back = Millimetres(-FAR.0);
-        let of = |pace| config.approach.min(if pace == Pace::Quick { QUICK } else { SLOW });
+        let of = |cycle| config.approach.min(if cycle == Cycle::Quick { QUICK } else { SLOW });
         let (way, speed) = match self.phase {
             Phase::Over | Phase::Last => (Millimetres::ZERO, config.approach),
             Phase::Retreat => (back, config.approach),
-            Phase::Before => (back, of(Pace::Quick)),
+            Phase::Before => (back, of(Cycle::Quick)),
             Phase::Seek => (motion.within_travel(FAR, config, limits), config.approach),
-            Phase::In(pace) => (motion.within_travel(FAR, config, limits), of(pace)),
+            Phase::In(cycle) => (motion.within_travel(FAR, config, limits), of(cycle)),
             Phase::Hold => {
                 let held = self.step_from.0.saturating_sub(motion.observer.travel.0);
-                (motion.within_travel(Millimetres(held), config, limits), of(Pace::Slow))
+                (motion.within_travel(Millimetres(held), config, limits), of(Cycle::Slow))
             }
-            Phase::Back(pace) => (back, of(pace)),
+            Phase::Back(cycle) => (back, of(cycle)),
         };
         motion.towards(way, Millimetres::ZERO, speed, config).0
     }
 
-    /// Adds a frame to the step of a way. The step ends after its length, or when the way turns.
+    /// Adds a frame to the present step, which ends after its length, or when the motion reverses.
     fn sample<const ROWS: usize, const COLUMNS: usize>(
         &mut self,
-        view: &View<ROWS, COLUMNS>,
+        view: &PressInputs<ROWS, COLUMNS>,
         step: &mut Step<ROWS, COLUMNS>,
         at: Millimetres,
         turns: bool,
@@ -338,9 +338,9 @@ impl Press {
     fn next(&mut self, phase: Phase, at: Millimetres, standing: &mut MeasureStatus) {
         (self.phase, self.step_from, self.fresh, self.steps) = (phase, at, true, 0);
         standing.progress = match phase {
-            Phase::In(Pace::Quick) => 10,
-            Phase::Back(Pace::Quick) => 20,
-            Phase::In(Pace::Slow) => 30,
+            Phase::In(Cycle::Quick) => 10,
+            Phase::Back(Cycle::Quick) => 20,
+            Phase::In(Cycle::Slow) => 30,
             Phase::Hold => 50,
             _ => 80,
         };

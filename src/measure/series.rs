@@ -12,7 +12,7 @@
 //! | 32 | the rows |
 //!
 //! A row of a press is a step: numbers of its first and last frame, the encoder's counts at these, frames taken (2
-//! bytes), whether it is one of the way back, 0, mean voltage of the bridge in mV (2), temperature of the
+//! bytes), whether it unloads, 0, mean voltage of the bridge in mV (2), temperature of the
 //! microcontroller in 0.1 K (2, 0 unknown). Then of every taxel, row by row: the mean above tare in eighths of a
 //! corrected code, plus 1,024 (2 bytes each); the variance of a frame in quarters of a code, squared, as `(8 + (byte &
 //! 7)) << (byte >> 3) >> 3`, 0 below 1 (a byte each); a bit that is 1 where it was bad or saturated in any frame,
@@ -187,7 +187,7 @@ impl<'a> Out<'a> {
         }
     }
 
-    /// Of squares, sums and first readings.
+    /// Adds the variances of taxels, from squares, sums and first readings.
     fn variances<'t>(&mut self, taxels: impl Iterator<Item = (&'t u32, (&'t i32, &'t i32))>, taken: i32) {
         for (square, (sum, first)) in taxels {
             // Mean difference to the first frame, quarters.
@@ -218,7 +218,7 @@ impl<'a> Out<'a> {
     }
 }
 
-/// A variance in a byte, as the layout says.
+/// Code of a variance in a byte, as in the layout above.
 #[inline(always)]
 fn coded(variance: u32) -> u8 {
     if variance == 0 {

@@ -32,14 +32,14 @@ const STROKES: u8 = 4 * SPEEDS.len() as u8;
 const PULSE_SUPPLY: [i32; 2] = [2, 25];
 /// Largest share of the supply for a stroke: 1/3.
 const STROKE_SUPPLY: [i32; 2] = [1, 3];
-/// Number of counts that is motion.
+/// Number of counts from which a change counts as motion.
 const MOVED: i32 = 2;
-/// Largest number of pulses of a way: five times what it needs.
+/// Largest number of pulses in one direction: five times the usual number.
 const PULSES: u8 = 100;
 
 /// Inputs of the motion in a frame.
 #[derive(Clone, Copy, Debug)]
-pub struct View {
+pub struct StrokeInputs {
     /// Count of the encoder.
     pub encoder: i32,
     /// Force of the array.
@@ -55,7 +55,7 @@ pub struct View {
 enum Part {
     /// A pulse; quick ones prove the direction.
     Pulse { quick: bool },
-    /// Pulses until the end of the way.
+    /// Pulses until the end of travel.
     Feel,
     /// Motion under one voltage to a place.
     Go,
@@ -78,9 +78,9 @@ pub struct Strokes {
     task: Task,
     phase: Phase,
     part: Part,
-    /// Number of parts begun so far: the pulses of a way count as one.
+    /// Number of parts begun so far: all pulses in one direction count as one.
     done: u8,
-    /// Number of pulses of the present way.
+    /// Number of pulses in the present direction.
     pulses: u8,
     /// Direction: forward 1, back -1.
     sign: i32,
@@ -185,7 +185,7 @@ impl Strokes {
 
     /// Takes a frame.
     #[inline(never)]
-    pub fn observe(&mut self, view: &View, standing: &mut MeasureStatus, config: &Config) {
+    pub fn observe(&mut self, view: &StrokeInputs, standing: &mut MeasureStatus, config: &Config) {
         let plan = &config.motions;
         self.row = None;
         self.sample(view);
@@ -205,7 +205,7 @@ impl Strokes {
     }
 
     /// Records a stroke, until the tip rests.
-    fn sample(&mut self, view: &View) {
+    fn sample(&mut self, view: &StrokeInputs) {
         if !matches!(self.part, Part::Stroke(_)) {
             return;
         }
@@ -234,7 +234,7 @@ impl Strokes {
     }
 
     /// Returns the reason that ends any motion.
-    fn danger(&self, view: &View, plan: &Motions) -> Option<(Ended, i32)> {
+    fn danger(&self, view: &StrokeInputs, plan: &Motions) -> Option<(Ended, i32)> {
         let place = self.place(view.encoder);
         if view.force >= plan.touch {
             Some((Ended::Touched, super::millinewtons(view.force)))
@@ -254,7 +254,7 @@ impl Strokes {
         (self.stood, self.half_rest) = ((encoder, 0), encoder);
     }
 
-    fn rest(&mut self, ended: Option<(Ended, i32)>, view: &View, standing: &mut MeasureStatus, plan: &Motions) {
+    fn rest(&mut self, ended: Option<(Ended, i32)>, view: &StrokeInputs, standing: &mut MeasureStatus, plan: &Motions) {
         self.frames = self.frames.saturating_add(1);
         let ended = match ended {
             None if view.force >= plan.touch => Some((Ended::Touched, super::millinewtons(view.force))),
@@ -287,7 +287,7 @@ impl Strokes {
     }
 
     /// Starts the next motion, or ends. The motion begins with the next frame.
-    fn next(&mut self, view: &View, standing: &mut MeasureStatus, plan: &Motions) {
+    fn next(&mut self, view: &StrokeInputs, standing: &mut MeasureStatus, plan: &Motions) {
         let felt = self.part != Part::Feel || self.place(view.encoder) >= plan.felt;
         self.done += u8::from(felt);
         self.pulses = if felt { 0 } else { self.pulses.saturating_add(1) };
@@ -354,7 +354,7 @@ impl Strokes {
     }
 
     /// Raises the voltage until the tip moves; slightly later the motor is shorted.
-    fn pulse(&mut self, view: &View, plan: &Motions) {
+    fn pulse(&mut self, view: &StrokeInputs, plan: &Motions) {
         let (gone, easiest) = (self.gone(view.encoder), self.easiest());
         let limit = easiest.saturating_add(plan.feel_uv).min(of_supply(view, PULSE_SUPPLY));
         if gone >= MOVED {
@@ -380,7 +380,7 @@ impl Strokes {
     }
 
     /// Runs a stroke under one voltage that comes to rest at a place.
-    fn stroke(&mut self, view: &View, plan: &Motions) {
+    fn stroke(&mut self, view: &StrokeInputs, plan: &Motions) {
         let gone = self.gone(view.encoder);
         if self.frames.is_multiple_of(plan.span_part) {
             let before = [self.history[SPAN_PARTS - 1], self.history[SPAN_PARTS / 4 - 1]];
@@ -418,6 +418,6 @@ impl Strokes {
     }
 }
 
-fn of_supply(view: &View, [part, of]: [i32; 2]) -> i32 {
+fn of_supply(view: &StrokeInputs, [part, of]: [i32; 2]) -> i32 {
     i32::from(view.supply_mv) * 1_000 / of * part
 }

@@ -25,7 +25,7 @@ impl Quotient {
         Self { significand: quotient(numerator << up, divisor), shift: 32 + up - down }
     }
 
-    /// With 31 to 60 bits after the point, rounded down.
+    /// Value with 31 to 60 fractional bits, rounded down.
     const fn floor(&self, bits: u32) -> u64 {
         if self.shift > bits {
             self.significand >> (self.shift - bits)
@@ -114,8 +114,8 @@ impl Tip {
         NewtonsPerMillimetre::from_bits(floor_sqrt(self.square_gain.floor(force_bits)).div_ceil(2) as i32)
     }
 
-    /// Total force by quadrature over rings: `F = integral of p dS` (eq. 14), the sum that the closed form
-    /// [`Tip::force`] stands for.
+    /// Total force by quadrature over rings: `F = integral of p dS` (eq. 14), the integral of which [`Tip::force`]
+    /// is the closed form.
     ///
     /// In `u = r^2` the area element is `pi du` and the pressure is smooth up to the rim, so the midpoint rule over
     /// rings of equal area converges with the square of their number.

@@ -16,10 +16,10 @@ use crate::command::Command;
 use crate::contact::Contact;
 use crate::frame::Sense;
 use crate::grip::Grip;
-use crate::measure::{BuiltIn, Ended, MeasureStatus, Press, State, Strokes, Task};
+use crate::measure::{BuiltIn, Ended, MeasureState, MeasureStatus, Press, Strokes, Task};
 use crate::safety::guard::Guard;
 use crate::state::Fault;
-use crate::status::{Taken, Taring};
+use crate::status::{AcknowledgedRequests, Taring};
 use crate::touch::{Stage, Touch};
 use crate::units::Millimetres;
 use fixed::types::I8F24;
@@ -48,13 +48,13 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     #[inline(never)]
     pub(super) fn serve(&mut self, command: &Command, sense: &Sense, contact: &Contact) {
         let before = self.status.taken;
-        let ran = self.status.measure.state == State::Running;
+        let ran = self.status.measure.state == MeasureState::Running;
         if let Activity::Press(press) = &self.activity
             && !press.running()
         {
             self.activity = Activity::Grip(Grip::default());
         }
-        self.status.taken = Taken { tare: command.tare_request, clear: command.clear_request, ..before };
+        self.status.taken = AcknowledgedRequests { tare: command.tare_request, clear: command.clear_request, ..before };
         if command.clear_request != before.clear && !command.torque && matches!(self.activity, Activity::Fault(_)) {
             self.status.fault = None;
             self.activity = Activity::Off(Halt::BRAKES);
@@ -74,7 +74,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             }
         }
         // A motion that this command ends closes its record with this frame: the next one begins after it.
-        let ended = ran && self.status.measure.state != State::Running;
+        let ended = ran && self.status.measure.state != MeasureState::Running;
         if command.measure_request != before.measure && !ended {
             self.serve_measure(command, sense.encoder, contact);
         }
@@ -132,8 +132,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         self.monitor.restart(self.array.picture(), &self.motion);
     }
 
-    /// Serves a request for a motion that measures, or for its end. A press waits for torque that is being enabled,
-    /// the others until the tip is at rest.
+    /// Serves a request for a motion that measures, or for its end. A press waits for torque that is being enabled;
+    /// jog and strokes wait until the tip is at rest.
     #[inline(never)]
     fn serve_measure(&mut self, command: &Command, encoder: i32, contact: &Contact) {
         let task = Task::of(command.measure_request);
@@ -150,7 +150,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             return;
         }
         self.status.taken.measure = command.measure_request;
-        let runs = self.status.measure.state == State::Running;
+        let runs = self.status.measure.state == MeasureState::Running;
         let refusal = match (task, &mut self.activity, BuiltIn::PROOF) {
             (Task::Stop, Activity::Strokes(run), _) => return run.halt(encoder),
             (Task::Stop, Activity::Press(_), _) => {

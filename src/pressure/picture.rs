@@ -16,7 +16,7 @@ use lanes::Row;
 
 /// Tactile image: the array's readings above tare and what they add up to, in sixteenths of a corrected code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Picture<const ROWS: usize, const COLUMNS: usize> {
+pub struct TactileImage<const ROWS: usize, const COLUMNS: usize> {
     /// Readings as `taxels[row][column]`; zero if the taxel is masked, dead or saturated, and all zero if the array
     /// is broken.
     pub taxels: [[i32; COLUMNS]; ROWS],
@@ -43,7 +43,7 @@ pub struct Picture<const ROWS: usize, const COLUMNS: usize> {
     pub undriven_max: u16,
 }
 
-impl<const ROWS: usize, const COLUMNS: usize> Picture<ROWS, COLUMNS> {
+impl<const ROWS: usize, const COLUMNS: usize> TactileImage<ROWS, COLUMNS> {
     /// Image before the first frame.
     pub const EMPTY: Self = Self {
         taxels: [[0; COLUMNS]; ROWS],
@@ -138,7 +138,7 @@ fn carried(curve: Curve, taxel: i32, tare: i32) -> i32 {
 #[inline(never)]
 pub(super) fn bend<const ROWS: usize, const COLUMNS: usize>(
     curve: Curve,
-    picture: &mut Picture<ROWS, COLUMNS>,
+    picture: &mut TactileImage<ROWS, COLUMNS>,
     rows: &[Row<COLUMNS>; ROWS],
 ) {
     // Place n of a line of N is in the sum of its running sums N - n times: N + 1 less twice that is its weight.
@@ -180,7 +180,7 @@ const fn upper(a: i32, b: i32) -> i32 {
 mod tests {
     use super::*;
 
-    /// In codes.
+    /// Corrected taxel in floating point, codes.
     fn exact(permille: i32, taxel: f64, tare: f64) -> f64 {
         let p = f64::from(permille) / 1_000.0;
         let least = 1.0 / (1.0 + p);

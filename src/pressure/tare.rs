@@ -9,7 +9,7 @@
 //! Compared with a clean tare before, it must carry more by half of what begins a contact. Without a clean tare only
 //! the shape is known, and preload may be uneven: then it must also carry half as much again as the other row.
 
-use super::{Array, CODE_BITS, Picture, TARE_BITS};
+use super::{Array, CODE_BITS, TARE_BITS, TactileImage};
 use crate::config::Config;
 
 impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
@@ -42,7 +42,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         self.tare_frames = (self.tare_frames + 1).min(Self::TARE_FRAMES);
         let weight = i64::from((1 << 16) / self.tare_frames.max(1));
         // The sums are not rounded taxel by taxel, so they have a mean of their own.
-        let Picture { sum, moment_x, moment_y, .. } = self.picture;
+        let TactileImage { sum, moment_x, moment_y, .. } = self.picture;
         let mut tare_sums = self.tare_sums;
         for (tare, value) in tare_sums.iter_mut().zip([sum, moment_x, moment_y]) {
             *tare = tare.wrapping_add(((i64::from(value) * weight + (1 << 15)) >> 16) as i32);

@@ -45,9 +45,9 @@ const BEYOND: i32 = 1 << 24;
 const LOOSE_NS: u32 = 20_000_000;
 /// Distance beyond a number of indentations at which a tip still counts as pressed: 0.5 mm, Q24.
 const YIELDING: i32 = 1 << 23;
-/// Number of indentations on the way forward: an object that yields moves with the tip.
+/// Number of indentations while moving forward: an object that yields moves with the tip.
 const DEEPER: i32 = 2;
-/// Number of indentations on the way back: a force that is too high must not wait.
+/// Number of indentations in a retreat: a force that is too high must not wait.
 const DEEPER_BACK: i32 = 5;
 /// Travel over which the force must fall for the touch to move back with the tip: 0.5 mm, Q24.
 const RETREAT: i32 = 1 << 23;
@@ -100,7 +100,7 @@ pub struct Guard {
     /// Change of the speed that the model expects, and the same with the delay of the encoder's filter.
     change: i32,
     late_change: i32,
-    /// Time since the tip was last surely pressed, for the way forward and for the way back, ns.
+    /// Time since the tip was last surely pressed, by the forward and by the retreat limit, ns.
     loose_ns: [u32; 2],
     /// Time for which the tip has been too fast, ns.
     fast_ns: u32,

@@ -5,7 +5,7 @@ use crate::config::Config;
 use crate::contact::Contact;
 use crate::control::{Observer, SpeedLoop};
 use crate::frame::{Sense, Shape};
-use crate::pressure::Picture;
+use crate::pressure::TactileImage;
 use crate::state::Fault;
 use crate::touch::FRAME_NS_MAX;
 use crate::units::{Millimetres, MillimetresPerSecond2};
@@ -39,9 +39,9 @@ const MORE: i32 = 4;
 const MORE_NS: u32 = 8_000_000;
 
 /// Inputs of the monitor in a frame.
-pub struct View<'a, const ROWS: usize, const COLUMNS: usize> {
+pub struct MonitorInputs<'a, const ROWS: usize, const COLUMNS: usize> {
     /// Tactile image.
-    pub picture: &'a Picture<ROWS, COLUMNS>,
+    pub picture: &'a TactileImage<ROWS, COLUMNS>,
     /// Contact in the image.
     pub contact: &'a Contact,
     /// True if the tip surely presses into something, by the guard.
@@ -75,7 +75,7 @@ impl Monitor {
     /// stops the motor in the first frame.
     pub fn restart<const ROWS: usize, const COLUMNS: usize>(
         &mut self,
-        picture: &Picture<ROWS, COLUMNS>,
+        picture: &TactileImage<ROWS, COLUMNS>,
         motion: &SpeedLoop,
     ) {
         let Observer { travel, disturbance, .. } = motion.observer;
@@ -94,7 +94,7 @@ impl Monitor {
     /// Returns the first fault that the contact and the motion show, the most direct evidence first.
     pub fn check<const ROWS: usize, const COLUMNS: usize>(
         &mut self,
-        view: &View<ROWS, COLUMNS>,
+        view: &MonitorInputs<ROWS, COLUMNS>,
         config: &Config,
     ) -> Option<Fault> {
         if view.contact.force > config.force_fault {
@@ -122,7 +122,7 @@ impl Monitor {
     /// or its connector changed.
     fn less<const ROWS: usize, const COLUMNS: usize>(
         &mut self,
-        view: &View<ROWS, COLUMNS>,
+        view: &MonitorInputs<ROWS, COLUMNS>,
         config: &Config,
     ) -> Option<Fault> {
         let less = view.picture.sum < config.touch_line.saturating_mul(-LESS);
@@ -133,10 +133,10 @@ impl Monitor {
     /// Returns a fault for a step up of the sum that no contact can cause: a row or a taxel is stuck at a high code.
     fn more<const ROWS: usize, const COLUMNS: usize>(
         &mut self,
-        view: &View<ROWS, COLUMNS>,
+        view: &MonitorInputs<ROWS, COLUMNS>,
         config: &Config,
     ) -> Option<Fault> {
-        let &Picture { sum, bad_count, .. } = view.picture;
+        let &TactileImage { sum, bad_count, .. } = view.picture;
         let (most, last, bad) = self.before;
         self.before = (last.max(sum), sum, bad_count);
         let least = (most.max(0) >> MORE_BITS).saturating_add(config.touch_line.saturating_mul(MORE));
@@ -155,7 +155,7 @@ impl Monitor {
     /// more.
     fn array<const ROWS: usize, const COLUMNS: usize>(
         &mut self,
-        view: &View<ROWS, COLUMNS>,
+        view: &MonitorInputs<ROWS, COLUMNS>,
         config: &Config,
     ) -> Option<Fault> {
         let sums = sums(view.picture);
@@ -187,7 +187,7 @@ impl Monitor {
 /// Returns a fault for a broken array. The same taxels must be bad in two frames in a row, or half of them in one: a
 /// burst of interference in a frame is no fault.
 pub fn array_broken<const ROWS: usize, const COLUMNS: usize>(
-    picture: &Picture<ROWS, COLUMNS>,
+    picture: &TactileImage<ROWS, COLUMNS>,
     config: &Config,
 ) -> Option<Fault> {
     let p = &config.params;
@@ -204,11 +204,14 @@ pub fn array_broken<const ROWS: usize, const COLUMNS: usize>(
 
 /// Returns true if a frame's array can be read. It cannot if more taxels are bad than allowed, even in this frame
 /// only.
-pub fn array_sound<const ROWS: usize, const COLUMNS: usize>(picture: &Picture<ROWS, COLUMNS>, config: &Config) -> bool {
+pub fn array_sound<const ROWS: usize, const COLUMNS: usize>(
+    picture: &TactileImage<ROWS, COLUMNS>,
+    config: &Config,
+) -> bool {
     let p = &config.params;
     i32::from(picture.undriven_max) <= p.undriven_max_codes && i32::from(picture.bad_count) <= p.bad_taxels_max
 }
 
-fn sums<const ROWS: usize, const COLUMNS: usize>(picture: &Picture<ROWS, COLUMNS>) -> [i32; 3] {
+fn sums<const ROWS: usize, const COLUMNS: usize>(picture: &TactileImage<ROWS, COLUMNS>) -> [i32; 3] {
     [picture.sum, picture.moment_x, picture.moment_y]
 }

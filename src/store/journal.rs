@@ -3,12 +3,9 @@
 //! - A save appends to the sector of the newest record; if that is full, to the other one, once that was erased.
 //! - A start whose sector is nearly full erases the other one if that has older records. The sector with the newest
 //!   whole record is never erased.
-//!   newest whole record.
 //! - Damaged bytes behind the newest whole record were written after it, and so were damaged bytes in the other
 //!   sector if the newest one's is full. Each start reports them until the next save, which is written behind them.
 //!   An erase that was cut short at such a time looks the same, and is reported too.
-//!   sector where the newest one's is full: each start says so until the next save, which goes behind that. An erase
-//!   that was cut short at such a time looks the same, and is told too.
 
 use super::{BLANK, Found, GRID, Record, Remark, end_of_records, read_record, take, words};
 
@@ -78,21 +75,21 @@ pub struct Journal {
     /// Current sector for saves: that of the newest whole record.
     current: Sector,
     sequence: u32,
-    /// The current sector, and the other.
-    stands: [Stand; 2],
+    /// Positions in the current sector, and in the other one.
+    sectors: [SectorContent; 2],
 }
 
 impl Journal {
     /// Reads the positions from the flash.
     pub fn new(flash: &impl Flash) -> Self {
-        let [a, b] = [Sector::A, Sector::B].map(|sector| Stand::of(flash.bytes(sector)));
+        let [a, b] = [Sector::A, Sector::B].map(|sector| SectorContent::of(flash.bytes(sector)));
         let b_is_newer = match (a.newest, b.newest) {
             (Some(a), Some(b)) => b.sequence.wrapping_sub(a.sequence).cast_signed() > 0,
             (a, b) => a.is_none() && b.is_some(),
         };
-        let (current, stands) = if b_is_newer { (Sector::B, [b, a]) } else { (Sector::A, [a, b]) };
-        let sequence = stands[0].newest.map_or(0, |newest| newest.sequence);
-        Self { current, sequence, stands }
+        let (current, sectors) = if b_is_newer { (Sector::B, [b, a]) } else { (Sector::A, [a, b]) };
+        let sequence = sectors[0].newest.map_or(0, |newest| newest.sequence);
+        Self { current, sequence, sectors }
     }
 
     /// Loads the newest whole record, as far as this firmware can take it. `tell` is called with every remark.
@@ -102,7 +99,7 @@ impl Journal {
         flash: &impl Flash,
         mut tell: impl FnMut(Remark),
     ) -> Loaded<ROWS, COLUMNS> {
-        let [own, other] = self.stands;
+        let [own, other] = self.sectors;
         let bytes = flash.bytes(self.current);
         let found = own.newest.and_then(|whole| Some((whole, read_record(bytes.get(whole.start..)?)?)));
         let Some((whole, found)) = found else {
@@ -129,25 +126,25 @@ impl Journal {
     /// # Errors
     /// The flash refuses, or is not blank afterwards.
     pub fn make_room<F: Flash>(&mut self, flash: &mut F, slot_max: usize) -> Result<bool, SaveError<F::Error>> {
-        let [own, other] = self.stands;
-        let low = |sector, stand: Stand| {
+        let [own, other] = self.sectors;
+        let low = |sector, content: SectorContent| {
             let size = flash.bytes(sector).len();
-            size.saturating_sub(stand.end) < (size / 4).max(slot_max)
+            size.saturating_sub(content.end) < (size / 4).max(slot_max)
         };
         let erased = self.current.other();
         if !low(self.current, own) || (other.newest.is_none() && !low(erased, other)) {
             return Ok(false);
         }
         flash.erase(erased).map_err(SaveError::Flash)?;
-        let stand = Stand::of(flash.bytes(erased));
-        self.stands = [own, stand];
-        if stand.end == 0 { Ok(true) } else { Err(SaveError::Verify) }
+        let content = SectorContent::of(flash.bytes(erased));
+        self.sectors = [own, content];
+        if content.end == 0 { Ok(true) } else { Err(SaveError::Verify) }
     }
 
     /// Appends a record, a word at a time; `between` is called before each, to feed a watchdog for example.
     ///
     /// # Errors
-    /// There is no room, or the flash does not hold the record afterwards.
+    /// The sectors are full, or the flash does not hold the record afterwards.
     #[inline(never)]
     pub fn save<const ROWS: usize, const COLUMNS: usize, F: Flash>(
         &mut self,
@@ -155,23 +152,23 @@ impl Journal {
         record: &Record<ROWS, COLUMNS>,
         between: impl FnMut(),
     ) -> Result<(), SaveError<F::Error>> {
-        let [own, other] = self.stands;
+        let [own, other] = self.sectors;
         let length = record.slot_bytes();
-        let room = |sector, stand: Stand| flash.bytes(sector).len().saturating_sub(stand.end) >= length;
+        let room = |sector, content: SectorContent| flash.bytes(sector).len().saturating_sub(content.end) >= length;
         if !room(self.current, own) {
             if other.newest.is_some() || !room(self.current.other(), other) {
                 return Err(SaveError::Full);
             }
             self.current = self.current.other();
-            self.stands = [other, own];
+            self.sectors = [other, own];
         }
-        let start = self.stands[0].end;
+        let start = self.sectors[0].end;
         let sequence = self.sequence.wrapping_add(1);
         let written = write(flash, self.current, start, || words(record, sequence), between);
         if written.is_ok() {
             let end = start + length;
             self.sequence = sequence;
-            self.stands[0] = Stand { end, newest: Some(Whole { start, end, sequence }) };
+            self.sectors[0] = SectorContent { end, newest: Some(Whole { start, end, sequence }) };
         } else {
             // Whatever the result, the next record goes behind it.
             *self = Self::new(flash);
@@ -200,10 +197,10 @@ fn write<F: Flash, W: Iterator<Item = u32>>(
 
 /// Content of a sector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Stand {
-    /// All behind this is blank.
+struct SectorContent {
+    /// Offset behind which all bytes are blank.
     end: usize,
-    /// Its last whole record.
+    /// Last whole record.
     newest: Option<Whole>,
 }
 
@@ -215,7 +212,7 @@ struct Whole {
     sequence: u32,
 }
 
-impl Stand {
+impl SectorContent {
     fn of(sector: &[u8]) -> Self {
         let end = end_of_records(sector);
         let newest = (0..end / GRID).rev().map(|place| place * GRID).find_map(|start| {

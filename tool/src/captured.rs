@@ -15,7 +15,7 @@ use fingertip::shipped::{CLOCKS, COLUMNS, ROWS, SLOTS, TAXELS};
 use mcap::records::{MessageHeader, Metadata, Record};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{Attachment, McapError, WriteOptions, Writer};
-use replay::{Refusal, Replayed, Taken, replay};
+use replay::{CapturedFrame, ReplayError, Replayed, replay};
 use serde_json::{Map, Value, json};
 use std::borrow::Cow;
 use std::fs;
@@ -34,8 +34,8 @@ pub type About = std::collections::BTreeMap<String, String>;
 /// Feeds a capture through the core on this machine.
 pub fn through_the_core(
     bytes: &[u8],
-    each: impl FnMut(&Taken<ROWS, COLUMNS>, &Status),
-) -> Result<Replayed<ROWS, COLUMNS>, Refusal> {
+    each: impl FnMut(&CapturedFrame<ROWS, COLUMNS>, &Status),
+) -> Result<Replayed<ROWS, COLUMNS>, ReplayError> {
     replay(bytes, &CLOCKS, each)
 }
 
@@ -51,7 +51,7 @@ pub struct Kept {
 /// Reads a file; every byte of it is under a check sum, and all are looked at.
 ///
 /// # Errors
-/// It cannot be read, is damaged or cut off, or holds no capture.
+/// The file cannot be read, is damaged or cut off, or holds no capture.
 pub fn open(path: &Path) -> Result<Kept, String> {
     of_bytes(&fs::read(path).map_err(|why| format!("cannot be read: {why}"))?)
 }
@@ -114,15 +114,15 @@ pub fn of_bytes(mut rest: &[u8]) -> Result<Kept, String> {
 /// Frames from one message of scalars to the next, and from one of codes to the next.
 const SCALARS_EVERY: u32 = 5;
 const CODES_EVERY: u32 = 50;
-/// As a scene's recording has it: that includes the same file.
+/// Schema of a frame; recordings of scenes include the same file.
 const FRAME_SCHEMA: [&str; 2] = ["fingertip.Frame", include_str!("messages/frame.json")];
 
-type Captured<'a> = (&'a Taken<ROWS, COLUMNS>, &'a Status);
+type Captured<'a> = (&'a CapturedFrame<ROWS, COLUMNS>, &'a Status);
 
 /// Writes a capture with what is known of it.
 ///
 /// # Errors
-/// It is no capture of this version, or it cannot be written.
+/// The bytes are no capture of this version, or the file cannot be written.
 pub fn write(to: impl Write + Seek, bytes: &[u8], about: &About) -> Result<(), String> {
     let mut shown = Vec::new();
     let replayed =
@@ -142,7 +142,7 @@ fn put(
     bytes: &[u8],
     about: &About,
     head: &Head<ROWS, COLUMNS>,
-    shown: &[(Taken<ROWS, COLUMNS>, Status)],
+    shown: &[(CapturedFrame<ROWS, COLUMNS>, Status)],
 ) -> mcap::McapResult<()> {
     let ended_ns = about.get(ENDED).and_then(|ended| ended.parse().ok()).unwrap_or(0_u64);
     let attached = Attachment {
@@ -172,7 +172,8 @@ fn put(
     let scalars = out.add_channel(scalars, &Topic::Scalars.name(id), "json", about)?;
     let codes = out.add_schema(FRAME_SCHEMA[0], "jsonschema", FRAME_SCHEMA[1].as_bytes())?;
     let codes = out.add_channel(codes, &topic(id, "frame"), "json", about)?;
-    let sequence = |shown: Option<&(Taken<ROWS, COLUMNS>, Status)>| shown.map_or(0, |(taken, _)| taken.frame.sequence);
+    let sequence =
+        |shown: Option<&(CapturedFrame<ROWS, COLUMNS>, Status)>| shown.map_or(0, |(taken, _)| taken.frame.sequence);
     let (first, frame_ns) = (sequence(shown.first()), u64::from(head.frame_ns));
     let since_ns = |sequence: u32| u64::from(sequence.wrapping_sub(first)) * frame_ns;
     let begun_ns = ended_ns.saturating_sub(since_ns(sequence(shown.last())));
@@ -217,7 +218,7 @@ fn state((taken, status): Captured<'_>, frame_ns: u32) -> State {
     }
 }
 
-fn codes_of(taken: &Taken<ROWS, COLUMNS>) -> Value {
+fn codes_of(taken: &CapturedFrame<ROWS, COLUMNS>) -> Value {
     let codes: Vec<Vec<u16>> =
         (0..SLOTS).map(|slot| (0..COLUMNS).map(|column| taken.frame.code(slot, column)).collect()).collect();
     json!({ "sequence": taken.frame.sequence, "codes": codes })

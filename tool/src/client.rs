@@ -51,7 +51,7 @@ pub struct Client {
     line: Line,
     port: String,
     baud: u32,
-    /// Its address.
+    /// ID of the controller.
     pub id: u8,
     timeout: Duration,
     /// An answer was not waited for: it may come yet.
@@ -136,13 +136,13 @@ impl Client {
         std::mem::replace(&mut self.timeout, timeout)
     }
 
-    /// Asks who is there.
+    /// Pings the controller.
     pub fn ping(&mut self) -> Result<Pong, Error> {
         let data = self.ask("ping", instruction::PING, &[], 3)?;
         Ok(Pong { id: self.id, model: u16::from_le_bytes([data[0], data[1]]), firmware: data[2] })
     }
 
-    /// True if another device answers to an address; two at once do so with a damaged packet.
+    /// Returns true if a device answers to an ID; two devices at once answer with a damaged packet.
     pub fn is_taken(&mut self, id: u8) -> Result<bool, Error> {
         let (own, timeout) = (self.id, self.timeout);
         (self.id, self.timeout) = (id, timeout.min(PROBE));
@@ -158,7 +158,7 @@ impl Client {
         }
     }
 
-    /// Asks all who are there.
+    /// Pings all devices on the bus.
     pub fn ping_all(&mut self) -> Result<Vec<Pong>, Error> {
         let heard = self.pass(&packet(BROADCAST, instruction::PING, &[]), None, usize::MAX)?;
         let (mut receiver, mut found) = (Receiver::new(), Vec::new());

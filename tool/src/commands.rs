@@ -103,7 +103,7 @@ const INTERRUPT_EVERY: Duration = Duration::from_millis(50);
 pub struct Interrupt(Arc<AtomicBool>);
 
 impl Interrupt {
-    /// From now on they end nothing by themselves.
+    /// Catches the signals: from now on they do not end the program by themselves.
     pub fn catch() -> Result<Self, Error> {
         let flag = Arc::new(AtomicBool::new(false));
         let set = flag.clone();

@@ -22,12 +22,12 @@ pub enum Error {
     /// The port was lost.
     #[error("{port}: {why}; is it still connected?")]
     Port {
-        /// Its name.
+        /// Name of the port.
         port: String,
         /// The system's reason.
         why: std::io::Error,
     },
-    /// There was no answer.
+    /// The controller did not answer.
     #[error(
         "{doing}: no answer of ID {id} on {port} at {baud} baud within {waited_ms} ms; `fingertip scan` looks for it, \
          --timeout-ms waits longer"
@@ -35,13 +35,13 @@ pub enum Error {
     Silent {
         /// Request.
         doing: String,
-        /// Of whom.
+        /// ID of the controller.
         id: u8,
-        /// Where.
+        /// Port.
         port: String,
-        /// At which speed.
+        /// Bus speed, baud.
         baud: u32,
-        /// For how long.
+        /// Time waited, ms.
         waited_ms: u128,
     },
     /// The answer was no good.
@@ -49,7 +49,7 @@ pub enum Error {
     Damaged {
         /// Request.
         doing: String,
-        /// Of whom.
+        /// ID of the controller.
         id: u8,
         /// Fault of the packet.
         what: &'static str,
@@ -59,9 +59,9 @@ pub enum Error {
     Refused {
         /// Request.
         doing: String,
-        /// Of whom.
+        /// ID of the controller.
         id: u8,
-        /// Its number.
+        /// Number of the error.
         number: u8,
     },
     /// The command line asks for something that does not exist; nothing was sent.

@@ -35,7 +35,7 @@ impl Line {
     /// Opens it.
     ///
     /// # Errors
-    /// There is no such port, another program has it, or it does not support this speed.
+    /// The port does not exist, another program uses it, or it does not support this speed.
     pub fn open(port: &str, baud: u32) -> io::Result<Self> {
         if let Some(address) = port.strip_prefix(TCP) {
             let stream = TcpStream::connect(address)?;
@@ -91,7 +91,7 @@ impl Line {
     pub fn discard(&mut self) -> io::Result<()> {
         match self {
             Self::Serial(port) => {
-                // What is left is no answer to what is asked now, and is dropped by its ID or its length.
+                // Remaining bytes belong to no present request, and are dropped by their ID or length.
                 let _ = port.discard_input_buffer();
             }
             Self::Tcp(stream) => {

@@ -24,7 +24,7 @@ const SCALARS: [(&str, &str); 13] = [
     ("fault", "Fault, by its number on the bus; 0 is none"),
     ("limits", "Limits, a bit each as on the bus"),
 ];
-/// As <https://docs.foxglove.dev/docs/sdk/schemas/raw-image> has it; the scenes' recordings include the same file.
+/// Schema of <https://docs.foxglove.dev/docs/sdk/schemas/raw-image>; recordings of scenes include the same file.
 const IMAGE_SCHEMA: &str = include_str!("messages/raw_image.json");
 /// Pa for a grey level: that of the scenes, 8 codes at 24 codes for a kPa.
 const PA_PER_GREY: i64 = 333;
@@ -39,7 +39,7 @@ pub enum Topic {
 }
 
 impl Topic {
-    /// Its name for a controller.
+    /// Name of the topic for a controller.
     pub fn name(self, id: u8) -> String {
         let kind = match self {
             Self::Scalars => "scalars",
@@ -48,7 +48,7 @@ impl Topic {
         topic(id, kind)
     }
 
-    /// Its schema's name.
+    /// Name of the topic's schema.
     pub fn schema_name(self) -> &'static str {
         match self {
             Self::Scalars => "fingertip.Scalars",
@@ -56,7 +56,7 @@ impl Topic {
         }
     }
 
-    /// Its schema, as JSON Schema.
+    /// Schema of the topic, as JSON Schema.
     pub fn schema(self) -> Vec<u8> {
         match self {
             Self::Scalars => scalars_schema().to_string().into_bytes(),

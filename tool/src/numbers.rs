@@ -1,11 +1,11 @@
-//! Numbers on the command line: what is no time or rate is not understood, so nothing waits for ever or ends in a
-//! panic.
+//! Numbers on the command line: a value that is no valid time or rate is refused, so no command waits for ever or
+//! panics.
 
 use std::ops::RangeInclusive;
 
-/// Thirty years and more.
+/// Range of times, s: up to more than thirty years.
 const SECONDS: RangeInclusive<f64> = 0.0..=1e9;
-/// From one in a quarter of an hour to more than there are frames.
+/// Range of rates, Hz: from one in a quarter of an hour to more than there are frames.
 const RATES_HZ: RangeInclusive<f64> = 0.001..=1e6;
 
 /// A time in s.

@@ -16,7 +16,7 @@ const PICTURE: u16 = address::PICTURE_TIME_US;
 /// The state of the loop at a frame, in the units of the bus.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct State {
-    /// When the frame ended, by the controller's clock; wraps after 71 minutes.
+    /// Time of the frame's end by the controller's clock, us; wraps after 71 minutes.
     pub time_us: u32,
     /// See the control table for each.
     pub frame: i64,
@@ -40,13 +40,13 @@ pub struct State {
     pub mode: i64,
     /// Number of the fault; 0 without one.
     pub fault: i64,
-    /// A limit each bit.
+    /// Active limits, a bit each.
     pub limits: i64,
-    /// Of 255.
+    /// Confidence, 0 to 255.
     pub confidence: i64,
-    /// From frame to frame.
+    /// Time between two frames, ns.
     pub period_ns: i64,
-    /// Pa, row by row, where they were read.
+    /// Pressures, Pa, row by row, if they were read.
     pub pressures_pa: Vec<i64>,
 }
 
@@ -138,7 +138,7 @@ impl State {
         ]
     }
 
-    /// For scripts: numbers by name, and the words for mode, fault and limits.
+    /// JSON for scripts: numbers by name, and the names of mode, fault and limits.
     pub fn json(&self) -> Map<String, Value> {
         let mut all: Map<String, Value> =
             self.numbers().into_iter().map(|(name, value)| (name.to_owned(), json!(value))).collect();
@@ -157,8 +157,8 @@ pub struct Clock {
     total_us: u64,
 }
 
-/// Reason for which a [`Clock`] has no time.
-pub const ANEW: &str = "the controller restarted: torque is off, and it is not tared";
+/// Message for a [`Clock`] without a time.
+pub const RESTARTED: &str = "the controller restarted: torque is off, and it is not tared";
 
 impl Clock {
     /// Seconds since the first state; states come in order, an hour apart at most. None where frames count back: the

@@ -9,7 +9,7 @@ use std::fmt;
 pub struct Block {
     /// First address.
     pub first: u16,
-    /// As they came.
+    /// Bytes as received.
     pub bytes: Vec<u8>,
 }
 

@@ -61,10 +61,10 @@ impl Part {
         self.file.try_clone()
     }
 
-    /// It is whole: puts it in its place.
+    /// Moves the complete file to its place.
     ///
     /// # Errors
-    /// It cannot be moved there, or something came to be there meanwhile: then it stays beside it.
+    /// The file cannot be moved, or another file took its place meanwhile: then the part stays beside it.
     pub fn place(self) -> Result<(), Error> {
         let failed = |why: io::Error| Error::file("write", &self.place, why);
         self.file.sync_all().map_err(failed)?;
@@ -87,7 +87,7 @@ impl Drop for Part {
 /// Writes a whole file at once.
 ///
 /// # Errors
-/// As [`Part::begin`] and [`Part::place`].
+/// Like [`Part::begin`] and [`Part::place`].
 pub fn write(place: &Path, force: bool, bytes: &[u8]) -> Result<(), Error> {
     let mut part = Part::begin(place, force)?;
     part.file.write_all(bytes).map_err(|why| Error::file("write", place, why))?;

@@ -146,7 +146,7 @@ const BROWSERS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "g
 /// Finds a Chromium, or installs Debian's; with fonts, without which a page has no letters.
 ///
 /// # Errors
-/// It is missing and cannot be installed; the text says what to install by hand.
+/// The browser is missing and cannot be installed; the text says what to install by hand.
 pub fn browser(console: &mut Console) -> Result<PathBuf> {
     let find = || BROWSERS.into_iter().find_map(paths::find_program);
     if let Some(program) = find() {

@@ -47,9 +47,9 @@ pub struct Args {
 /// Board that runs the image.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Board {
-    /// On the desk
+    /// The board on the desk
     Nucleo,
-    /// In the emulator
+    /// The emulated board
     Virtual,
 }
 

@@ -135,7 +135,7 @@ impl Console {
 /// A line of a program's.
 struct Line {
     text: String,
-    /// From its standard error.
+    /// True for a line of the standard error.
     error: bool,
 }
 
@@ -265,7 +265,7 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Of a build.
+    /// Progress of a build.
     pub fn new(what: &str, slow: Slow) -> Self {
         let now = Instant::now();
         let slow = slow.iter().map(|(name, seconds)| (*name, (*seconds, None))).collect();

@@ -62,7 +62,7 @@ impl Core {
 /// Runs the loop on every core and writes the table.
 ///
 /// # Errors
-/// As [`page`], or the page cannot be written.
+/// Like [`page`]; also if the page cannot be written.
 pub fn run_all(choice: Choice, console: &mut Console) -> Result<()> {
     let page = page(choice, console)?;
     console.print(&table(&page));
@@ -188,7 +188,7 @@ pub fn test_m4(choice: Choice, console: &mut Console) -> Result<()> {
 /// Makes sure of the emulator.
 ///
 /// # Errors
-/// It is missing and cannot be installed.
+/// The emulator is missing and cannot be installed.
 pub fn ensure_m4(console: &mut Console) -> Result<()> {
     match paths::find_program(M4_EMULATOR) {
         Some(_) => Ok(()),

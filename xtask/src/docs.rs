@@ -21,7 +21,7 @@ const GENERATED: &[(&str, &str)] = &[
 ];
 /// The demonstration's figures, as the README shows them.
 const FIGURES: &str = "docs/demo.json";
-/// Its pictures, and those of the paper.
+/// Pictures of the demonstration and of the paper.
 pub const PICTURES: &str = "docs/pictures";
 /// The paper's figures among the pictures.
 const PAPER: [&str; 3] = ["docs/pictures/figure-7.svg", "docs/pictures/figure-10.svg", "docs/pictures/figure-11.svg"];
@@ -96,7 +96,7 @@ pub fn renew(path: &str, text: &str, check: bool, stale: &mut Vec<String>, conso
 
 /// Published packages; each depends on those before it.
 pub const PACKAGES: [&str; 2] = ["fingertip-lanes", "fingertip"];
-/// Its version, as in the workspace's manifest.
+/// Version of the packages, as in the workspace's manifest.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// Makes the packages and runs the tests of `host-tests/outside`, which depends on them.
@@ -136,7 +136,7 @@ pub fn package(console: &mut Console) -> Result<()> {
 
 /// A tool of cargo's; the version is part of the promise that a passing check passes tomorrow.
 pub struct Tool {
-    /// Its name and that of its program.
+    /// Name of the tool and of its program.
     name: &'static str,
     version: &'static str,
     /// Purpose here.

@@ -10,9 +10,9 @@ pub const PROFILE: &str = "host";
 
 /// A program of the workspace.
 pub struct Program {
-    /// Its package.
+    /// Package of the program.
     pub package: &'static str,
-    /// Its name.
+    /// Name of the program.
     pub name: &'static str,
     /// True if it is built with its package's default features.
     pub whole: bool,

@@ -113,7 +113,7 @@ pub fn firmware(choice: Choice, console: &mut Console) -> Result<Image> {
 /// Builds an image that checks a board, with the flashable bytes beside it.
 ///
 /// # Errors
-/// It does not compile or link.
+/// The image does not compile or link.
 pub fn checking(toolchain: Toolchain, name: &str, console: &mut Console) -> Result<Image> {
     let image = Image::read(&built(checked(toolchain, "build", name).arg("--release"), toolchain, name, console)?)?;
     fs::write(&image.bin, &image.bytes).with_context(|| format!("cannot write {}", paths::shown(&image.bin)))?;
@@ -123,7 +123,7 @@ pub fn checking(toolchain: Toolchain, name: &str, console: &mut Console) -> Resu
 /// Builds an image for the emulated core and returns where it lies.
 ///
 /// # Errors
-/// It does not compile or link.
+/// The image does not compile or link.
 pub fn build(toolchain: Toolchain, name: &str, feature: &str, console: &mut Console) -> Result<PathBuf> {
     built(emulated(toolchain, "build", name, feature).arg("--release"), toolchain, name, console)
 }

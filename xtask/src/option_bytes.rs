@@ -164,7 +164,7 @@ mod tests {
     use super::*;
     use anyhow::ensure;
 
-    /// As they come from the factory: brown-out reset off, read protection off, no sector protected, software watchdog.
+    /// Factory setting: brown-out reset off, read protection off, no sector protected, software watchdog.
     const FACTORY: u32 = 0x0fff_aaed;
     const LEVEL_3: u32 = FACTORY & !BOR_LEV;
     /// Pauses that a write takes: 350 ms.

@@ -8,7 +8,7 @@ use std::process::Command;
 
 /// A virtual environment in the build folder.
 pub struct Environment {
-    /// Its folder.
+    /// Folder of the environment.
     pub folder: &'static str,
     /// Installed packages, with their versions.
     pub packages: &'static [&'static str],

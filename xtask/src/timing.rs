@@ -45,7 +45,7 @@ pub struct Run {
 }
 
 impl Run {
-    /// What the image calls a region, in a line `region NUMBER NAME` of its output; the number where it does not say.
+    /// Name of a region from the line `region NUMBER NAME` of the output; its number without such a line.
     pub fn name(&self, region: u32) -> String {
         let start = format!("region {region} ");
         let name = self.output.lines().find_map(|line| line.strip_prefix(&start));
@@ -146,7 +146,7 @@ pub fn measure(image: &Path, argument: Option<&Path>, console: &mut Console) -> 
 /// Makes sure of an emulator with the plugin interface.
 ///
 /// # Errors
-/// It is missing and cannot be installed.
+/// The emulator is missing and cannot be installed.
 pub fn ensure(console: &mut Console) -> Result<()> {
     if version().is_some_and(|version| version >= VERSION_MIN) {
         return Ok(());

@@ -109,7 +109,7 @@ pub fn ensure(choice: Choice, console: &mut Console) -> Result<Toolchain> {
 /// Finds or installs a compiler for some targets.
 ///
 /// # Errors
-/// As [`ensure`].
+/// Like [`ensure`].
 pub fn ensure_for(choice: Choice, targets: &[&str], why: &str, console: &mut Console) -> Result<Toolchain> {
     if choice == Choice::Debian {
         return debian(console);
@@ -132,7 +132,7 @@ pub fn ensure_for(choice: Choice, targets: &[&str], why: &str, console: &mut Con
             "no compiler for {}.\n\
              - rustup: {rustup:#}\n\
              - Debian: {debian:#}\n\
-             Open the way to static.rust-lang.org or to a Debian mirror, or do one of the two by hand.",
+             Allow access to static.rust-lang.org or to a Debian mirror, or do one of the two by hand.",
             missing.join(", ")
         )
     })

@@ -1,4 +1,4 @@
-//! The one table of checks: what the image measures, what is expected, why, and what to do where it is otherwise.
+//! Table of all checks: figure, expected range, reason, and advice if the figure is outside.
 
 use crate::finger::{COUNTS_PER_RAD, FORCE_PER_MM2, MM_PER_RAD};
 use crate::script::Bench;
@@ -7,21 +7,21 @@ use fingertip::shipped::{Config, Pipeline};
 use serde_json::Value;
 use std::sync::OnceLock;
 
-/// A figure of the image's report against what is expected.
+/// A figure of the image's report, with its expected range.
 pub struct Check {
-    /// In the report.
+    /// Name in the report.
     pub name: String,
-    /// In words.
+    /// Description.
     pub what: String,
-    /// Of the figure.
+    /// Unit of the figure.
     pub unit: &'static str,
-    /// The least and the most that are expected.
+    /// Range of expected values.
     pub within: [f64; 2],
-    /// Source.
+    /// Source of the range.
     pub source: &'static str,
     /// Advice if the figure is outside.
     pub then: &'static str,
-    /// Why the emulated board cannot show it.
+    /// Reason why the emulated board cannot show this figure.
     pub unseen: Option<&'static str>,
 }
 
@@ -29,7 +29,7 @@ const INF: f64 = f64::INFINITY;
 const NO_NOISE: &str = "its converters have none";
 const NO_CAPTURE: &str = "it has no inside connection from the oscillators to the timers";
 const OWN_TIMES: &str = "its flash takes the data sheet's times by construction";
-/// Also said of the kernels.
+/// Reason why the emulated board shows no cycle counts, also those of the kernels.
 pub const FLAT: &str = "it retires a flat number of instructions a second";
 
 type Row = (&'static str, &'static str, &'static str, [f64; 2], &'static str, &'static str, Option<&'static str>);
@@ -163,7 +163,7 @@ const TABLE: [Row; 26] = [
         "C",
         [10.0, 65.0],
         "estimate: a room's, up to 20 K for itself and some for its sensor",
-        "not reported: the factory's codes are missing, and the force is not corrected for warmth; else tell us",
+        "not reported: the factory's codes are missing, and the force is not compensated for temperature; else tell us",
         None,
     ),
     (
@@ -299,13 +299,13 @@ pub fn checks() -> Vec<Check> {
 // The steps of the simulated finger against the demonstration's.
 
 const DEMO: &str = include_str!("../../../docs/demo.json");
-/// As the report names them, as the demonstration does, in words, and their unit.
+/// Name in the report, its unit, name in the demonstration, description, and unit there.
 const FIGURES: [(&str, &str, &str, &str, &str); 3] = [
     ("rise", "ms", "rise_ms", "rise, 10 to 90 %", "ms"),
     ("overshoot", "percent", "overshoot_percent", "overshoot", "%"),
     ("settled", "ms", "settling_ms", "settled to 2 %", "ms"),
 ];
-/// A tenth.
+/// Allowed relative difference to the demonstration.
 const SHARE: f64 = 0.1;
 
 /// The force of two counts of the encoder at the goal, in percent of the step, as an overshoot is reported: where

@@ -20,7 +20,7 @@ const PITCH_MM: f32 = 1.5;
 const GROUND: f32 = 0.3 / 3.3 * 4_096.0;
 const PRELOAD: f32 = 40.0;
 const PER_KPA: f32 = 24.0;
-/// R_on over K: what a row loses for each code in its sum.
+/// R_on over K: share that a row loses per code of its sum.
 const SAG_PER_CODE: f32 = 30.0 / 1.8e7;
 
 const TORQUE_NM_PER_A: f32 = 5.35e-3;
@@ -35,8 +35,8 @@ pub(crate) const COUNTS_PER_RAD: f32 = 1_600.0 / (2.0 * PI);
 const SOURCE_V: f32 = 6.0;
 const SOURCE_OHM: f32 = 0.1;
 
-/// Steps of a frame; the new duty comes after half of them, 50 us for the demonstration's 43, and the array is read
-/// then.
+/// Number of steps in a frame. After half of them the array is read and the new duty acts: 50 us after the frame's
+/// begin, close to the demonstration's 43.
 const STEPS: usize = 6;
 const HALF_OF_THEM: usize = STEPS / 2;
 
@@ -44,7 +44,7 @@ const HALF_OF_THEM: usize = STEPS / 2;
 const HALF: usize = COLUMNS / 2;
 /// Taxels that mirror and swap of the axes do not make the same.
 const CLASSES: usize = HALF * (HALF + 1) / 2;
-/// The table's indentations: 0 to 2.8 mm, beyond what 6 N take.
+/// Number of indentations in the table: 0 to 2.8 mm, more than 6 N need.
 const DEPTHS: usize = 141;
 const DEPTH_STEP_MM: f32 = 0.02;
 /// Points along each side of a taxel whose mean is its pressure.
@@ -63,7 +63,7 @@ pub struct Finger {
 }
 
 impl Finger {
-    /// At rest so far from the wall, the bridge open; the table is still to be made.
+    /// Finger at rest at a distance from the wall, the bridge open; [`Self::make_table`] must be called.
     pub const fn new(wall_mm: f32) -> Self {
         Self {
             kpa: [[0.0; CLASSES]; DEPTHS],
@@ -76,7 +76,7 @@ impl Finger {
         }
     }
 
-    /// At rest again. Table and wall stay.
+    /// Returns to rest. Table and wall stay.
     pub fn restart(&mut self) {
         let Self { kpa: _, wall_mm: _, angle_rad, speed_rad_per_s, bridge, supply_v, read_mm } = self;
         (*angle_rad, *speed_rad_per_s, *bridge, *supply_v, *read_mm) = (0.0, 0.0, Bridge::Open, SOURCE_V, 0.0);

@@ -9,7 +9,7 @@ use std::fs;
 use std::io::Error;
 use std::path::Path;
 
-/// Of the JSON file's fields.
+/// Version of the JSON file's fields.
 const SCHEMA_VERSION: u32 = 1;
 /// Allowed difference between measured and estimated cycles: a share, or a number. The model does not know the flash
 /// fully.
@@ -32,28 +32,28 @@ pub enum Board {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// As expected.
+    /// The value is as expected.
     Pass,
-    /// Otherwise, or not reported.
+    /// The value is not as expected, or not reported.
     Fail,
     /// The emulated board cannot show it.
     NotShown,
 }
 
-/// A check and what came of it.
+/// A check and its result.
 #[derive(Debug, Serialize)]
 pub struct Judged {
-    /// In the report.
+    /// Name in the report.
     pub name: String,
-    /// In words.
+    /// Description.
     pub what: String,
-    /// Of the figures.
+    /// Unit of the figures.
     pub unit: &'static str,
-    /// None where it was not reported.
+    /// Measured figure; `None` if it was not reported.
     pub figure: Option<f64>,
-    /// The least that is expected.
+    /// Smallest expected figure.
     pub at_least: f64,
-    /// The most; `None` without a limit.
+    /// Largest expected figure; `None` without a limit.
     pub at_most: Option<f64>,
     /// Source.
     pub source: &'static str,
@@ -63,7 +63,7 @@ pub struct Judged {
     pub advice: Option<&'static str>,
 }
 
-/// A kernel's cycles beside the timing model's estimate.
+/// Measured cycles of a kernel, with the timing model's estimate.
 #[derive(Debug, Serialize)]
 pub struct Kernel {
     /// Kernel and variant.
@@ -72,20 +72,20 @@ pub struct Kernel {
     pub median_cycles: f64,
     /// The same.
     pub most_cycles: f64,
-    /// With the flash's wait states, of the same inputs; `None` without an estimate.
+    /// Estimate for the same inputs with the flash's wait states; `None` without one.
     pub estimated_cycles: Option<f64>,
     /// Verdict.
     pub verdict: Verdict,
 }
 
-/// All of a board.
+/// All results of a board.
 #[derive(Debug, Serialize)]
 pub struct Judgement {
-    /// Of these fields.
+    /// Version of these fields.
     pub schema_version: u32,
-    /// Of the bytes that were flashed.
+    /// SHA-256 of the flashed bytes.
     pub image_sha256: String,
-    /// The part's own.
+    /// Unique ID of the part.
     pub board_uid: String,
     /// Which board it was.
     pub board: Board,
@@ -165,7 +165,7 @@ fn judged(check: Check, report: &Report, board: Board) -> Judged {
 }
 
 impl Judgement {
-    /// As a table: what fails with its source and what to do.
+    /// Results as a table; failed checks with source and advice.
     pub fn text(&self) -> String {
         let mut text = String::new();
         for check in &self.checks {

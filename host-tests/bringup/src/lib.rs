@@ -1,4 +1,4 @@
-//! The first hour with a board: what the image of `cargo xtask bringup` and its judge on the host share.
+//! Bring-up of a board: code that the image of `cargo xtask bringup` and its judge on the host share.
 //!
 //! The image runs on a bare NUCLEO-F446RE and on the emulated board. It measures, and closes the loop on a finger that
 //! it simulates itself ([`finger`], [`script`]); it judges nothing.

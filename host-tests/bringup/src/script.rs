@@ -10,12 +10,12 @@ use fingertip::shipped::{Frame, Pipeline, TARE_FRAMES};
 use fingertip::units::{CoreCycles, Newtons};
 use images::record::{Digest, Record};
 
-/// Goals in mN, and for how many frames each is held; 0 lets go. The first has 5 mm to go.
+/// Goals in mN, and number of frames for which each is held; 0 releases. The first approach is 5 mm long.
 pub const GOALS: [(i32, u32); 6] =
     [(1_000, 5_000), (200, 2_500), (2_000, 2_500), (5_000, 2_500), (1_000, 2_500), (0, 1_000)];
 /// The goals among them that are steps from one force to another.
 pub const STEPS: core::ops::Range<usize> = 1..5;
-/// Time from the start to torque on: the tare is over by then.
+/// Frames from the start to torque on, longer than the tare.
 const TORQUE_AT: u32 = TARE_FRAMES + 20;
 /// The first goal.
 const FIRST_AT: u32 = TORQUE_AT + 20;
@@ -48,9 +48,9 @@ pub struct Answer {
     pub goal: usize,
     /// Time from 10 % to 90 % of the step, ms.
     pub rise_ms: f32,
-    /// Beyond the goal, of the goal or of the step, whichever is smaller.
+    /// Overshoot as a share of the goal or of the step, whichever is smaller.
     pub overshoot_percent: f32,
-    /// Until the force stays within 2 %, ms; negative where it does not.
+    /// Time until the force stays within 2 %, ms; negative if it never does.
     pub settled_ms: f32,
 }
 
@@ -107,7 +107,7 @@ impl Way {
     }
 }
 
-/// The finger, and who asks it: everything around the control step.
+/// Finger and host: everything around the control step.
 pub struct Bench {
     /// The finger.
     pub finger: Finger,
@@ -121,7 +121,7 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// At rest, before the tare; [`Finger::make_table`] is still to be called.
+    /// Bench at rest, before the tare; [`Finger::make_table`] must be called.
     pub const fn new() -> Self {
         Self {
             finger: Finger::new(WALL_MM),
@@ -135,7 +135,7 @@ impl Bench {
         }
     }
 
-    /// At rest again before the tare, for the records.
+    /// Returns to rest before the tare, for the records.
     pub fn restart(&mut self) {
         self.finger.restart();
         self.finger.wall_mm = NEAR_MM;
@@ -175,8 +175,8 @@ impl Bench {
         self.goal == Some(GOALS.len())
     }
 
-    /// A frame's time passes under what the step said, which took `answer`. Tells how the force has answered where a
-    /// goal is over.
+    /// Advances the finger by a frame time under the step's duty; `answer` is the time that the step took. Returns the
+    /// step response of the force at the end of a goal.
     pub fn pass(&mut self, status: &Status, frame_ns: u32, answer: CoreCycles) -> Option<Answer> {
         self.finger.advance(status.bridge(), frame_ns);
         self.finger.fill(&mut self.frame);

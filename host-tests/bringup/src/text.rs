@@ -1,7 +1,7 @@
 //! The lines between image and host: `bringup VERSION UID`, `figure NAME VALUE`, `cycles MEDIAN MOST KERNEL`, and `end
 //! CHECK`, a check over all before it. A line that begins with `#` only reports progress.
 
-/// Of these lines.
+/// Version of these lines.
 pub const VERSION: u32 = 1;
 /// The virtual COM port's speed.
 pub const BAUD: u32 = 115_200;

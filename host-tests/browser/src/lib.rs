@@ -1,5 +1,5 @@
-//! A headless Chromium, driven over the DevTools protocol: opens a page as a screen or a phone shows it, light or dark,
-//! and reports what is wrong with it.
+//! A headless Chromium, driven over the DevTools protocol: opens a page as on a screen or a phone, light or dark, and
+//! reports its errors.
 
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use serde_json::{Value, json};
@@ -15,7 +15,7 @@ use tungstenite::{Message, WebSocket};
 
 // The browser's process, and the protocol: JSON over a web socket, answers by number, events in between.
 
-/// Why the browser did not do what was asked.
+/// Reason why a request to the browser failed.
 pub type BrowserError = Box<dyn Error + Send + Sync>;
 
 /// Silence after which a browser counts as hung; the slowest machine needs a small part of it.
@@ -46,7 +46,7 @@ impl Browser {
     /// Starts the program, with a new profile in a folder.
     ///
     /// # Errors
-    /// It does not start or does not answer; the text has what it wrote.
+    /// The program does not start or does not answer; the text includes its output.
     pub fn start(program: &Path, profile: &Path) -> Result<Self, BrowserError> {
         let mut command = Command::new(program);
         command.args(FLAGS).arg(format!("--user-data-dir={}", profile.display())).arg("about:blank");
@@ -160,7 +160,7 @@ impl Drop for Browser {
 
 // What a reader's hand does: a mouse, a finger on the glass, a file that is chosen.
 
-/// A place in what is shown of the page, from its left and upper edge in px.
+/// A point in the visible part of the page, from its left and upper edge, px.
 pub type Place = (f64, f64);
 
 /// Number of positions between the ends of a drag that the page receives.
@@ -353,7 +353,7 @@ pub fn complaints(browser: &mut Browser, address: &str, so: Look, picture: &Path
     Ok(found)
 }
 
-/// Errors and warnings on the console since the page was opened, and whatever was fetched beside it.
+/// Errors and warnings on the console since the page was opened, and all resources fetched in addition to the page.
 pub fn events(browser: &Browser, address: &str) -> Vec<String> {
     let complaint = |event: &Value| {
         let params = &event["params"];

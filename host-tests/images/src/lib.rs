@@ -26,12 +26,12 @@ pub mod single;
 /// The shipped parameters of a finger whose motor's direction was confirmed: torque is refused before.
 pub const CONFIRMED: Params = Params { direction_confirmed: 1, ..Params::DEFAULT };
 
-/// What corrects for a real sensor switched on: a characteristic that is no line, creep, a gain that drifts with
-/// temperature. The images that count cycles measure what it costs by these.
+/// Parameters with all corrections of a real sensor on: a nonlinear characteristic, creep, and a gain that drifts with
+/// temperature. The images that count cycles measure the cost of the corrections with them.
 pub const CORRECTED: Params =
     Params { curve_permille: 3_300, creep_permille: 66, array_gain_ppm_per_k: 3_600, ..CONFIRMED };
 
-/// A frame of the touch and of the grip in an approach or a hold, where the motor felt nothing before the array did.
+/// Steps touch and grip by a frame of an approach or a hold, without an external force before the array shows one.
 #[inline(always)]
 pub fn reference(
     grip: &mut Grip,

@@ -108,17 +108,17 @@ static CRC: Crc<u64, Table<1>> = Crc::<u64, Table<1>>::new(&CRC_64_XZ);
 pub struct Digest(crc::Digest<'static, u64, Table<1>>);
 
 impl Digest {
-    /// Of nothing.
+    /// Digest of no steps.
     pub fn new() -> Self {
         Self(CRC.digest())
     }
 
-    /// Adds what a step returned.
+    /// Adds the results of a step.
     pub fn add(&mut self, duty: Duty, status: &Status) {
         status.words(duty, |word| self.0.update(&word.to_le_bytes()));
     }
 
-    /// The digest of what was added.
+    /// Value of the digest.
     pub fn value(self) -> u64 {
         self.0.finalize()
     }

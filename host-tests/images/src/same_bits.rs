@@ -1,9 +1,9 @@
-//! The same random inputs for every function on any processor, and a digest of what each answered.
+//! The same random inputs for every function on any processor, and a digest of the results of each.
 //!
 //! Two processors whose digests are equal agree in every bit of every answer. Each input goes to all functions of the
-//! model ([`model`]) and to what has a configuration or a state ([`machines`]); about a quarter of the numbers is
-//! outside the functions' domains. What looks at a whole frame, [`machines::FRAMES`], takes every 8th input, and what
-//! is costly to make, [`made::MADE`], every 1024th.
+//! model ([`model`]) and to the types with a configuration or a state ([`machines`]); about a quarter of the numbers is
+//! outside the functions' domains. Functions of a whole frame, [`machines::FRAMES`], get every 8th input, and costly
+//! constructors, [`made::MADE`], every 1024th.
 
 pub mod machines;
 pub mod made;
@@ -67,13 +67,13 @@ impl Default for Source {
     }
 }
 
-/// A digest of numbers in order. Each number permutes it, so that two runs that differ in one number differ for good,
-/// unless another difference undoes it.
+/// Digest of numbers in order. Each number permutes the digest, so two runs that differ in one number keep different
+/// digests, unless another difference cancels the first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mix(u64);
 
 impl Mix {
-    /// Of nothing.
+    /// Digest of no numbers.
     pub const EMPTY: Self = Self(0);
 
     /// Adds a number.
@@ -98,7 +98,7 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// Nothing taken yet.
+    /// Comparison before the first step.
     ///
     /// # Errors
     /// None: the default parameters are sound, as the core's own tests show.
@@ -134,7 +134,8 @@ impl Comparison {
         self.taken += 1;
     }
 
-    /// Changes a function's digest as a different answer would, to see it found. False where there is no such function.
+    /// Changes the digest of a function like a different result, to test the comparison. Returns false for an unknown
+    /// name.
     pub fn spoil(&mut self, name: &str) -> bool {
         let place = names().position(|other| other == name);
         place.and_then(|place| self.mixes.get_mut(place)).map(|mix| mix.add(1)).is_some()

@@ -1,18 +1,18 @@
 //! Contact from a single tactile image; the firmware spreads this over frames.
 //!
-//! [`contact::Fit`](fingertip::contact::Fit) spreads a refinement over frames. Here all of it is done with one picture,
-//! from a start in closed form: dearer, and closer. It judges the fit, and the study has its price.
+//! [`contact::Fit`](fingertip::contact::Fit) spreads a refinement over frames. Here all of it is done with one image,
+//! from a start in closed form: slower, and more exact. It is a reference for the fit; the study has its cost.
 
 mod rim;
 mod start;
 
 use fingertip::config::Shaped;
 use fingertip::contact::parts::{
-    CENTRE_BITS, Comparison, Equations, Guess, Misfit, PEAK_BITS, Prediction, SLOPE_BITS, SQUARE_BITS, Scale,
-    TAXELS_MIN, View, confidence, covers,
+    CENTRE_BITS, Comparison, Equations, Guess, Misfit, PEAK_BITS, PeakScale, Prediction, SLOPE_BITS, SQUARE_BITS,
+    ScaledImage, TAXELS_MIN, confidence, covers,
 };
 use fingertip::contact::{Contact, from_sums};
-use fingertip::pressure::Picture;
+use fingertip::pressure::TactileImage;
 use rim::Rim;
 
 /// Number of refinements of the reading.
@@ -53,7 +53,7 @@ const RESTS: u32 = 1 << (CENTRE_BITS - 14);
 /// the sum's force and centre; the model then only gives the confidence. So does a contact that the model explains with
 /// no confidence at all.
 pub fn read<const ROWS: usize, const COLUMNS: usize>(
-    picture: &Picture<ROWS, COLUMNS>,
+    picture: &TactileImage<ROWS, COLUMNS>,
     refined: Refined,
     config: &Shaped<ROWS, COLUMNS>,
 ) -> Contact {
@@ -62,10 +62,10 @@ pub fn read<const ROWS: usize, const COLUMNS: usize>(
     if sums.force < config.contact_off {
         return sums;
     }
-    let Some(scale) = Scale::new(picture.peak, geometry) else {
+    let Some(scale) = PeakScale::new(picture.peak, geometry) else {
         return sums;
     };
-    let view = View { picture, scale };
+    let view = ScaledImage { picture, scale };
     let guess = Guess::from_lengths(sums.indentation, sums.centre_x, sums.centre_y, geometry);
     if covers(&sums, picture, config) {
         let confidence = confidence::<ROWS, COLUMNS>(&misfit(&guess, &view, config), &scale);
@@ -93,7 +93,7 @@ pub fn read<const ROWS: usize, const COLUMNS: usize>(
 /// Difference between a guess and the tactile image.
 fn misfit<const ROWS: usize, const COLUMNS: usize>(
     guess: &Guess,
-    view: &View<ROWS, COLUMNS>,
+    view: &ScaledImage<ROWS, COLUMNS>,
     config: &Shaped<ROWS, COLUMNS>,
 ) -> Misfit {
     let mut misfit = Misfit::NONE;
@@ -107,7 +107,7 @@ fn misfit<const ROWS: usize, const COLUMNS: usize>(
 fn refine<const ROWS: usize, const COLUMNS: usize>(
     start: Guess,
     refined: Refined,
-    view: &View<ROWS, COLUMNS>,
+    view: &ScaledImage<ROWS, COLUMNS>,
     config: &Shaped<ROWS, COLUMNS>,
 ) -> Guess {
     let (mut guess, far) = step(start, false, view, config);
@@ -129,7 +129,7 @@ fn refine<const ROWS: usize, const COLUMNS: usize>(
 fn step<const ROWS: usize, const COLUMNS: usize>(
     guess: Guess,
     closely: bool,
-    view: &View<ROWS, COLUMNS>,
+    view: &ScaledImage<ROWS, COLUMNS>,
     config: &Shaped<ROWS, COLUMNS>,
 ) -> (Guess, u32) {
     let geometry = &config.geometry;

@@ -76,7 +76,7 @@ impl Lock {
     /// Replaces the file.
     ///
     /// # Errors
-    /// It cannot be written; what was there before still is.
+    /// The file cannot be written; then the old one remains.
     pub fn write(&self, bytes: impl AsRef<[u8]>) -> io::Result<()> {
         self.write_with(&self.path, bytes)
     }
@@ -117,7 +117,7 @@ impl Whole {
     /// Begins a file.
     ///
     /// # Errors
-    /// It cannot be written, or another process writes it.
+    /// The file cannot be written, or another process writes it.
     pub fn create(path: &Path) -> io::Result<Self> {
         let lock = Lock::take(path)?;
         let new = beside(path, "new");
@@ -157,10 +157,10 @@ impl Drop for Whole {
     }
 }
 
-/// Replaces a file by what is whole. Terminals, pipes and other devices are written to as they are.
+/// Replaces a file in one step, never with a part of the bytes. Writes directly to terminals, pipes and other devices.
 ///
 /// # Errors
-/// It cannot be written; what was there before still is.
+/// The file cannot be written; then the old one remains.
 pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> io::Result<()> {
     // The target of a link is replaced, not the link.
     match fs::canonicalize(path) {

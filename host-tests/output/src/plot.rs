@@ -87,7 +87,7 @@ fn picture(size_px: (u32, u32), draw: impl FnOnce(&Area<'_>) -> Result<(), PlotE
     Ok(with_dark_scheme(&svg))
 }
 
-/// As [`picture`], drawn [`FINE`] times as large: what is drawn in it counts in these parts of a pixel.
+/// Like [`picture`], drawn [`FINE`] times as large: coordinates are in these fractions of a pixel.
 fn fine_picture(
     (width, height): (u32, u32),
     draw: impl FnOnce(&Area<'_>) -> Result<(), PlotError>,
@@ -119,7 +119,7 @@ pub enum Curve {
 }
 
 impl Curve {
-    /// Its points.
+    /// Points of the curve.
     pub fn points_mut(&mut self) -> &mut Vec<(f64, f64)> {
         let (Self::Solid(points)
         | Self::Pale(points)

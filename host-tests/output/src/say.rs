@@ -30,8 +30,8 @@ pub fn aside(text: impl Display) {
     let _ = io::stderr().write_all(format!("{text}\n").as_bytes());
 }
 
-/// Ends what is said, and tells whether all of it was: of a reader that went away, or of a full disk. Returns whether
-/// the program may end well: who closed the output wanted no more of it.
+/// Flushes standard output and reports a failed write. Returns true if the program may exit with success: a closed pipe
+/// is not an error, as the reader has seen enough; a full disk is one.
 pub fn end() -> bool {
     keep(io::stdout().flush());
     match LOST.get() {

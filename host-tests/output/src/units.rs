@@ -49,9 +49,9 @@ const WORDS: [(&str, &str); 41] = [
 ];
 /// Divided by these in words: "counts a turn".
 const IN_WORDS: [&str; 3] = ["code", "decade", "turn"];
-/// Says of what it is, between `per` and the unit.
+/// Word for the reference quantity, between `per` and the unit.
 const OF_WHAT: &str = "goal";
-/// Behind the unit: thousandths of it.
+/// Suffix of a unit for thousandths of it.
 const THOUSANDTHS: &str = "_milli";
 
 /// The unit that a name ends with; `None` for a plain number.

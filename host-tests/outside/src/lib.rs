@@ -6,7 +6,7 @@
 fn a_motion_that_is_not_built_in_is_refused() {
     use fingertip::command::Command;
     use fingertip::frame::{Frame, Sense};
-    use fingertip::measure::{Ended, State, Task};
+    use fingertip::measure::{Ended, MeasureState, Task};
     use fingertip::pipeline::{Pipeline, Taring};
     use fingertip::{config::newtons, params::Params, shipped};
 
@@ -27,6 +27,6 @@ fn a_motion_that_is_not_built_in_is_refused() {
         }
         let status = finger.status();
         assert_eq!((status.fault, status.taken.measure), (None, task.after(0)), "{task:?}");
-        assert_eq!((status.measure.state, status.measure.ended), (State::Ended, Ended::NotReady), "{task:?}");
+        assert_eq!((status.measure.state, status.measure.ended), (MeasureState::Ended, Ended::NotReady), "{task:?}");
     }
 }

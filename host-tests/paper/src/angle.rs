@@ -64,9 +64,9 @@ pub(crate) fn arc_tangent(t: u32) -> u32 {
     t - mul(t, mul(z, alternating(&ARC_TANGENT, z)))
 }
 
-/// The angle of the point (x, y) above the x axis, `atan(y/x)`, in Q2.30: the two lengths are not negative.
+/// Angle of the point (x, y) above the x axis, `atan(y/x)`, in Q2.30, for x and y of at least 0.
 ///
-/// The quotient is formed the way that makes it at most 1, so the tangent near pi/2 is never needed.
+/// The smaller length is divided by the larger one, so the tangent near pi/2 is never needed.
 pub(crate) fn angle_of(y: u32, x: u32) -> u32 {
     if y == 0 {
         return 0;

@@ -48,15 +48,15 @@ pub enum RelaxationError {
     },
     /// The shares add up to more than 1, in 2^-16.
     Sum(i64),
-    /// A term's time constant is out of its range.
+    /// The time constant of a term is out of range.
     TimeConstant {
-        /// Which term.
+        /// Number of the term.
         term: usize,
         /// Its time constant, us.
         value_us: u32,
-        /// The shortest one allowed, us: the period.
+        /// Minimum, us: the period.
         min_us: u32,
-        /// The longest one allowed, us.
+        /// Maximum, us.
         max_us: u32,
     },
 }
@@ -113,10 +113,10 @@ pub struct RelaxationState<const N: usize> {
 }
 
 impl<const N: usize> RelaxationState<N> {
-    /// Unloaded for long.
+    /// State after a long time without load.
     pub const REST: Self = Self { elastic_q48: 0, memory_q48: [0; N] };
 
-    /// Under a constant elastic force for long.
+    /// State after a long time under a constant elastic force.
     pub fn settled(elastic: Newtons) -> Self {
         let elastic_q48 = widen(elastic);
         Self { elastic_q48, memory_q48: [elastic_q48; N] }
@@ -154,10 +154,10 @@ impl<const N: usize> Relaxation<N> {
         Ok(Self { terms: terms.map(|term| Coefficients::new(period_us, term)) })
     }
 
-    /// The force one period later, when the elastic force has gone straight to `elastic`.
+    /// Force after one period, in which the elastic force changes linearly to `elastic`.
     ///
-    /// An elastic force below 0 counts as 0: a tip does not pull. The result is negative while a tip that was let go
-    /// recovers: then it has left the object.
+    /// An elastic force below 0 counts as 0: a tip does not pull. The result is negative while a released tip
+    /// recovers: then the tip has left the object.
     pub fn step(&self, state: &mut RelaxationState<N>, elastic: Newtons) -> Newtons {
         let now_q48 = widen(elastic);
         let before_q48 = core::mem::replace(&mut state.elastic_q48, now_q48);

@@ -1,6 +1,6 @@
 //! Beyond one dimension: tilt and tangential displacement, the "additional work" of the paper's last paragraph.
 //!
-//! Every column is a spring along the normal that also bends sideways with the surface it stands on, so normal
+//! Every column is a spring along the normal that also bends sideways with the surface at its foot, so normal
 //! approach `d`, tangential shift `s` and tilt `t` of the object share one elastic energy (after Inoue and Hirai's
 //! parallel distributed model):
 //!
@@ -45,7 +45,7 @@ pub struct Load {
 const TANGENT_BITS: u32 = 46;
 
 /// A displacement within its domain: lengths in Q24, the tangent in Q46.
-struct Pose {
+struct ClampedDisplacement {
     normal: i64,
     shift: i64,
     tangent: i64,
@@ -57,7 +57,7 @@ struct Pose {
 ///
 /// A value outside the ranges of [`Displacement`] counts as the nearest value inside.
 pub fn load(tip: &Tip, displacement: Displacement) -> Load {
-    let Pose { normal, shift, tangent, square } = pose(tip, displacement);
+    let ClampedDisplacement { normal, shift, tangent, square } = pose(tip, displacement);
     let lean = shift_product(normal * normal, tangent, TANGENT_BITS);
     let shear = shift_product(2 * normal * shift, tangent, TANGENT_BITS);
     // 2 d tan t / 3 + s in Q40.
@@ -73,7 +73,7 @@ pub fn load(tip: &Tip, displacement: Displacement) -> Load {
 ///
 /// A value outside the ranges of [`Displacement`] counts as the nearest value inside.
 pub fn energy(tip: &Tip, displacement: Displacement) -> NewtonMillimetres {
-    let Pose { normal, shift, tangent, square } = pose(tip, displacement);
+    let ClampedDisplacement { normal, shift, tangent, square } = pose(tip, displacement);
     // d tan t + s in Q40.
     let lean = shift_product(normal, tangent, TANGENT_BITS - 16) + (shift << 16);
     let sum = square / 3 + shift_product(lean, shift, 16);
@@ -88,7 +88,7 @@ pub fn free_shift(tip: &Tip, normal: Millimetres, tilt: Radians) -> Millimetres 
     Millimetres::from_bits(-shift_product(pose.normal, pose.tangent, TANGENT_BITS + 1) as i32)
 }
 
-fn pose(tip: &Tip, displacement: Displacement) -> Pose {
+fn pose(tip: &Tip, displacement: Displacement) -> ClampedDisplacement {
     let normal = i64::from(depth(tip, displacement.normal));
     let reach = tip.radius().to_bits() / 2;
     let shift = i64::from(displacement.shift.to_bits().max(-reach).min(reach));
@@ -98,7 +98,7 @@ fn pose(tip: &Tip, displacement: Displacement) -> Pose {
     let steepness = nearest_long_quotient(u128::from(sine) << TANGENT_BITS, cosine.max(1 << 62)) as i64;
     let tangent = if tilt < 0 { -steepness } else { steepness };
     let stretch = (1 << TANGENT_BITS) + shift_product(tangent, tangent, TANGENT_BITS);
-    Pose { normal, shift, tangent, square: shift_product(normal * normal, stretch, TANGENT_BITS) }
+    ClampedDisplacement { normal, shift, tangent, square: shift_product(normal * normal, stretch, TANGENT_BITS) }
 }
 
 /// `pi Y` times a signed Q48 number, with `drop` bits less after the point than a force has.

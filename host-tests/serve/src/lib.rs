@@ -1,8 +1,8 @@
 //! A simulated fingertip behind a port, for any client of the bus: paced to the clock, and idle between frames.
 //!
-//! [`Port`] is where clients come in: a pseudo-terminal or a TCP port. [`serve`] moves a [`Finger`] on with the clock,
-//! hands it what comes in, and sends what it answers. One thread does all: it sleeps until a byte comes in, an
-//! answer is due, or a [`TICK`] is over. [`Pace`] counts what is promised: real time, and answers in time.
+//! Clients connect to a [`Port`]: a pseudo-terminal or a TCP port. [`serve`] advances a [`Finger`] with the clock,
+//! passes received bytes to it, and sends its answers. One thread does all: it sleeps until a byte arrives, an answer
+//! is due, or a [`TICK`] is over. [`Pace`] measures real-time operation and answer times.
 
 #[cfg(feature = "native")]
 pub mod native;
@@ -16,36 +16,36 @@ use output::say;
 use port::Event;
 use std::time::{Duration, Instant};
 
-/// Interval at which an idle finger is moved on: what it has to catch up when a request comes.
+/// Interval at which an idle finger is advanced: the time that it must catch up at most when a request arrives.
 pub const TICK: Duration = Duration::from_millis(1);
 
 /// A simulated finger.
 pub trait Finger {
-    /// Why it cannot go on.
+    /// Reason of a failure.
     type Error;
 
-    /// Its own time, s.
+    /// Time of the finger, s.
     fn now_s(&self) -> f64;
 
-    /// Goes on to a time of its own, or as far beyond as its steps take it.
+    /// Advances the finger to a time, or beyond it to the end of a step.
     ///
     /// # Errors
-    /// It cannot.
+    /// The simulation failed.
     fn run_until(&mut self, time_s: f64) -> Result<(), Self::Error>;
 
-    /// Takes what the host sends.
+    /// Receives bytes of the host.
     ///
     /// # Errors
-    /// It cannot.
+    /// The simulation failed.
     fn hear(&mut self, bytes: &[u8]) -> Result<(), Self::Error>;
 
-    /// Returns the bytes that it sends by now.
+    /// Returns the bytes that the finger has sent by now.
     ///
     /// # Errors
-    /// It cannot.
+    /// The simulation failed.
     fn answer(&mut self) -> Result<Vec<u8>, Self::Error>;
 
-    /// When it has something to send, where that is known beforehand.
+    /// Time of the next answer, s, if it is known beforehand.
     fn due_s(&self) -> Option<f64> {
         None
     }
@@ -58,22 +58,22 @@ pub trait Finger {
     /// Executes a command from the standard input, and returns what was done.
     ///
     /// # Errors
-    /// It cannot be understood or done.
+    /// The command is unknown or cannot be executed.
     fn command(&mut self, text: &str) -> Result<String, String>;
 }
 
-/// Serves a finger until somebody stops it. `late` is after which time an answer counts as late, its own delay left
-/// out; `always` says how it keeps pace also where it does.
+/// Serves a finger until it is stopped. An answer counts as late after `late`, without its configured delay. With
+/// `always` the real-time ratio is reported also while it is 1.
 ///
 /// # Errors
-/// The finger cannot go on.
+/// The simulation failed.
 pub fn serve<F: Finger>(finger: &mut F, port: &mut Port, late: Duration, always: bool) -> Result<Served, F::Error> {
     let mut pace = Pace::new(finger.now_s(), late, always);
     let mut due = Instant::now() + TICK;
     loop {
         let now_s = pace.clock_s(finger.now_s());
         let wait = pace.until(finger.due_s()).map_or(due, |answer| answer.min(due));
-        // One that is behind goes on at once.
+        // A finger that is behind continues at once.
         let behind = now_s - finger.now_s() > TICK.as_secs_f64();
         let wait = if behind { Duration::ZERO } else { wait.saturating_duration_since(Instant::now()) };
         match port.wait(wait, finger.baud()) {
@@ -106,7 +106,7 @@ pub fn serve<F: Finger>(finger: &mut F, port: &mut Port, late: Duration, always:
     Ok(pace.end(finger.now_s()))
 }
 
-/// Goes on with the clock, a tick at most: in between somebody may ask.
+/// Advances with the clock by at most a tick, as a request may arrive in between.
 fn advance<F: Finger>(finger: &mut F, pace: &mut Pace) -> Result<(), F::Error> {
     let (now_s, clock_s) = (finger.now_s(), pace.clock_s(finger.now_s()));
     if clock_s > now_s { finger.run_until(clock_s.min(now_s + 2.0 * TICK.as_secs_f64())) } else { Ok(()) }

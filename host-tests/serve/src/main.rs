@@ -18,8 +18,8 @@ const DELAY: Duration = Duration::from_micros(500);
 
 /// Serves a simulated finger in real time: the native core and link, for any client of the bus.
 ///
-/// It begins as at power-on: torque off, not tared. Commands are read from the standard input, a line each: `remove`,
-/// `put`, `move MM`, `fault KIND`, `mend`, `state`, `help`.
+/// The finger begins as at power-on: torque off, not tared. Commands are read from the standard input, a line each:
+/// `remove`, `put`, `move MM`, `fault KIND`, `mend`, `state`, `help`.
 #[derive(Debug, Parser)]
 #[command(
     name = "serve",
@@ -39,10 +39,10 @@ struct Args {
     /// Takes a TCP port of this machine instead of a pseudo-terminal; 0 takes any that is free
     #[arg(long, value_name = "PORT")]
     tcp: Option<u16>,
-    /// In place of the scene's seed
+    /// Replaces the scene's seed
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// In place of what the scene says; may be given many times
+    /// Replaces a value of the scene; may be given many times
     #[arg(long, value_name = "TABLE.KEY=VALUE")]
     set: Vec<String>,
 }

@@ -16,7 +16,7 @@ impl<E: Set> Finger for Native<E> {
     }
 
     fn run_until(&mut self, time_s: f64) -> Result<(), Infallible> {
-        // Whole frames, the last of which ends by then.
+        // Whole frames that end by this time.
         while self.0.now_s() + self.0.frame_s() <= time_s {
             self.0.frame();
         }

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 /// A finger that is farther behind does not try to catch up.
 const BEHIND_MAX_S: f64 = 0.1;
-/// It is said to be behind where it does less of real time than this.
+/// Share of real time below which a finger is reported to be behind.
 const KEEPS_UP: f64 = 0.98;
 /// Interval of the checks, and of the reports while nothing changes.
 const LOOK: Duration = Duration::from_secs(1);
@@ -14,7 +14,7 @@ const LOOKS_BETWEEN: u32 = 5;
 /// Statistics of a served finger.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Served {
-    /// Its own time.
+    /// Time of the finger, s.
     pub virtual_s: f64,
     /// Real time.
     pub wall_s: f64,
@@ -35,14 +35,14 @@ pub struct Served {
 pub struct Pace {
     begun: Instant,
     begun_s: f64,
-    /// Given up where it was too far behind.
+    /// Time skipped because the finger was too far behind, s.
     lost_s: f64,
     late: Duration,
     always: bool,
     asked: Option<Instant>,
     all: Served,
     look: Look,
-    /// Looks until it is said again; 0 where it keeps up.
+    /// Number of checks until the next report; 0 while it keeps up.
     silent: u32,
 }
 
@@ -80,7 +80,7 @@ impl Pace {
         clock_s
     }
 
-    /// When the clock will show a time of the finger.
+    /// Instant at which the clock reaches a time of the finger.
     pub fn until(&self, time_s: Option<f64>) -> Option<Instant> {
         time_s.map(|time_s| self.begun + Duration::from_secs_f64((time_s - self.begun_s + self.lost_s).max(0.0)))
     }
@@ -94,7 +94,7 @@ impl Pace {
     /// An answer left.
     pub fn answered(&mut self, bytes: usize) {
         self.all.sent += bytes as u64;
-        // What comes in pieces counts by the first.
+        // An answer in pieces counts by its first piece.
         let Some(asked) = self.asked.take() else { return };
         self.all.answers += 1;
         let took = asked.elapsed();
@@ -139,7 +139,7 @@ impl Pace {
 }
 
 impl Served {
-    /// For people.
+    /// Text for people.
     pub fn text(&self) -> String {
         let Self { virtual_s, wall_s, received, sent, answers, late, longest_s } = self;
         format!(

@@ -35,13 +35,13 @@ pub enum Place {
 /// Input of a served finger.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Event {
-    /// From the client.
+    /// Bytes from the client.
     Bytes(Vec<u8>),
-    /// A line at the side.
+    /// Command from the standard input.
     Command(String),
-    /// Somebody wants it to end.
+    /// Request to end.
     Stop,
-    /// The time is over.
+    /// No input within the time.
     Nothing,
 }
 
@@ -50,7 +50,7 @@ pub enum Event {
 pub struct Stop(Arc<PipeWriter>);
 
 impl Stop {
-    /// It ends at once; where it has ended already, nothing happens.
+    /// Ends the server at once; does nothing after its end.
     pub fn stop(&self) {
         let _ = (&*self.0).write(&[0]);
     }
@@ -76,7 +76,7 @@ enum Opened {
 struct Side {
     begun: Vec<u8>,
     lines: VecDeque<String>,
-    /// Nothing more comes.
+    /// True after the end of the input.
     ended: bool,
 }
 
@@ -212,7 +212,7 @@ struct Pty {
     near: SerialPort,
     far: SerialPort,
     _link: Option<Link>,
-    /// The speed of what was not heard, once that was said.
+    /// Baud rate at which bytes were ignored, once that was reported.
     unheard: Option<u32>,
 }
 
@@ -257,7 +257,7 @@ impl Pty {
         let _ = rustix::io::write(&self.near, bytes);
     }
 
-    /// As the client has set it.
+    /// Baud rate that the client has set.
     fn baud(&self) -> Option<u32> {
         tcgetattr(&self.far).ok().map(|settings| settings.output_speed())
     }
@@ -305,7 +305,7 @@ struct Tcp {
     pub name: String,
     listener: TcpListener,
     client: Option<(TcpStream, SocketAddr)>,
-    /// Who was refused last, open until the next one comes.
+    /// Client that was refused last; kept open until the next one.
     refused: Option<TcpStream>,
 }
 
@@ -326,11 +326,11 @@ impl Tcp {
         [self.listener.as_fd()].into_iter().chain(self.client.iter().map(|(client, _)| client.as_fd()))
     }
 
-    /// Takes a client in, and what the one that is there sends.
+    /// Accepts a new client, and reads bytes of the present one.
     pub fn read(&mut self, new: bool, bytes: bool) -> Vec<u8> {
         let mut heard = if bytes { self.hear() } else { Vec::new() };
         if new && let Ok((client, from)) = self.listener.accept() {
-            // The one that is there may have gone since, behind what it sent last.
+            // The present client may have closed the connection after its last bytes.
             for _ in 0..LAST_READS {
                 let last = self.hear();
                 if last.is_empty() {
@@ -357,7 +357,7 @@ impl Tcp {
     }
 
     fn welcome(&mut self, mut client: TcpStream, from: SocketAddr) {
-        // Small packets, each of which somebody waits for.
+        // Small packets, for each of which a client waits.
         let ready = client.set_nodelay(true).and_then(|()| client.set_nonblocking(true));
         match &self.client {
             Some((_, first)) => {

@@ -77,7 +77,7 @@ fn another_speed_is_not_heard() {
     let served = Served::begin(Stdio::piped(), &[]);
     let port = terminal(&served, 57_600);
     port.write_all(&PING).expect("a terminal takes it");
-    // It learns later what it does not receive: then the answer is to the second alone.
+    // The first client notices the loss later: the answer goes only to the second.
     let mut served = served;
     let mut line = String::new();
     let mut complaints = BufReader::new(served.child.0.stderr.take().expect("it was asked for"));
@@ -139,7 +139,7 @@ fn who_has_gone_keeps_nobody_out() {
     let pid = rustix::process::Pid::from_raw(served.child.0.id() as i32).expect("a process number");
     let signal = |signal| rustix::process::kill_process(pid, signal).expect("it runs");
     for _ in 0..20 {
-        // It sleeps while one goes and the next comes, as on a busy machine.
+        // The server is paused while one client leaves and the next connects, as on a busy machine.
         let mut first = TcpStream::connect(&served.name).expect("it listens");
         served.ask("fault");
         signal(rustix::process::Signal::STOP);

@@ -1,4 +1,4 @@
-//! Prints `docs/budget.md`: what makes the force wrong.
+//! Prints `docs/budget.md`: the error budget of the force.
 
 use sim::native;
 use sim::population::budget::Budget;

@@ -33,7 +33,7 @@ fn named(scene: &Scene, effects: &[&'static Description]) -> Result<Scene, Box<d
     Ok(Scene { effects, ..scene.clone() })
 }
 
-/// The times of a scene's runs over those without effects, run by turns: the median of what they take more.
+/// Median of the additional run time of a scene relative to one without effects; the runs alternate.
 fn more(scene: &Scene, bare: &Scene, pairs: usize) -> Result<f64, Box<dyn Error>> {
     let mut more = Vec::new();
     for _ in 0..pairs {

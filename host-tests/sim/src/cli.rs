@@ -24,7 +24,7 @@ pub struct Args {
     /// The scene: a file, or a name out of the library
     #[arg(required_unless_present_any = ["list", "keys", "replay"])]
     pub scene: Option<String>,
-    /// What runs the controller: the same core on the host, or the flash image on the emulated microcontroller
+    /// Platform of the controller: the same core on the host, or the flash image on the emulated microcontroller
     #[arg(long, value_enum, default_value_t = Board::Native)]
     pub board: Board,
     /// Writes the results for scripts
@@ -39,16 +39,16 @@ pub struct Args {
     /// Records the scalars of each N-th control step; what the core needs for a replay is always whole
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..))]
     pub every: u64,
-    /// In place of the scene's seed
+    /// Replaces the scene's seed
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
-    /// In place of what the scene says; may be given many times
+    /// Replaces a value of the scene; may be given many times
     #[arg(long, value_name = "TABLE.KEY=VALUE")]
     pub set: Vec<String>,
-    /// Runs the scene once more without each effect, and shows what each changed
+    /// Also runs the scene without each effect, and shows the change by each
     #[arg(long)]
     pub ablate: bool,
-    /// Feeds a recording through the core again, which must give the same bits
+    /// Replays a recording through the core, which must give the same bits
     #[arg(long, value_name = "FILE", conflicts_with_all = ["scene", "ablate", "list", "explain", "keys"])]
     pub replay: Option<PathBuf>,
     /// Shows the library's scenes
@@ -82,7 +82,7 @@ impl Args {
     /// Returns the scene of the arguments, changed as requested and checked.
     ///
     /// # Errors
-    /// There is no such scene, or it has mistakes. The text is for people.
+    /// The scene does not exist or has mistakes. The text is for people.
     pub fn scene(&self) -> Result<Scene, String> {
         load(self.scene.as_deref().unwrap_or_default(), &self.set, self.seed)
     }

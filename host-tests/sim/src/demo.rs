@@ -23,7 +23,7 @@ const QUICK_S: [f64; 2] = [0.5, 0.25];
 
 /// Array at the end of a hold, with the contact that the controller sensed.
 #[derive(Clone, Copy, Debug)]
-pub struct Picture {
+pub struct HeldImage {
     /// Requested force.
     pub goal_n: f64,
     /// Sensed force.
@@ -57,7 +57,7 @@ pub struct Run {
     /// State of the world at each frame.
     pub trace: Vec<Sample>,
     /// Pressure maps.
-    pub pictures: Vec<Picture>,
+    pub pictures: Vec<HeldImage>,
     /// Frames that the controller missed, by its own count.
     pub missed_frames: u32,
 }
@@ -88,7 +88,7 @@ pub enum DemoError {
     /// The controller stopped with this fault.
     #[error("the controller stopped with fault {0}")]
     Fault(u8),
-    /// A picture could not be drawn.
+    /// A figure could not be drawn.
     #[error(transparent)]
     Plot(#[from] PlotError),
     /// A file could not be written.
@@ -134,7 +134,7 @@ pub struct Trace {
     run: Run,
     controllers: Vec<Controller>,
     /// Last tactile image under the last goal.
-    last: Option<Picture>,
+    last: Option<HeldImage>,
     fault: Option<Fault>,
 }
 
@@ -156,7 +156,7 @@ impl Trace {
     /// Keeps the tactile image of a hold that is over.
     fn keep(&mut self) {
         let last = self.last.take().filter(|last| last.goal_n >= DRAWN_N);
-        let known = |new: &Picture| self.run.pictures.iter().any(|picture| picture.goal_n == new.goal_n);
+        let known = |new: &HeldImage| self.run.pictures.iter().any(|picture| picture.goal_n == new.goal_n);
         if let Some(new) = last.filter(|new| !known(new)) {
             self.run.pictures.push(new);
         }
@@ -196,7 +196,7 @@ impl Watch for Trace {
             duty: truth.duty,
         });
         let contact = &status.contact;
-        self.last = Some(Picture {
+        self.last = Some(HeldImage {
             goal_n,
             force_n: newtons(contact.force),
             centre_mm: [contact.centre_x.0.to_num(), contact.centre_y.0.to_num()],

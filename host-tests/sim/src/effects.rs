@@ -202,25 +202,25 @@ pub(crate) fn waiting_s(rng: &mut Rng, rate_per_s: f64) -> f64 {
 
 /// Effects of one finger by family.
 pub struct Parts<E: Set + ?Sized> {
-    /// On the array.
+    /// Effects on the array.
     pub sensor: E::Sensor,
-    /// On the contact.
+    /// Effects on the contact.
     pub contact: E::Contact,
-    /// On the drive.
+    /// Effects on the drive.
     pub drive: E::Drive,
-    /// On clock and bus.
+    /// Effects on clock and bus.
     pub link: E::Link,
 }
 
 /// Set of effects: [`Named`], or `()`, which has none compiled in.
 pub trait Set {
-    /// On the array.
+    /// Effects on the array.
     type Sensor: sensor::Stages;
-    /// On the contact.
+    /// Effects on the contact.
     type Contact: contact::Stages;
-    /// On the drive.
+    /// Effects on the drive.
     type Drive: drive::Stages;
-    /// On clock and bus.
+    /// Effects on clock and bus.
     type Link: link::Stages;
 
     /// Effects of one finger.

@@ -250,7 +250,7 @@ impl ArrayEvents {
     }
 }
 
-/// A request of the host beside a goal.
+/// A request of the host other than a goal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
     /// Enables or disables torque.

@@ -174,7 +174,7 @@ impl Host {
 /// Time from the request for a reading to its arrival: 14 and 23 bytes at 1 Mbaud, and the turn of the controller.
 const READ_S: f64 = 0.5e-3;
 /// Largest deviation of a settled force from the goal, as a share of the goal.
-const STANDS: f64 = 0.1;
+const SETTLED_SHARE: f64 = 0.1;
 /// Readings at a settled force that determine the centre at rest.
 const RESTS: u32 = 8;
 /// Load, as a share of the trusted friction, from which a drop counts as a slip. The centre of a contact with less load
@@ -262,9 +262,9 @@ impl Grip {
             return false;
         }
         let goal_n = self.grip_n(script_n);
-        let stands = (reading.force_n - self.goal_n(script_n)).abs() <= STANDS * goal_n;
+        let settled = (reading.force_n - self.goal_n(script_n)).abs() <= SETTLED_SHARE * goal_n;
         if self.rests < RESTS {
-            if stands {
+            if settled {
                 self.rests += 1;
                 let share = 1.0 / f64::from(self.rests);
                 for (rest, centre) in self.rest_mm.iter_mut().zip(reading.centre_mm) {
@@ -278,7 +278,7 @@ impl Grip {
         let [x, y] = [0, 1].map(|axis| reading.centre_mm[axis] - self.rest_mm[axis]);
         let shift_mm = (x * x + y * y).sqrt();
         let bears = self.n_per_mm * self.farthest_mm >= BEARS * self.friction * goal_n;
-        let dropped = stands && bears && shift_mm < self.farthest_mm - self.drop_mm;
+        let dropped = settled && bears && shift_mm < self.farthest_mm - self.drop_mm;
         self.farthest_mm = if dropped { shift_mm } else { self.farthest_mm.max(shift_mm) };
         let needed_n = self.n_per_mm * shift_mm / self.friction;
         let mut asked_n = goal_n;

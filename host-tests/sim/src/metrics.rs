@@ -187,7 +187,7 @@ pub fn page() -> String {
     page
 }
 
-/// Formats a value for people: at most six significant digits, and a word if there is none.
+/// Formats a value for people: at most six significant digits, or `none` for a missing value.
 pub fn shown(value: Option<f64>) -> String {
     let Some(value) = value else { return "none".into() };
     let whole_digits = if value == 0.0 { 1 } else { value.abs().log10().floor() as i32 + 1 };

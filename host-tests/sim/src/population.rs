@@ -44,7 +44,7 @@ pub struct Population {
     variables: Vec<(String, Draw)>,
     places: Vec<Place>,
     events: Option<Events>,
-    /// Counts beside the envelope.
+    /// Additional counts, not part of the envelope.
     pub counted: Vec<Counted>,
 }
 

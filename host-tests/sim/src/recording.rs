@@ -151,7 +151,7 @@ const FOOTER_BYTES: usize = HEAD + 20;
 /// Checks a file.
 ///
 /// # Errors
-/// It is cut off or changed. The text names the part.
+/// The file is cut off or changed. The text names the part.
 pub fn check(bytes: &[u8]) -> Result<(), RunError> {
     if !bytes.starts_with(MAGIC) {
         return Err("this is no MCAP file: it does not begin as one".into());

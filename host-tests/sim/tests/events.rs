@@ -11,7 +11,7 @@ use sim::run::{Outcome, run};
 use sim::scene::read;
 use sim::watch::{Step, Truth, Watch};
 
-/// What is kept of a step.
+/// Record of a step.
 struct Kept {
     time_s: f64,
     truth: Truth,
@@ -129,7 +129,7 @@ fn requests_reach_the_controller() {
     );
     assert_eq!((all.at(0.5).status.mode, all.at(0.99).status.mode), (Mode::Off, Mode::Force));
     assert_eq!(with("tare", "").at(0.422).status.tare, fingertip::pipeline::Taring::Refused, "the tip is pressed");
-    // A fault is cleared by the recovery that comes later.
+    // The later recovery clears the fault.
     let recover = event("recover", "").replace("0.4", "0.7");
     let (_, all) = run_with(&format!("{}{recover}", event("row_stuck", "row = 2, to_codes = 3000, for_s = 0.2")));
     let faulty = with("brown_out", "to_v = 2, for_s = 0.05");

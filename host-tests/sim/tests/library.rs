@@ -34,8 +34,8 @@ fn every_scene_of_the_library_holds_its_bounds() {
     assert!(broken.is_empty(), "{broken:#?}");
 }
 
-/// What breaks a scene's bounds: keys to set, one at a time. Between them they break each side of each bound: a side
-/// that nothing breaks says nothing.
+/// Scene and the keys that break its bounds, set one at a time. Together they break each side of each bound: a side
+/// that nothing can break tests nothing.
 type Breakers = (&'static str, &'static [&'static str]);
 
 /// A supply that is too low: the finger stops with a fault.
@@ -130,7 +130,7 @@ fn the_library_shows_every_effect() {
     assert!(missing.is_empty(), "everything.toml does not name {missing:?}");
 }
 
-/// What the array shows at the end of each hold of the compression test.
+/// Readings of the array at the end of each hold of the compression test.
 #[derive(Default)]
 struct Gauge {
     until_s: Vec<f64>,

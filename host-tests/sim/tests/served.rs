@@ -17,7 +17,7 @@ impl Host {
         Self(Bus::new(&sim::cli::load(scene, &[], None).expect("a scene")).expect("a world"))
     }
 
-    /// What comes back, as ID, error and data of each packet.
+    /// Sends an instruction; returns ID, error and data of each answer.
     fn ask(&mut self, id: u8, instruction: u8, params: &[u8]) -> Vec<(u8, u8, Vec<u8>)> {
         let mut bytes = Reply::new();
         let mut sender = Sender::new(&mut bytes, id, instruction);
@@ -97,7 +97,7 @@ fn it_touches_holds_and_loses_what_is_taken_away() {
     host.frames(3_000);
     assert!((host.0.truths()[0].0.force_n - 1.5).abs() < 0.02);
 
-    // The tip goes with what moves.
+    // The tip moves with the object.
     let before_mm = host.0.truths()[0].0.travel_mm;
     host.0.command(&format!("move {} 5", before_mm - 3.0)).expect("a command");
     host.frames(10_000);

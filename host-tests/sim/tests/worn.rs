@@ -85,7 +85,7 @@ fn leave_a_third(seeds: std::ops::Range<u64>) {
         let raw = error_mn(&scene(seed, OFF), &native::board);
         let [plain, crept] = [OFF, CREEP].map(|creep| calibrated_mn(&scene(seed, creep)));
         println!("seed {seed}: {raw:.0} mN, calibrated {plain:.0}, with the creep term too {crept:.0}");
-        // Hysteresis is most of what is left: it has the other sign once a step came to rest from above.
+        // The rest is mostly hysteresis, whose error changes sign after a step down.
         assert!((150.0..400.0).contains(&raw) && plain < 0.65 * raw && (20.0..90.0).contains(&crept), "seed {seed}");
     }
 }
@@ -138,8 +138,8 @@ fn leaves_a_few_percent(count: usize) {
     assert!(fingers.iter().all(|finger| finger.calibrated.refused.is_empty()));
 }
 
-/// Ordinary fingers as they come, and calibrated first: what a hold is off, as shares of 3 % and 20 mN, and of 8 % and
-/// 50 mN. More with `FINGERS=20 cargo test -p sim --profile host --test unlike ordinary -- --nocapture`.
+/// Ordinary fingers, uncalibrated and calibrated: error of a hold, relative to 3 % plus 20 mN, and to 8 % plus 50 mN.
+/// More with `FINGERS=20 cargo test -p sim --profile host --test unlike ordinary -- --nocapture`.
 #[test]
 #[ignore = "long: cargo xtask test --long"]
 fn long_ordinary_fingers_hold_closer_once_they_are_calibrated() {

@@ -67,14 +67,14 @@ fn places(header: &StringRecord) -> Result<[usize; 4], String> {
 
 /// Why a row has no answer.
 #[derive(Debug)]
-enum Refusal {
+enum CellError {
     /// A cell is no decimal number.
     Number { column: &'static str, text: String },
     /// A cell is outside the domain.
     Range { column: &'static str, text: String, range: String },
 }
 
-impl fmt::Display for Refusal {
+impl fmt::Display for CellError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Number { column, text } => write!(f, "{column} is {text:?}: a decimal number is needed"),
@@ -83,7 +83,7 @@ impl fmt::Display for Refusal {
     }
 }
 
-fn answer(cells: [&str; 4]) -> Result<[String; 6], Refusal> {
+fn answer(cells: [&str; 4]) -> Result<[String; 6], CellError> {
     let [a, y, d, r] = [0, 1, 2, 3].map(|place| Cell { column: INPUTS[place], text: cells[place] });
     let (radius, modulus) = (a.read()?, y.read()?);
     let (depth, distance) = (d.read()?, r.read()?);
@@ -117,8 +117,8 @@ struct Cell<'a> {
 
 impl Cell<'_> {
     /// The cell's exact value.
-    fn read(&self) -> Result<DBig, Refusal> {
-        let refusal = || Refusal::Number { column: self.column, text: self.text.to_owned() };
+    fn read(&self) -> Result<DBig, CellError> {
+        let refusal = || CellError::Number { column: self.column, text: self.text.to_owned() };
         // The parser also takes separators and other notations; a CSV cell has digits, a point, a sign, an exponent.
         if !self.text.chars().all(|c| c.is_ascii_digit() || matches!(c, '.' | '-' | '+' | 'e' | 'E')) {
             return Err(refusal());
@@ -129,15 +129,15 @@ impl Cell<'_> {
     }
 
     /// The nearest fixed-point value, where the exact one is inside the range.
-    fn within(&self, value: &DBig, (min, max): (i32, i32), fraction_bits: u32) -> Result<i32, Refusal> {
+    fn within(&self, value: &DBig, (min, max): (i32, i32), fraction_bits: u32) -> Result<i32, CellError> {
         let (least, most) = (min >> fraction_bits, max >> fraction_bits);
         let inside = *value >= DBig::from(least) && *value <= DBig::from(most);
         let bits = round(value, fraction_bits).filter(|_| inside);
         bits.ok_or_else(|| self.refuse(format!("{least} to {most}")))
     }
 
-    fn refuse(&self, range: String) -> Refusal {
-        Refusal::Range { column: self.column, text: self.text.to_owned(), range }
+    fn refuse(&self, range: String) -> CellError {
+        CellError::Range { column: self.column, text: self.text.to_owned(), range }
     }
 }
 

@@ -21,7 +21,7 @@ const SCANS: [(&str, i32, i32); 3] = [("fast", 500, 3), ("default", 2_400, 15), 
 
 /// Documented limit cycles of the observer, in units of the last place: 60 pm, 2 um/s, 4 mm/s^2.
 const TRAVEL_SWING: i64 = 1;
-/// At the calmest pace the travel swings by 0.7 nm at most.
+/// Limit cycle of the travel with the calmest gain set: at most 0.7 nm.
 const CALM_TRAVEL_SWING: i64 = 12;
 const SPEED_SWING: i64 = 131;
 const DISTURBANCE_SWING: i64 = 1_024;
@@ -32,7 +32,7 @@ pub fn all(whole: bool) -> Vec<Outcome> {
     let mut runs: Vec<Run> = Vec::new();
     for (scan, settle_ns, sample_cycles) in SCANS {
         let config = Config::shipped(&Params { settle_ns, sample_cycles, ..cool() }).expect("allowed");
-        // The default scan is the one to take every step of.
+        // Every single step is taken for the default scan only.
         let whole = whole && scan == "default";
         queue(&mut runs, observers(scan, &config), whole);
         queue(&mut runs, drives(scan, &config), whole);
@@ -45,8 +45,8 @@ pub fn all(whole: bool) -> Vec<Outcome> {
     cores::map(runs, |run| run())
 }
 
-/// A motor that stays cool, for what has the winding beside what is looked at: it is a machine of its own below. While
-/// it holds the current back, the loop's current and its own state repeat together after longer than can be waited for.
+/// Parameters of a motor that stays cool, for the machines that contain the winding model. The winding is examined
+/// alone, as it limits the current: current and winding state together repeat after too many steps to wait for.
 pub fn cool() -> Params {
     Params { winding_k_per_w: 0, housing_k_per_w: 0, ..images::CONFIRMED }
 }
@@ -72,14 +72,14 @@ fn observers(scan: &str, config: &Config) -> Vec<Machine<Observer>> {
         ("the encoder's ends in turns", [(i32::MIN, i32::MAX), (i32::MAX, i32::MIN)]),
         ("the ends of the acceleration's type in turns", [(0, i32::MAX), (1, i32::MIN)]),
     ];
-    let machine = |(input, pair): (&str, [(i32, i32); 2]), pace: usize| {
+    let machine = |(input, pair): (&str, [(i32, i32); 2]), gain_set: usize| {
         let config = config.clone();
         Machine {
-            name: format!("observer, {scan} scan, pace {pace}, {input}"),
+            name: format!("observer, {scan} scan, gain set {gain_set}, {input}"),
             start: Observer::new(),
             inputs: 2,
             step: Box::new(move |observer: &mut Observer| {
-                let gains = &config.gain_sets[pace];
+                let gains = &config.gain_sets[gain_set];
                 pair.iter()
                     .for_each(|(encoder, acceleration)| observer.update(*encoder, *acceleration, gains, &config));
             }),
@@ -87,14 +87,14 @@ fn observers(scan: &str, config: &Config) -> Vec<Machine<Observer>> {
                 (
                     "travel",
                     |observer| observer.travel.to_bits().into(),
-                    if pace == 0 { TRAVEL_SWING } else { CALM_TRAVEL_SWING },
+                    if gain_set == 0 { TRAVEL_SWING } else { CALM_TRAVEL_SWING },
                 ),
                 ("speed", |observer| observer.speed.to_bits().into(), SPEED_SWING),
                 ("disturbance", |observer| observer.disturbance.to_bits().into(), DISTURBANCE_SWING),
             ],
         }
     };
-    inputs.into_iter().flat_map(|input| [0, GAIN_SETS - 1].map(|pace| machine(input, pace))).collect()
+    inputs.into_iter().flat_map(|input| [0, GAIN_SETS - 1].map(|gain_set| machine(input, gain_set))).collect()
 }
 
 /// The wanted acceleration, held or in turns.
@@ -119,14 +119,14 @@ fn drives(scan: &str, config: &Config) -> Vec<Machine<Drive>> {
     inputs.map(machine).into()
 }
 
-/// Observer and drive joined by the law, behind a motor that does not move, with the way still to go held or in turns.
+/// Observer and drive joined by the control law, with a blocked motor and a constant or alternating position error.
 fn loops(scan: &str, config: &Config) -> Vec<Machine<SpeedLoop>> {
     let inputs =
         [("none", [0; 2]), ("1 um", [1 << 14; 2]), ("far", [i32::MAX; 2]), ("far in turns", [i32::MAX, i32::MIN])];
     let machine = |(input, pair): (&str, [i32; 2])| {
         let config = config.clone();
         Machine {
-            name: format!("speed loop, {scan} scan, blocked motor, way {input}"),
+            name: format!("speed loop, {scan} scan, blocked motor, error {input}"),
             start: SpeedLoop::new(),
             inputs: 2,
             step: Box::new(move |motion: &mut SpeedLoop| {
@@ -202,7 +202,7 @@ fn tare(array: &mut Array, frame: &Frame, config: &Config) {
     }
 }
 
-/// Tare upon tare, of one frame or of two in turns.
+/// Repeated tares of one frame, or of two alternating frames.
 fn tares() -> Vec<Machine<Array>> {
     let inputs = [("one frame", [40, 40]), ("the extremes in turns", [12, config().saturated_codes - 372 - 1])];
     let machine = |(input, pair): (&str, [u16; 2])| {

@@ -9,19 +9,20 @@ use fingertip::model::{MODULUS_MAX, MODULUS_MIN, RADIUS_MAX, RADIUS_MIN, Tip};
 use fingertip::units::{Kilopascals, Millimetres, Newtons};
 use std::ops::Range;
 
-/// Every random point follows from this and its place.
+/// Seed of the random points; each point is computed from the seed and its index.
 pub const SEED: u64 = 0x2003_0914;
 
 const CHUNK: u64 = 1_000;
 
-/// Points for each one that the reference's arc tangent checks: it takes ten times as long as all the rest together.
+/// Ratio of all points to those whose angle is also checked: the reference's arc tangent takes ten times as long as
+/// the rest together.
 const ANGLE_EVERY: u64 = 10;
 
 /// Force, indentation, contact radius, stiffness, pressure and touching angle.
 pub struct Tallies(pub [Tally; 6]);
 
 impl Tallies {
-    /// Nothing judged yet.
+    /// Tallies without results.
     pub const fn new() -> Self {
         Self([
             Tally::new("F(d)", 0.5),
@@ -177,13 +178,13 @@ pub fn in_reach(tip: &Tip, force: i32) -> bool {
     force < tip.force_max().to_bits() || super::exact::force_in_reach(tip, force)
 }
 
-/// A random point of the domain.
+/// Random point of the domain.
 pub struct Point {
     /// Radius and modulus, uniform.
     pub tip: Tip,
     /// Depth: half of the points uniform, half uniform in its logarithm.
     pub d: i32,
-    /// Force, likewise.
+    /// Force: half of the points uniform, half uniform in its logarithm.
     pub force: i32,
     /// Distance: inside the contact, near its rim (down to one unit) or outside.
     pub r: i32,

@@ -17,7 +17,7 @@ pub struct Judged {
 }
 
 impl Judged {
-    /// From an error known well beyond the unit's size.
+    /// Judges an error that is known much more exactly than the unit of the last place.
     pub fn by_error(error_ulp: f64, bound_ulp: f64) -> Self {
         Self { error_ulp, nearest: None, within: error_ulp.abs() <= bound_ulp }
     }
@@ -43,7 +43,7 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Nothing judged yet.
+    /// Tally without results.
     pub const fn new(name: &'static str, bound_ulp: f64) -> Self {
         Self { name, bound_ulp, inputs: 0, nearest: 0, outside: 0, worst_ulp: 0.0, worst_at: [0; 4] }
     }

@@ -8,7 +8,7 @@ use crate::fit_statistics::{FRAMES, GOOD, Series};
 use crate::stimulus;
 use bringup::script::{Bench, RECORDS};
 use fastrand::Rng;
-use fingertip::shipped::{COLUMNS, Frame, Picture, Pipeline, ROWS};
+use fingertip::shipped::{COLUMNS, Frame, Pipeline, ROWS, TactileImage};
 use images::record::Record;
 use sim::plant::{Plant, Setup};
 
@@ -44,7 +44,7 @@ pub struct Seen {
     /// The truth.
     pub scene: Scene,
     /// Tactile image.
-    pub pictures: Vec<Picture>,
+    pub pictures: Vec<TactileImage>,
 }
 
 /// The series of `docs/contact.md` that are studied: none and 1 % of each reading.
@@ -65,7 +65,7 @@ fn seen(series: &Series) -> Vec<Seen> {
     seen
 }
 
-/// For each pitch its cases, of each so many pictures.
+/// Bytes for the image: the cases by pitch, with the first `pictures` tactile images of each.
 fn seen_to_bytes<'a>(seen: impl Iterator<Item = &'a Seen>, pictures: usize) -> Vec<u8> {
     let seen: Vec<_> = seen.collect();
     let mut words = vec![seen.len() as i32, pictures as i32];

@@ -92,7 +92,7 @@ impl Hand {
     /// Presses with this force on a surface that it found at 5 mm; the contact and the travel.
     fn pressing_with(force_mn: i32, config: &Config) -> (Self, Contact, Millimetres) {
         let mut hand = Self::free(config);
-        // The least contact comes first: a touch has a place once its force rose.
+        // The weakest contact comes first: the place of a touch is known only after its force has risen.
         let least = Contact { force: config.contact_on, ..contact(40, config) };
         hand.frame(force_mn, &least, at(plus(mm(5.0), least.indentation)), config);
         assert!(hand.touch.held() && !hand.touch.placed());
@@ -194,9 +194,9 @@ fn stops_mm(from_mm: f64, speed: MillimetresPerSecond, config: &Config) -> f64 {
     d_mm
 }
 
-/// Forward, beyond the speed of an approach: the speed from which a shorted motor alone would coast 1.25 times the
-/// indentation that is left below 1.3 times the goal and 0.4 N, and not less where nothing else limits it. The contact
-/// brakes the rest.
+/// Speed limit forward above the approach speed: a shorted motor alone would coast from it by 1.25 times the
+/// indentation left until 1.3 times the goal plus 0.4 N. The contact brakes the rest. The limit is not lower unless
+/// another one acts.
 #[test]
 fn a_shorted_motor_stops_within_three_tenths_and_four_tenths_of_a_newton() {
     let config = config();
@@ -290,7 +290,7 @@ fn more_than_an_eighth_of_uncertainty_is_slow_forward() {
     }
 }
 
-/// Speed limit on the way back from a force that the array hardly shows, and behind the surface: 1.25 times the approach.
+/// Speed limit of a retreat from a force that the array hardly shows, and behind the surface: 1.25 times the approach.
 fn slow_back(config: &Config) -> MillimetresPerSecond {
     MillimetresPerSecond(config.approach.0 * 5 / 4)
 }
@@ -318,7 +318,7 @@ fn half_of_the_uncertainty_and_a_place_behind_the_surface_are_slow_back() {
     }
 }
 
-/// Twice its indentation and 0.3 mm forward, five times on the way back.
+/// Depth limit at full speed: 2 times the indentation and 0.3 mm forward, 5 times and 0.3 mm in a retreat.
 #[test]
 fn a_tip_farther_in_than_the_array_confirms_is_slow() {
     let config = config();
@@ -375,7 +375,7 @@ fn a_goal_is_held_between_the_least_contact_and_the_largest_force() {
         let (expected, flags) = asks(held);
         assert_eq!(asks(goal), (expected, flags | Limits::GOAL));
     }
-    // The converter may see less than what is allowed.
+    // The converter may saturate below the allowed force.
     let blind = Config { force_seen: newtons(1_500), ..config.clone() };
     let (seen, flags) = { hand }.frame(1_500, &held, at(travel), &blind);
     let more = { hand }.frame(1_501, &held, at(travel), &blind);

@@ -1,7 +1,7 @@
-//! The parts of the force loop, each by itself: pace, drive, observer, profile, law, and what each mode asks of them.
+//! Unit tests of the force loop: gain schedule, drive, observer, profile, control law, and the references of each mode.
 
+mod gain_schedule;
 mod grip;
-mod pace;
 
 use fingertip::config::Config;
 use fingertip::control::Drive;
@@ -30,7 +30,7 @@ const MOST: i32 = 1 << 30;
 /// The supply that makes it.
 const SUPPLY_MV: u16 = 6_000;
 
-/// A drive that no limit holds but what the largest voltage is.
+/// Configuration in which only the largest voltage limits the drive.
 fn free() -> Config {
     let config = Config { slew_limit: i32::MAX, current_limit: i32::MAX, voltage_limit: MOST, ..config() };
     assert_eq!(config.params.voltage_max_mv, i32::from(SUPPLY_MV));
@@ -70,7 +70,7 @@ fn the_slew_limit_is_a_step_from_the_last_voltage() {
     }
 }
 
-/// The current is what the voltage has over the back-EMF.
+/// The current is proportional to the voltage minus the back-EMF.
 #[test]
 fn the_current_limit_lies_around_the_back_emf() {
     let config = Config { current_limit: 1 << 20, ..free() };
@@ -149,7 +149,7 @@ fn the_duty_is_the_voltages_share_of_the_supply() {
     }
 }
 
-/// The bridge then holds no voltage, but the motor still turns: what the back-EMF does stays.
+/// After a cut the bridge applies no voltage, but the motor still turns: the back-EMF remains.
 #[test]
 fn a_cut_takes_the_voltage_and_leaves_the_back_emf() {
     let config = free();
@@ -192,7 +192,7 @@ fn the_profile_is_the_line_near_the_goal_and_the_root_beyond() {
             (f64::from(gains.slope_per_s) * way, -f64::from(gains.slope_per_s) * now)
         } else {
             let root = (2.0 * brake * way.abs()).sqrt();
-            // Never more than what braking makes, and a quarter.
+            // At most 1.25 times the deceleration of the brake.
             ((root - brake / (2.0 * slope)).copysign(way), -(brake * (now / root).clamp(-1.25, 1.25)))
         };
         let name = format!("{way} mm, {now} mm/s, {brake} mm/s^2, k {slope}");
@@ -208,7 +208,7 @@ fn the_profile_is_the_line_near_the_goal_and_the_root_beyond() {
     assert!((5_000..15_000).contains(&near), "{near} near the goal");
 }
 
-/// However fast it goes, the curve asks for a quarter more than the brake at most.
+/// At any speed the curve requests at most 1.25 times the deceleration of the brake.
 #[test]
 fn no_speed_asks_for_more_than_a_quarter_beyond_the_brake() {
     let config = config();
@@ -258,8 +258,8 @@ fn the_law_is_the_documented_one() {
     }
 }
 
-/// A force that pushes back helps to stop where it presses, and drives where it lets go: 85 % of it is counted on,
-/// between a quarter and twice of what the motor can.
+/// The contact force brakes a motion into the object and drives a release. The brake includes 85 % of it, within a
+/// quarter and twice the motor's own deceleration.
 #[test]
 fn the_brake_counts_on_the_force_where_it_helps() {
     let config = config();
@@ -281,10 +281,10 @@ fn the_brake_counts_on_the_force_where_it_helps() {
     }
 }
 
-/// While the loop is quick every way counts; once it is calm, one within the slack is none, and of a longer one what is
-/// beyond it.
+/// The fastest gain set corrects every position error. The calmest one ignores an error within the slack; of a larger
+/// error it corrects the part beyond the slack.
 #[test]
-fn a_calm_loop_leaves_a_way_within_the_slack() {
+fn a_calm_loop_ignores_an_error_within_the_slack() {
     let config = config();
     let slack = mm(0.004);
     let speed_over = |motion: SpeedLoop, way: f64, slack: Millimetres| {
@@ -309,7 +309,7 @@ fn a_calm_loop_leaves_a_way_within_the_slack() {
 
 // The observer against its equations in f64.
 
-/// The equations of the observer's documentation.
+/// Observer by the equations of its documentation.
 struct Ideal {
     beta: f64,
     frame_s: f64,
@@ -319,10 +319,10 @@ struct Ideal {
 }
 
 impl Ideal {
-    /// For a pace: its poles are 2.5 times as quick as the speed loop.
-    fn new(pace: usize, config: &Config) -> Self {
+    /// Observer for a gain set: its poles are 2.5 times as fast as the speed loop.
+    fn new(gain_set: usize, config: &Config) -> Self {
         let frame_s = f64::from(config.frame_s_q37) / 2_f64.powi(37);
-        let speed_gain = f64::from(config.gain_sets[pace].speed_q18_per_s) / 2_f64.powi(18);
+        let speed_gain = f64::from(config.gain_sets[gain_set].speed_q18_per_s) / 2_f64.powi(18);
         let half = 0.5 * 2.5 * speed_gain * frame_s;
         Self { beta: (1.0 - half) / (1.0 + half), frame_s, travel: 0.0, speed: 0.0, disturbance: 0.0 }
     }
@@ -341,12 +341,12 @@ impl Ideal {
 }
 
 #[test]
-fn it_follows_its_equations_at_each_pace() {
+fn it_follows_its_equations_with_each_gain_set() {
     let config = config();
     let count_mm = config.mm_per_count_q40 as f64 / 2_f64.powi(40);
     let mut rng = fastrand::Rng::with_seed(5);
-    for pace in 0..config.gain_sets.len() {
-        let (mut observer, mut reference) = (Observer::new(), Ideal::new(pace, &config));
+    for gain_set in 0..config.gain_sets.len() {
+        let (mut observer, mut reference) = (Observer::new(), Ideal::new(gain_set, &config));
         let (mut counts, mut fastest, mut hardest) = (0, 0.0_f64, 0.0_f64);
         for frame in 0..2_000 {
             if frame % 50 == 0 {
@@ -354,7 +354,7 @@ fn it_follows_its_equations_at_each_pace() {
             }
             counts += rng.i32(-2..=2);
             let driven = rng.i32(-100_000..=100_000);
-            observer.update(counts, driven * 256, &config.gain_sets[pace], &config);
+            observer.update(counts, driven * 256, &config.gain_sets[gain_set], &config);
             reference.update(f64::from(counts) * count_mm, driven.into());
             let is = [
                 observer.travel.0.to_num::<f64>() - reference.travel,
@@ -362,9 +362,9 @@ fn it_follows_its_equations_at_each_pace() {
                 observer.disturbance.0.to_num::<f64>() - reference.disturbance,
             ];
             (fastest, hardest) = (fastest.max(reference.speed.abs()), hardest.max(reference.disturbance.abs()));
-            assert!(is[0].abs() < 1e-5, "travel is {} mm off in frame {frame} of pace {pace}", is[0]);
-            assert!(is[1].abs() < 1e-2, "speed is {} mm/s off in frame {frame} of pace {pace}", is[1]);
-            assert!(is[2].abs() < 20.0, "disturbance is {} mm/s^2 off in frame {frame} of pace {pace}", is[2]);
+            assert!(is[0].abs() < 1e-5, "travel is {} mm off in frame {frame} of gain set {gain_set}", is[0]);
+            assert!(is[1].abs() < 1e-2, "speed is {} mm/s off in frame {frame} of gain set {gain_set}", is[1]);
+            assert!(is[2].abs() < 20.0, "disturbance is {} mm/s^2 off in frame {frame} of gain set {gain_set}", is[2]);
         }
         assert!(fastest > 5.0 && hardest > 500.0, "{fastest} mm/s and {hardest} mm/s^2 prove little");
     }
@@ -375,7 +375,7 @@ fn what_no_motion_makes_is_a_jump_to_rest_at_the_new_place() {
     for counts in [500, -500, 100_000, i32::MIN] {
         let config = config();
         let way = config.travel(counts);
-        // At rest it expects to stay: the error is the whole way.
+        // At rest the observer expects no motion: the error is the whole jump.
         let error = way.to_bits().unsigned_abs();
         for (jump, jumps) in [(error, false), (error - 1, true)] {
             let config = Config { jump, ..config.clone() };

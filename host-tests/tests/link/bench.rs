@@ -5,7 +5,7 @@ use fingertip::command::Command;
 use fingertip::link::packet::{Event, Packet, Receiver, Sender, StatusError};
 use fingertip::link::{Captured, Crash, CrashCause, Health, Reply, ResetCause};
 use fingertip::params::Params;
-use fingertip::pipeline::{Status, Taken, Taring};
+use fingertip::pipeline::{AcknowledgedRequests, Status, Taring};
 use fingertip::pressure::TARE_BITS;
 use fingertip::shipped::{CLOCKS, COLUMNS, Frame, ROWS, Record, SLOTS, Server, Snapshot};
 use fingertip::state::{Fault, Mode};
@@ -70,7 +70,7 @@ impl Bench {
         self.status.mode = if fault.is_some() { Mode::Fault } else { Mode::Off };
     }
 
-    /// The made-up loop takes up what it is asked, and carries out a tare and a clear at once.
+    /// Accepts the requests like a loop that executes a tare and a clear at once.
     pub fn take_up(&mut self) {
         let Command { tare_request: tare, clear_request: clear, measure_request: measure, torque, .. } =
             self.server.command();
@@ -80,7 +80,7 @@ impl Bench {
         if tare != self.status.taken.tare {
             self.status.tare = if self.status.fault.is_some() { Taring::Refused } else { Taring::Done };
         }
-        self.status.taken = Taken { tare, clear, measure };
+        self.status.taken = AcknowledgedRequests { tare, clear, measure };
     }
 
     /// Returns the packets that the bus sends in return.
@@ -181,10 +181,10 @@ pub fn hex(text: &str) -> Vec<u8> {
     text.split_whitespace().map(|byte| u8::from_str_radix(byte, 16).expect("hexadecimal")).collect()
 }
 
-/// ID, instruction and parameters.
+/// ID, instruction and parameters of a packet.
 pub type Content = (u8, u8, Vec<u8>);
 
-/// All that a receiver makes of some bytes.
+/// Packets and events that a receiver finds in some bytes.
 pub fn receive(receiver: &mut Receiver, bytes: &[u8]) -> (Vec<Content>, Vec<Event>) {
     let (mut packets, mut events) = (Vec::new(), Vec::new());
     for &byte in bytes {

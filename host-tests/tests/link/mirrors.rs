@@ -54,7 +54,7 @@ fn a_mirror_is_written_by_the_rules_of_what_it_mirrors() {
     assert_eq!(bench.number(address::MIRROR_GOAL_MN, 4), 100);
 }
 
-/// All that a driver needs whose addresses have 8 bits: one read, and what it writes.
+/// A driver with 8-bit addresses reaches all registers it needs: one block to read, and those it writes.
 #[test]
 fn the_finger_is_driven_with_addresses_below_256() {
     for (name, of) in [
@@ -166,7 +166,7 @@ fn every_readable_byte_can_be_led_to() {
     bench.status.mode = Mode::Force;
     bench.status.contact.force = fingertip::config::newtons(1_234);
     let indirect = |name: &str| name.starts_with("INDIRECT");
-    // Not what the reads and writes themselves change.
+    // Except registers that the reads and writes themselves change.
     let counts = [address::GOOD_PACKETS, address::SAVED_STATE];
     let mut led_to = 0;
     for register in REGISTERS.iter().filter(|register| register.address >= 64 && !indirect(register.name)) {

@@ -1,7 +1,7 @@
 //! Recovery in one write, goals that end with torque, values before a tare, faults, watchdog and requests.
 
 use crate::bench::{Bench, ID, packet};
-use fingertip::capture::State;
+use fingertip::capture::CaptureState;
 use fingertip::command::Command;
 use fingertip::link::packet::{BROADCAST, StatusError, instruction};
 use fingertip::measure::{Ended, MeasureStatus, Task};
@@ -61,8 +61,8 @@ fn recover_leaves_what_the_single_writes_leave() {
     }
 }
 
-/// As `dynamixel_hardware_interface` does with `Recover` as a command interface: goal and recover go out in each cycle by
-/// indirect addresses, unanswered. What it writes with an answer it takes for refused, as that has the alert.
+/// Sequence of `dynamixel_hardware_interface` with `Recover` as a command interface: it writes goal and recover in each
+/// cycle by indirect addresses, without an answer. It takes answered writes for refused, as the answers have the alert.
 #[test]
 fn a_driver_that_sends_goal_and_recover_in_each_cycle_recovers() {
     let mut bench = Bench::new();
@@ -182,7 +182,7 @@ fn torque_off_takes_the_goal_back() {
     assert_eq!(bench.write(address::TORQUE_ENABLE, &[1]), Ok(()));
     assert_eq!(bench.write(address::TORQUE_ENABLE, &[0, 0]), Err(7));
     assert_eq!(bench.number(address::GOAL_FORCE_MN, 4), 700);
-    // A goal that comes while torque is off is a new one.
+    // A goal written while torque is off is a new one.
     bench.write(address::TORQUE_ENABLE, &[0]).expect("off");
     goal(&mut bench, 300).expect("a goal");
     bench.write(address::TORQUE_ENABLE, &[1]).expect("on");
@@ -324,8 +324,8 @@ fn the_watchdog_hears_only_good_instructions_for_this_device() {
     }
 }
 
-// Requests on the bus: what cannot be done is answered with error 1, what is accepted is passed on, and how it went
-// can be read.
+// Requests on the bus: one that cannot be executed is answered with error 1, an accepted one is passed on, and its
+// result can be read.
 
 const RESULT: Result<(), u8> = Err(1);
 
@@ -357,7 +357,7 @@ fn a_tare_with_or_after_the_clearing_of_a_fault_is_taken() {
     let Command { tare_request, clear_request, torque, .. } = bench.server.command();
     assert_eq!((tare_request, clear_request, torque), (1, 1, false));
 
-    // One after the other, before the loop has looked.
+    // One request after the other, before the loop has seen them.
     let mut bench = faulted();
     assert_eq!(bench.write(address::CLEAR_FAULT, &[1]), Ok(()));
     assert_eq!(bench.write(address::TARE, &[1]), Ok(()));
@@ -369,7 +369,7 @@ fn a_tare_with_or_after_the_clearing_of_a_fault_is_taken() {
     assert_eq!(bench.write(address::TARE, &[1]), RESULT);
 }
 
-/// Every force would read less by what pressed during the tare. The host may insist.
+/// All forces would read too low by the force during the tare. The host may force torque nevertheless.
 #[test]
 fn torque_is_refused_after_a_tare_while_something_touched() {
     let mut bench = Bench::new();
@@ -444,7 +444,7 @@ fn a_motion_is_refused_where_it_cannot_begin() {
     bench.set_fault(Some(Fault::Bridge));
     assert_eq!(all(&mut bench), [false; 3], "a fault");
     let mut bench = Bench::new();
-    bench.capture.state = State::Recording;
+    bench.capture.state = CaptureState::Recording;
     assert_eq!(all(&mut bench), [true, false, false], "the capture's memory is in use");
     // Stopping is never refused.
     for bench in [&mut Bench::new(), &mut faulted(), &mut bench] {
@@ -496,7 +496,7 @@ fn a_save_is_refused_while_the_loop_drives_or_tares() {
     assert_eq!(bench.write(address::SAVE_PARAMETERS, &[1]), Ok(()), "the motor is off in a fault");
 }
 
-/// A write to several has no answer, so how it went is read: what was refused is counted, what was taken has its state.
+/// A Sync Write has no answer, so its result is read: refusals are counted, accepted requests have a state.
 #[test]
 fn how_an_unanswered_request_went_can_be_read() {
     let mut bench = Bench::new();
@@ -509,7 +509,7 @@ fn how_an_unanswered_request_went_can_be_read() {
     assert_eq!(bench.number(address::TARE_STATE, 1), 1, "before the loop has looked");
     bench.take_up();
     assert_eq!(bench.number(address::TARE_STATE, 1), 2);
-    // A fault comes between: the link let it through, the loop refuses it.
+    // A fault occurs in between: the link has accepted the request, the loop refuses it.
     sync_write(&mut bench);
     bench.set_fault(Some(Fault::Bridge));
     bench.take_up();

@@ -162,14 +162,14 @@ fn a_shared_packet_is_no_framing_error() {
     ];
     for request in requests.iter().chain(&requests) {
         assert!(!talk(&mut devices, request).is_empty());
-        // The host waits its time before it goes on.
+        // The host waits for its time-out before it continues.
         devices.iter_mut().for_each(|device| device.tick_ms += 10);
         assert_eq!(talk(&mut devices, &packet(3, 0x01, &[])).len(), 1);
     }
     for device in &devices {
         assert_eq!(device.server.counters().framing, 0);
     }
-    // A packet that others leave unfinished is one, and noise too; what comes next is heard all the same.
+    // After an unfinished packet of another device, and after noise, the next packet is still received.
     talk(&mut devices, &sync(&[1, 9]));
     talk(&mut devices, &[1; 40]);
     assert_eq!(talk(&mut devices, &packet(3, 0x01, &[])).len(), 1);

@@ -217,7 +217,7 @@ fn the_model_files_are_fresh() {
     }
 }
 
-/// What the description asks a driver for is in the model file, and fits the indirect addresses.
+/// All items that the description requests are in the model file, and they fit the indirect addresses.
 #[test]
 fn the_description_for_ros2_control_asks_for_what_there_is() {
     let path = concat!(env!("FINGERTIP_ROOT"), "/examples/dynamixel/fingertip.ros2_control.xacro");
@@ -226,7 +226,7 @@ fn the_description_for_ros2_control_asks_for_what_there_is() {
     let items = items();
     let bytes = |tag: &str| {
         let names = gpio.split(tag).skip(1).map(|rest| rest.split('"').next().unwrap_or_default());
-        // What is the driver's own.
+        // Keys of the driver itself.
         let names: Vec<&str> = names.filter(|name| !["type", "ID"].contains(name)).collect();
         assert!(!names.is_empty(), "no {tag}");
         let item = |name: &&str| items.iter().find(|item| item.name == **name);
@@ -307,7 +307,7 @@ fn no_register_takes_a_value_out_of_its_range() {
     assert!(tried > 400, "{tried} values tried");
 }
 
-/// All that two bytes can hold, not only the edges.
+/// Tests all values of two bytes, not only the edges.
 #[test]
 fn no_register_of_two_bytes_takes_any_value_out_of_its_range() {
     let mut tried = 0;
@@ -504,7 +504,7 @@ fn param(name: &str) -> u16 {
     REGISTERS.iter().find(|register| register.name == name).map(|register| register.address).expect("a parameter")
 }
 
-/// Whole or not at all, like everything that is written; what the loop is to do of it is told once.
+/// Gains are written completely or not at all, like all registers, and passed to the loop once.
 #[test]
 fn gains_are_written_with_torque_off_in_their_range_and_all_at_once() {
     let mut bench = Bench::new();
@@ -519,7 +519,7 @@ fn gains_are_written_with_torque_off_in_their_range_and_all_at_once() {
     // The same again is no change.
     bench.write(address::GAINS + 2, &gains(15_000)[2..40]).expect("a write");
     assert!(!bench.server.take_actions().calibrate);
-    // One of them out of range: none is taken.
+    // One of them is out of range: none is accepted.
     for wrong in [0, 8_191, 32_768, u16::MAX] {
         let mut bytes = gains(16_000);
         bytes[100..102].copy_from_slice(&u16::to_le_bytes(wrong));
@@ -532,7 +532,7 @@ fn gains_are_written_with_torque_off_in_their_range_and_all_at_once() {
     assert_eq!(bench.write(address::GAINS, &gains(16_000)), Err(StatusError::Access as u8));
     assert_eq!(bench.read(address::GAINS, 200), Ok(gains(15_000)));
     bench.write(address::TORQUE_ENABLE, &[0]).expect("a write");
-    // What waits for an Action, too, and what a Factory Reset leaves.
+    // The same for a write that waits for an Action, and after a Factory Reset.
     assert_eq!(bench.ask(0x04, &[&address::GAINS.to_le_bytes()[..], &gains(14_000)].concat()).number(), 0);
     assert_eq!(bench.ask(0x05, &[]).number(), 0);
     assert_eq!(bench.read(address::GAINS, 200), Ok(gains(14_000)));

@@ -1,8 +1,8 @@
 //! Early ends of a motion: the motor rests, the motion and its record say so, and the next one works.
 
 use crate::{Finger, params};
-use fingertip::capture::{Ended as CaptureEnded, State as Kept};
-use fingertip::measure::{Ended, State, Task};
+use fingertip::capture::{CaptureState, Ended as CaptureEnded};
+use fingertip::measure::{Ended, MeasureState, Task};
 use fingertip::params::Params;
 use fingertip::pressure::Calibration;
 use fingertip::shipped::Config;
@@ -32,7 +32,7 @@ const ENDS: [(&str, Act); 6] = [
 fn frames(task: Task) -> u32 {
     let mut finger = Made::begun(task);
     let mut frames = 1;
-    while finger.frame().measure.state == State::Running {
+    while finger.frame().measure.state == MeasureState::Running {
         frames += 1;
     }
     finger.assert_ended(task, Ended::Complete);
@@ -58,10 +58,10 @@ fn end_and_go_on(parts: &[u32]) {
                 let at = 1 + (frames - 40) * part / 6 + number as u32;
                 let mut finger = Made::begun(task);
                 (0..at).for_each(|_| _ = finger.frame());
-                assert_eq!(finger.bench.status().measure.state, State::Running, "{name} at {at}");
+                assert_eq!(finger.bench.status().measure.state, MeasureState::Running, "{name} at {at}");
                 act(&mut finger);
                 let mut waited = 0;
-                while finger.bench.status().measure.state == State::Running {
+                while finger.bench.status().measure.state == MeasureState::Running {
                     finger.frame();
                     waited += 1;
                     assert!(waited < 5_000, "{name} at {at}: {:?}", finger.bench.status());
@@ -84,7 +84,7 @@ fn end_and_go_on(parts: &[u32]) {
                 (0..2_000).for_each(|_| _ = finger.frame());
                 finger.begin(Task::Strokes);
                 (0..2_000).for_each(|_| _ = finger.frame());
-                assert_eq!(finger.bench.status().measure.state, State::Running, "{name} at {at}");
+                assert_eq!(finger.bench.status().measure.state, MeasureState::Running, "{name} at {at}");
             }
         }
     }
@@ -117,7 +117,7 @@ fn a_motion_that_replaces_another_is_one_of_its_own() {
     assert_eq!((measure.task, measure.ended), (Task::Jog, Ended::NotReady));
 }
 
-/// The host ends the record in the middle: the motion goes on without one, the next motion has one again.
+/// The host ends the record in the middle: the motion continues without a record, the next motion has one again.
 #[test]
 fn a_record_ended_by_the_host_is_whole() {
     let mut finger = Made::begun(Task::Press);
@@ -128,11 +128,11 @@ fn a_record_ended_by_the_host_is_whole() {
     let bytes = finger.capture.data().to_vec();
     let record = finger.record();
     assert_eq!((record.ended, record.rows), (Ended::Interrupted as u8, 3));
-    assert_eq!(finger.ends().measure.state, State::Done);
+    assert_eq!(finger.ends().measure.state, MeasureState::Done);
     assert!(finger.capture.data() == bytes && finger.capture.standing().count == 1, "it changes no more");
     finger.bench.place(0.0);
     finger.begin(Task::Strokes);
-    assert_eq!(finger.capture.standing().state, Kept::Recording);
+    assert_eq!(finger.capture.standing().state, CaptureState::Recording);
     assert!(finger.capture.data().is_empty(), "nothing can be read of a record that is not closed");
     finger.ends();
     finger.assert_ended(Task::Strokes, Ended::Complete);
@@ -152,7 +152,7 @@ fn pressed(finger: &mut Made) {
 /// A state, how it is made, and how a jog, strokes and a press end in it.
 type Case = (&'static str, fn() -> Made, [Option<Ended>; 3]);
 
-/// Each state of a finger, and what becomes of a jog, of strokes and of a press in it; `None` begins.
+/// States of a finger, with the refusals of a jog, of strokes and of a press in each; `None` if the motion begins.
 #[test]
 fn every_state_has_its_answer() {
     const NO: Option<Ended> = Some(Ended::NotReady);
@@ -240,7 +240,8 @@ fn every_state_has_its_answer() {
             let status = finger.frame();
             let (measure, taken) = (status.measure, status.taken.measure);
             assert_eq!((measure.task, taken), (task, finger.bench.command().measure_request), "{name}");
-            let expected = answer.map_or((State::Running, Ended::Complete), |ended| (State::Ended, ended));
+            let expected =
+                answer.map_or((MeasureState::Running, Ended::Complete), |ended| (MeasureState::Ended, ended));
             assert_eq!((measure.state, measure.ended), expected, "{name}: {task:?}");
             assert_eq!(matches!(status.mode, Mode::Press | Mode::Strokes), answer.is_none(), "{name}: {task:?}");
         }
@@ -256,7 +257,7 @@ fn a_request_during_a_motion_is_answered_by_its_end() {
             for other in others {
                 finger.bench.request(*other);
                 let status = finger.frame();
-                assert_eq!((status.measure.task, status.measure.state), (task, State::Running));
+                assert_eq!((status.measure.task, status.measure.state), (task, MeasureState::Running));
                 assert_eq!(status.taken.measure, finger.bench.command().measure_request);
             }
             let bench: &mut Bench = &mut finger.bench;
@@ -264,6 +265,6 @@ fn a_request_during_a_motion_is_answered_by_its_end() {
             finger.ends().measure
         };
         assert_eq!(end(&[]), end(&[Task::Jog, Task::Strokes, Task::Press]));
-        assert_eq!(end(&[]).state, State::Done);
+        assert_eq!(end(&[]).state, MeasureState::Done);
     }
 }

@@ -1,18 +1,18 @@
-//! Motions that measure: what begins, what ends them, and what is left of them.
+//! Motions that measure: their begin, their end, and their record.
 
 mod interrupted;
 mod series;
 
 use crate::series::{Record, decode};
-use fingertip::capture::{Capture, Ended as CaptureEnded, State as Kept};
+use fingertip::capture::{Capture, CaptureState, Ended as CaptureEnded};
 use fingertip::config::newtons;
 use fingertip::contact::Contact;
 use fingertip::control::SpeedLoop;
-use fingertip::measure::press::{HOLDS_MS, PARTS, Press, ROWS_MAX, Step, View};
-use fingertip::measure::{Ended, MeasureStatus, State, Task};
+use fingertip::measure::press::{HOLDS_MS, PARTS, Press, PressInputs, ROWS_MAX, Step};
+use fingertip::measure::{Ended, MeasureState, MeasureStatus, Task};
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
-use fingertip::shipped::{COLUMNS, Config, Picture, ROWS, TARE_FRAMES};
+use fingertip::shipped::{COLUMNS, Config, ROWS, TARE_FRAMES, TactileImage};
 use fingertip::units::Celsius;
 use host_tests::finger::config;
 use images::record::Record as Given;
@@ -61,7 +61,7 @@ impl<const BYTES: usize> Finger<BYTES> {
         let status = self.frame();
         assert_eq!(
             (status.measure.task, status.measure.state),
-            (task, fingertip::measure::State::Running),
+            (task, fingertip::measure::MeasureState::Running),
             "{status:?}"
         );
     }
@@ -70,7 +70,7 @@ impl<const BYTES: usize> Finger<BYTES> {
         self.frame_with(|_| {})
     }
 
-    /// A frame as the board takes it, where somebody changes what the core is given.
+    /// Steps a frame like the board, with changed inputs to the core.
     fn frame_with(&mut self, change: impl FnOnce(&mut Given)) -> Status {
         let Self { bench, capture } = self;
         let due = capture.is_due(bench.status(), &bench.record().command);
@@ -91,7 +91,7 @@ impl<const BYTES: usize> Finger<BYTES> {
     fn ends(&mut self) -> Status {
         for _ in 0..400_000 {
             let status = self.frame();
-            if status.measure.state != fingertip::measure::State::Running {
+            if status.measure.state != fingertip::measure::MeasureState::Running {
                 return status;
             }
         }
@@ -100,7 +100,7 @@ impl<const BYTES: usize> Finger<BYTES> {
 
     /// The record, which must be closed.
     fn record(&self) -> Record {
-        assert_eq!(self.capture.standing().state, Kept::Done);
+        assert_eq!(self.capture.standing().state, CaptureState::Done);
         decode(self.capture.data())
     }
 
@@ -160,11 +160,11 @@ fn strokes_are_recorded_whole() {
     assert!(finger.capture.standing().bytes < 40 << 10, "{} bytes", finger.capture.standing().bytes);
 }
 
-/// The rows that fit are kept, and the record is closed as full; the motion goes on.
+/// Rows that fit are stored, then the record is closed as full; the motion continues.
 #[test]
 fn a_memory_that_is_full_keeps_what_it_has() {
     let mut finger = Finger::<{ 2 << 10 }>::begun(Task::Press);
-    assert_eq!(finger.ends().measure.state, State::Done);
+    assert_eq!(finger.ends().measure.state, MeasureState::Done);
     let (record, standing) = (finger.record(), finger.capture.standing());
     assert_eq!((record.ended, record.value, record.rows), (Ended::Full as u8, 5, 5));
     assert_eq!((standing.ended, standing.frames), (CaptureEnded::Full, 5));
@@ -184,10 +184,10 @@ fn a_capture_and_a_motion_share_the_memory() {
     finger.capture.arm();
     finger.bench.command().tare_request += 1;
     (0..330).for_each(|_| _ = finger.frame());
-    assert_eq!(finger.capture.standing().state, Kept::Recording);
+    assert_eq!(finger.capture.standing().state, CaptureState::Recording);
     finger.bench.request(Task::Strokes);
     (0..5).for_each(|_| _ = finger.frame());
-    assert_eq!(finger.bench.status().measure.state, State::Running);
+    assert_eq!(finger.bench.status().measure.state, MeasureState::Running);
     finger.capture.end(CaptureEnded::Asked);
     assert_eq!(finger.capture.data()[..3], *b"FTC");
     let frames = finger.capture.standing().frames;
@@ -198,7 +198,7 @@ fn a_capture_and_a_motion_share_the_memory() {
 
 // Whatever a press is shown, its record has a bound; whatever a finger is shown, motions neither panic nor overflow.
 
-/// Frames of 83 us to 10 ms, an encoder that moves, jumps or rests, and a force that comes and goes.
+/// Frames of 83 us to 10 ms, an encoder that moves, jumps or rests, and an intermittent force.
 #[test]
 fn a_press_has_no_more_rows_than_stated() {
     let mut most = 0;
@@ -207,7 +207,7 @@ fn a_press_has_no_more_rows_than_stated() {
         let mut config = config();
         config.timing.frame_ns = random.u32(83_000..10_000_000);
         let (mut motion, mut standing) = (SpeedLoop::new(), MeasureStatus::running(Task::Press));
-        let (mut step, mut picture) = (Step::<ROWS, COLUMNS>::NONE, Picture::EMPTY);
+        let (mut step, mut picture) = (Step::<ROWS, COLUMNS>::NONE, TactileImage::EMPTY);
         let mut contact = Contact::default();
         motion.observe(0, &config);
         let mut press = Press::begin(&motion, fingertip::measure::BuiltIn::PROOF.expect("it is built in"));
@@ -225,7 +225,7 @@ fn a_press_has_no_more_rows_than_stated() {
             encoder = encoder.wrapping_add(random.i32(-stride..=stride));
             motion.observe(encoder, &config);
             let chip = random.bool().then(|| Celsius::from_bits(random.i32(..)));
-            let view = View {
+            let view = PressInputs {
                 sequence,
                 picture: &picture,
                 contact: &contact,
@@ -239,12 +239,12 @@ fn a_press_has_no_more_rows_than_stated() {
         }
         most = most.max(rows);
         assert!(rows <= ROWS_MAX, "seed {seed}: {rows} rows");
-        assert_eq!(press.running(), standing.state == State::Running);
+        assert_eq!(press.running(), standing.state == MeasureState::Running);
     }
     assert!(most > ROWS_MAX / 2, "{most} rows at most: the inputs show nothing");
 }
 
-/// Codes, counts and supplies of any kind while a motion is under way.
+/// Arbitrary codes, counts and supplies during a motion.
 #[test]
 fn a_motion_takes_anything_and_closes_its_record() {
     for seed in 0..60 {
@@ -269,10 +269,10 @@ fn a_motion_takes_anything_and_closes_its_record() {
         }
         finger.bench.request(Task::Stop);
         finger.frame();
-        if finger.ends().measure.state != State::None && task != Task::Jog {
+        if finger.ends().measure.state != MeasureState::None && task != Task::Jog {
             let record = decode(finger.capture.data());
             assert!(task != Task::Press || record.steps.len() <= ROWS_MAX);
         }
-        assert_ne!(finger.capture.standing().state, Kept::Recording);
+        assert_ne!(finger.capture.standing().state, CaptureState::Recording);
     }
 }

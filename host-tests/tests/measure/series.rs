@@ -13,9 +13,9 @@ pub struct Read {
     pub back: bool,
     pub voltage_mv: i16,
     pub tenths_k: u16,
-    /// Codes above tare.
+    /// Mean of each taxel, codes above tare.
     pub means: Vec<f64>,
-    /// Codes, squared.
+    /// Variance of each taxel, codes squared.
     pub variances: Vec<f64>,
     pub bad: Vec<bool>,
 }
@@ -119,7 +119,7 @@ fn written<const ROWS: usize, const COLUMNS: usize>(rows: &[Row<'_, ROWS, COLUMN
     [&head.bytes(), &body[..length]].concat()
 }
 
-/// A step from the readings of its frames, in sixteenths of a code; what a press sums up.
+/// Sums of a press step over the readings of its frames, in sixteenths of a code.
 fn sums<const ROWS: usize, const COLUMNS: usize>(frames: &[[[i32; COLUMNS]; ROWS]]) -> Step<ROWS, COLUMNS> {
     let mut step = Step { first: frames[0], taken: frames.len() as u16, ..Step::NONE };
     for frame in frames {
@@ -196,7 +196,7 @@ fn strokes_come_back_from_their_bytes() {
     assert_eq!(record.samples, [[i16::MIN, 0], [-1, i16::MAX], [i16::MAX, -2], [i16::MIN, 0]]);
 }
 
-/// Sums at the ends of what they can hold, and nothing at all: no overflow, and the means stay on their side.
+/// Sums at the limits of their range, and zeros: no overflow, and the means keep their sign.
 #[test]
 fn the_ends_of_the_sums_are_written() {
     const MOST: i32 = 1 << 17;

@@ -36,7 +36,7 @@ enum Codes {
     Flat(u16),
     /// Two codes in turns.
     Checkerboard(u16, u16),
-    /// Two codes by row: what a scan out of step shows.
+    /// Two codes, alternating by row, as from a scan out of step.
     Stripes(u16, u16),
     /// Anything.
     Noise(u64),
@@ -290,7 +290,7 @@ fn place() -> impl Strategy<Value = Place> {
     prop_oneof![Just(Place::Least), Just(Place::Largest), Just(Place::Default), (0.0..=1.0).prop_map(Place::Between),]
 }
 
-/// Any parameters allowed, the ends of the ranges more often than what lies between.
+/// Any valid parameters, with the limits of the ranges more often than values in between.
 ///
 /// The direction is confirmed in nine of ten, because nothing drives the motor otherwise.
 fn any_params() -> impl Strategy<Value = Params> {
@@ -303,7 +303,7 @@ fn any_params() -> impl Strategy<Value = Params> {
         .prop_map(|(params, confirmed)| Params { direction_confirmed: confirmed.into(), ..params })
 }
 
-/// The configuration, with what the loop's arithmetic relies on.
+/// Configuration, after checks of the properties that the loop's arithmetic needs.
 fn config(params: &Params) -> Config {
     let config = Config::shipped(params).expect("allowed");
     let positive = [config.mm_per_count_q40, config.newtons_per_sum_q48, config.pascals_per_sum_q32];
@@ -316,7 +316,7 @@ fn config(params: &Params) -> Config {
             *gains;
         [l1, l2, l3, speed_q18_per_s, slope_per_s, half_over_slope_q32, half_over_slope2_q40]
     });
-    // Below what their type holds: they were not cut to fit.
+    // Below the limit of their type: they were not clamped.
     assert!(positive.into_iter().chain(gains).all(|value| (1..i32::MAX).contains(&value)), "{config:?}");
     // 0 where the motor is too weak for the acceleration's resolution: then it is not driven.
     let limits = [config.voltage_limit, config.current_limit, config.slew_limit, config.damping_q17_per_s];

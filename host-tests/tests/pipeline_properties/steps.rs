@@ -1,7 +1,7 @@
 //! Runs of steps, judged one by one.
 
 use crate::{Arguments, Input, any_inputs, any_params, config};
-use fingertip::measure::{Ended, State, Task};
+use fingertip::measure::{Ended, MeasureState, Task};
 use fingertip::params::Params;
 use fingertip::pipeline::{Status, Taring};
 use fingertip::shipped::{Pipeline, TARE_FRAMES};
@@ -16,7 +16,7 @@ use std::collections::BTreeSet;
 /// Runs of each test.
 const CASES: u32 = 500;
 
-/// A pipeline and what it was last given.
+/// A pipeline and its last inputs.
 struct Run {
     pipeline: Pipeline,
     arguments: Arguments,
@@ -114,8 +114,8 @@ impl Run {
         let least = self.pipeline.config().contact_on;
         self.touched = status.mode != Mode::Tare && (self.touched || status.contact.force >= least);
         assert_eq!(status.tare == Taring::Running, status.mode == Mode::Tare);
-        let was_running = self.before.measure.state == State::Running;
-        let runs = status.measure.state == State::Running;
+        let was_running = self.before.measure.state == MeasureState::Running;
+        let runs = status.measure.state == MeasureState::Running;
         if measures && status.taken.measure != command.measure_request {
             // For torque, for rest, or for the frame after the one in which a motion was interrupted.
             let torque = task == Task::Press && command.torque;
@@ -125,7 +125,7 @@ impl Run {
         } else if measures && task != Task::Stop && !was_running {
             assert_eq!(status.measure.task, task);
             // Accepted or refused; a fault may end it in its first frame.
-            assert!(runs || status.measure.state == State::Ended, "{status:?}");
+            assert!(runs || status.measure.state == MeasureState::Ended, "{status:?}");
         }
         assert!(
             !runs || status.measure.task == if status.mode == Mode::Press { Task::Press } else { status.measure.task }
@@ -134,7 +134,7 @@ impl Run {
         assert!(runs || status.mode != Mode::Strokes);
         assert_eq!(
             status.measure.value != 0 || status.measure.ended != Ended::Complete,
-            status.measure.state == State::Ended
+            status.measure.state == MeasureState::Ended
         );
         if was_running && runs {
             assert_eq!(
@@ -146,7 +146,7 @@ impl Run {
         if status.mode == Mode::Press && !measures {
             assert!(was_running, "a press goes on after its answer: {status:?}");
         }
-        // Enabling torque begins with what the goal and the touch are, whatever was requested before; a measurement
+        // Enabling torque starts from the present goal and touch, whatever was requested before; a measurement
         // begins only with its request.
         if drives(status.mode) && !drives(self.before.mode) && status.mode != Mode::Strokes {
             let sound = match status.mode {
@@ -229,7 +229,7 @@ proptest! {
         run.take(&after);
     }
 
-    /// New parameters at any moment: the bridge is off, and the loop goes on with them.
+    /// New parameters at any time: the bridge is off, and the loop continues with them.
     #[test]
     fn parameters_may_change_at_any_moment(
         first in any_params(),

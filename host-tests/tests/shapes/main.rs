@@ -192,7 +192,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
     }
 }
 
-// The loop closed over a finger: it approaches, holds 1 N and 2 N, and lets go.
+// The closed loop with a finger: it approaches, holds 1 N and 2 N, and releases.
 
 /// Presses for a time: the true force stays within a share of the goal, and the centre within a distance of its place.
 /// Gives the share of the force that the array does not see, and the last status.
@@ -273,8 +273,8 @@ fn sixteen_by_thirty_two() {
     holds::<16, 32>(900);
 }
 
-/// A contact that reaches over the array's edge: what the array sees is too little, and the fit has to find the rest.
-/// Gives the share of the force that the array does not see.
+/// A contact partly off the array: the sum over the array is too low, and the fit must estimate the rest. Returns the
+/// share of the force that is off the array.
 fn over_the_edge<const ROWS: usize, const COLUMNS: usize>(
     pitch_um: i32,
     centre_mm: [f64; 2],

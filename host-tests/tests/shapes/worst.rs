@@ -5,13 +5,13 @@ use fastrand::Rng;
 use fingertip::command::Command;
 use fingertip::config::{Geometry, Shaped, newtons};
 use fingertip::contact::parts::{
-    CENTRE_BITS, Comparison, Equations, Guess, ONE, Prediction, SLOPE_BITS, SQUARE_BITS, Scale, View,
+    CENTRE_BITS, Comparison, Equations, Guess, ONE, PeakScale, Prediction, SLOPE_BITS, SQUARE_BITS, ScaledImage,
 };
 use fingertip::contact::{self, Fit, FitLevel};
 use fingertip::frame::{Frame, Sense, Shape};
 use fingertip::params::Params;
 use fingertip::pipeline::Pipeline;
-use fingertip::pressure::{Array, Calibration, GAIN_MAX, Picture};
+use fingertip::pressure::{Array, Calibration, GAIN_MAX, TactileImage};
 use fingertip::units::{Celsius, CoreCycles};
 use images::single::{self, Refined};
 use proptest::prelude::*;
@@ -27,7 +27,7 @@ fn config<const ROWS: usize, const COLUMNS: usize>(params: &Params) -> Shaped<RO
     Shaped::<ROWS, COLUMNS>::new(params, &fingertip::shipped::CLOCKS).expect("parameters within their ranges")
 }
 
-/// The ends of what goes into the sums and the fit, with the largest sag that the shape allows.
+/// Parameters at the limits that matter for the sums and the fit, with the largest sag that the shape allows.
 fn extremes<const ROWS: usize, const COLUMNS: usize>() -> Vec<Params> {
     let sag = (0..=7_600).rev().step_by(4).find(|sag| {
         Shaped::<ROWS, COLUMNS>::new(
@@ -322,7 +322,7 @@ fn between(rng: &mut Rng, low: i32, high: i32) -> i32 {
 
 fn take<const ROWS: usize, const COLUMNS: usize>(
     prediction: &Prediction<ROWS, COLUMNS>,
-    view: &View<ROWS, COLUMNS>,
+    view: &ScaledImage<ROWS, COLUMNS>,
     geometry: &Geometry,
 ) {
     let comparison = Comparison { prediction, view, geometry };
@@ -333,7 +333,7 @@ fn take<const ROWS: usize, const COLUMNS: usize>(
 /// Contacts of all depths anywhere, on arrays of all pitches, with the indentation followed as far as it may be.
 fn stays_within<const ROWS: usize, const COLUMNS: usize>(poses: u32) {
     let mut rng = Rng::with_seed(2003);
-    let mut picture = Picture::<ROWS, COLUMNS>::EMPTY;
+    let mut picture = TactileImage::<ROWS, COLUMNS>::EMPTY;
     let mut steepest = 0;
     for _ in 0..poses / 500 {
         let (pitch_um, tip_radius_um) = (between(&mut rng, 500, 4_000), between(&mut rng, 4_000, 16_000));
@@ -341,9 +341,9 @@ fn stays_within<const ROWS: usize, const COLUMNS: usize>(poses: u32) {
         let config = Shaped::<ROWS, COLUMNS>::new(&params, &fingertip::shipped::CLOCKS).expect("allowed parameters");
         let geometry = &config.geometry;
         let peak = between(&mut rng, 16, 4_095 * 16 * i32::from(GAIN_MAX >> 14));
-        let Some(scale) = Scale::new(peak, geometry) else { continue };
+        let Some(scale) = PeakScale::new(peak, geometry) else { continue };
         picture.taxels.as_flattened_mut().fill_with(|| between(&mut rng, 0, peak));
-        let view = View { picture: &picture, scale };
+        let view = ScaledImage { picture: &picture, scale };
         for _ in 0..500 {
             let [x, y] = [COLUMNS, ROWS].map(|side| {
                 let reach = (geometry.pitch >> (SQUARE_BITS - CENTRE_BITS)) * side as i32 / 2 + (1 << CENTRE_BITS);
@@ -381,8 +381,8 @@ fn a_rows_sums_fit_wherever_the_contact_is_and_however_deep() {
 fn stays_within_along_the_rim<const ROWS: usize, const COLUMNS: usize>() {
     let params = Params { pitch_um: 500, tip_radius_um: 16_000, modulus_pa: 20_000, ..Params::DEFAULT };
     let config = Shaped::<ROWS, COLUMNS>::new(&params, &fingertip::shipped::CLOCKS).expect("allowed parameters");
-    let (geometry, picture) = (&config.geometry, Picture::<ROWS, COLUMNS>::EMPTY);
-    let scale = Scale::new(4_095 * 16, geometry).expect("a peak that is high enough");
+    let (geometry, picture) = (&config.geometry, TactileImage::<ROWS, COLUMNS>::EMPTY);
+    let scale = PeakScale::new(4_095 * 16, geometry).expect("a peak that is high enough");
     let pitch = geometry.pitch >> (SQUARE_BITS - CENTRE_BITS);
     for height in (ONE / 4..ONE).step_by(1 << 19) {
         let s = f64::from(height) / f64::from(ONE);
@@ -391,7 +391,7 @@ fn stays_within_along_the_rim<const ROWS: usize, const COLUMNS: usize>() {
             let guess = Guess::new(height, 0, rim - off - pitch / 2 * (ROWS as i32 - 1), geometry);
             let mut prediction = Prediction::new(&guess, &scale, &config);
             prediction.height -= FOLLOWED;
-            take(&prediction, &View { picture: &picture, scale }, geometry);
+            take(&prediction, &ScaledImage { picture: &picture, scale }, geometry);
         }
     }
 }

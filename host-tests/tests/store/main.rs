@@ -9,7 +9,7 @@ use fingertip::store::{Flash as _, Journal, Remark, SLOT_BYTES, SaveError, Secto
 use host_tests::page::{PAGE, table};
 use sim::encode;
 
-// A record's bytes, and what is never taken for a record.
+// Bytes of a record, and bytes that are never taken for a record.
 
 const SIZE: usize = 8 * SLOT_BYTES;
 
@@ -50,7 +50,7 @@ fn garbage_is_a_fault_with_the_defaults_and_the_next_save_ends_it() {
     }
 }
 
-/// Bytes of a record without what fills it up to the next one's place.
+/// Number of bytes of a record without the padding.
 fn whole() -> usize {
     12 + 8 * names().len() + 4
 }
@@ -244,7 +244,7 @@ fn gains_are_taken_all_or_not_at_all() {
             49,
         );
     }
-    // None, or another array's: what this firmware has no name for.
+    // No gains, or those of another array, are unknown to this firmware.
     let (loaded, remarks) = start_in(Sector::A, &with_gains_of(&whole, 50..60, |_, gains| gains));
     assert_eq!(loaded, Loaded { record: expected, sound: true });
     assert_eq!(remarks.len(), 10);
@@ -340,11 +340,11 @@ fn of_values(values: &[(&str, i32)], sequence: u32) -> Vec<u8> {
 /// Difference of another firmware's records.
 #[derive(Clone, Copy, Debug)]
 enum Other {
-    /// Nothing: they are this one's.
+    /// No difference.
     None,
-    /// It has one parameter more.
+    /// One more parameter.
     More,
-    /// It has one fewer.
+    /// One parameter fewer.
     Fewer,
     /// One parameter has another name.
     Renamed,

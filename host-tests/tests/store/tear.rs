@@ -65,8 +65,8 @@ fn ops(board: &Board) -> Vec<Done> {
     board.nor.done
 }
 
-/// Two cuts in a row: the first at all places, the second at one place in `few` of what the start after it does and of
-/// the save after that, others each time.
+/// Two power cuts in a row: the first at every operation, the second at one operation in `few` of the following start
+/// and save, at other ones each time.
 fn tear_twice(board: &Board, words: usize, few: usize) -> [usize; 2] {
     let (mut cases, mut alarms) = (0, 0);
     for first in cuts(&ops(board), words, 1, true) {
@@ -215,8 +215,8 @@ fn sectors_of_the_real_size_are_torn_too() {
     assert!(cases > 1_000);
 }
 
-/// Gains come and go: a record with them is longer. Whatever is cut, what comes up is one record as a whole, and old or
-/// new.
+/// Records with gains are longer than records without. Wherever power is cut, the next start loads one complete record,
+/// the old or the new one.
 #[test]
 fn gains_torn_anywhere_are_the_old_ones_or_the_new_ones() {
     let size = 4 * Record::SLOT_MAX;
@@ -378,9 +378,9 @@ pub struct Cut {
     pub undone: u32,
     /// Of an erase: number of erased words; the next word has some of its bits set.
     pub words: usize,
-    /// Of an erase: what the other words are.
+    /// Content of the remaining words after an erase was cut.
     pub rest: Rest,
-    /// For what is random.
+    /// Seed of the random words.
     pub seed: u64,
 }
 
@@ -389,7 +389,7 @@ pub struct Cut {
 pub enum Rest {
     /// As it was.
     Old,
-    /// Erased too, but what comes before is as it was: the other way round.
+    /// Erased too, but the words before are unchanged: an erase in reverse order.
     Behind,
     /// Some bits are set.
     Weak,
@@ -432,7 +432,7 @@ impl Nor {
         &mut self.sectors[sector as usize]
     }
 
-    /// Power comes back; it will be lost again there.
+    /// Turns power on, with the next cut.
     pub fn power_on(&mut self, cut: Option<Cut>) {
         (self.cut, self.powered) = (cut, true);
         self.done.clear();
@@ -493,7 +493,7 @@ impl Flash for Nor {
     }
 }
 
-/// A board on such a flash, and what its flash should hold.
+/// A board with this flash, and the records that the flash should hold.
 #[derive(Clone, Debug)]
 pub struct Board {
     pub nor: Nor,
@@ -530,8 +530,8 @@ impl Board {
         }
     }
 
-    /// Starts as the board does, and checks what comes up: the old values or the new ones, and a fault where the new
-    /// ones were begun and are not there.
+    /// Starts like the board and checks the result: the old or the new values, and a fault if the new ones were begun
+    /// but are missing.
     pub fn start(&mut self, cut: Option<Cut>) {
         self.nor.power_on(cut);
         self.journal = Journal::new(&self.nor);

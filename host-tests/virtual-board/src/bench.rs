@@ -19,39 +19,39 @@ use sim::bridge::Bridge;
 
 /// The plant's step, and the least of a scene's world.
 pub const STEP_NS: u64 = 10_000;
-/// How often the log is read out.
+/// Time between two reads of the log, ns.
 const LOG_NS: u64 = 1_000_000;
-/// TIM1's registers behind which the duty stands, as offsets: CCR1 and CCR2.
+/// Offsets of TIM1's duty registers CCR1 and CCR2.
 const DUTY_REGISTERS: [u64; 2] = [0x34, 0x38];
 
 /// USART2's register with single-wire mode, and its bit.
 const CR3: u64 = 0x14;
 const HDSEL: u64 = 1 << 3;
 
-/// All that is not the board, and that a snapshot keeps.
+/// State around the board; a snapshot includes it.
 #[derive(Debug)]
 pub struct Bench {
-    /// The next instant of the world's grid; all stops that are the bench's own lie on it.
+    /// Next instant of the world's grid, ns; all stops of the bench itself lie on this grid.
     pub next_ns: u64,
     /// The world and the converters' inputs.
     pub front_end: Shared,
-    /// The run's digest.
+    /// Digest of the run.
     pub trace: Trace,
-    /// From frame to duty.
+    /// Latency from frame to duty.
     pub latency: Latency,
-    /// When the bridge went on and off.
+    /// Times at which the bridge turned on and off.
     pub bridge_edges: Vec<BridgeEdge>,
-    /// When the transmit enable went high and low; a snapshot does not keep it.
+    /// Times at which the transmit enable went high and low; a snapshot does not include them.
     pub transmit_edges: Vec<BridgeEdge>,
     /// The image's log.
     pub log: Log,
-    /// What the image has sent and nobody took yet.
+    /// Bytes that the image sent and that are not read yet.
     pub received: Vec<TimedByte>,
-    /// The core is held until the next reset.
+    /// True while the core is held, until the next reset.
     pub core_held: bool,
-    /// What the image wrote to the flash.
+    /// Flash content that the image wrote.
     pub flash: Kept,
-    /// The external clock; a snapshot does not keep it.
+    /// The external clock; a snapshot does not include it.
     pub clock: ExternalClock,
     /// The host of a scene, once the board is set up.
     pub host: Option<Box<SceneHost>>,
@@ -66,7 +66,7 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// At time 0.
+    /// Bench at time 0.
     pub fn new(front_end: Shared, image: &Firmware) -> Self {
         let (grid_ns, follows_frames) = {
             let world = &front_end.lock().world;
@@ -122,7 +122,7 @@ impl Bench {
         }
     }
 
-    /// Brings the world to an instant under the bridge as it was, then looks at the bridge anew.
+    /// Advances the world to an instant with the bridge state held so far, then reads the bridge again.
     pub fn watch_bridge(&mut self, board: &mut FingerBoard, at_ns: u64) {
         let bridge = board.bridge();
         if bridge == self.bridge {
@@ -202,8 +202,8 @@ impl Bench {
         self.next_ns = (self.next_ns / self.grid_ns + 1) * self.grid_ns;
     }
 
-    /// Where to stop next: at the instant of the grid, or where the host begins to send before it. A byte begins at a
-    /// stop.
+    /// Time of the next stop: the next instant of the grid, or an earlier one at which the host begins to send. A byte
+    /// begins at a stop.
     pub fn next_stop(&self, board: &mut FingerBoard, now: VirtualNanos) -> VirtualNanos {
         let sends_ns = board.wire().sends_ns().filter(|sends_ns| *sends_ns > now.0);
         VirtualNanos(sends_ns.map_or(self.next_ns, |sends_ns| sends_ns.min(self.next_ns)))

@@ -1,4 +1,4 @@
-//! The board: the microcontroller, its clock, its supply and what its pins lead to.
+//! The board: microcontroller, clock, supply, and the parts at its pins.
 
 use crate::front_end::Shared;
 use crate::part::Part;
@@ -23,7 +23,7 @@ const HSE_HZ: u64 = 8_000_000;
 const VDD_MV: u32 = 3_300;
 /// The core's clock.
 const CORE_HZ: NonZeroU64 = NonZeroU64::new(168_000_000).expect("the core is clocked");
-/// Its SysTick runs at an eighth.
+/// Divider of the SysTick clock.
 const REFCLK_DIVIDER: NonZeroU32 = NonZeroU32::new(8).expect("a divider divides");
 const PORT_A: usize = 0;
 const PORT_C: usize = 2;
@@ -60,13 +60,13 @@ impl FingerBoard {
         self.part.wire()
     }
 
-    /// Whether the transceiver holds the line.
+    /// Returns true while the transceiver drives the line.
     pub fn transmits(&mut self) -> bool {
         level(&mut self.part, PORT_C, 8) == Level::High
     }
 
-    /// What the bridge makes of its inputs: IN1 and IN2 averaged over the PWM period, asleep or with both low it
-    /// coasts.
+    /// State of the bridge by its inputs: IN1 and IN2 averaged over the PWM period. It coasts while it sleeps or both
+    /// are low.
     pub fn bridge(&mut self) -> Bridge {
         if level(&mut self.part, PORT_C, 9) == Level::Low {
             return Bridge::Coast;

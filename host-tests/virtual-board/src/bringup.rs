@@ -9,7 +9,7 @@ use std::collections::{HashMap, VecDeque};
 use std::io::{self, Read, Write};
 use std::path::Path;
 
-/// Nothing that the image does takes so long without a line, virtual time.
+/// Virtual time without a line of output after which the image counts as stuck, ms.
 const SILENT_MS: u64 = 60_000;
 
 /// Runs the image to the end of its report and judges that.

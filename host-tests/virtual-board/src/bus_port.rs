@@ -2,7 +2,7 @@
 //!
 //! The crate's DMA fetches a byte at the instant of its stop bit, so no read of the core could come before it. Here the
 //! port asks for the DMA [`FETCH_NS`] later. A read of the data register in between consumes the byte, as on the part:
-//! the DMA never sees it, and no flag tells.
+//! the DMA never sees it, and no flag reports the loss.
 
 use crate::wire::Wire;
 use rigless::device::{Device, DeviceContext, RegisterFile};
@@ -67,7 +67,7 @@ impl Device for BusPort {
         Device::write(&mut self.port, register, value, registers, context);
     }
 
-    /// The port does not see that it may ask for the DMA while a byte arrives; at its time it is told.
+    /// Enables the DMA request at its time: the port itself holds it back from the arrival of a byte on.
     fn on_event(&mut self, event: EventId, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         let control = registers.get(Register::Cr3);
         let empty = !sr::RXNE.is_set(registers.get(Register::Sr));

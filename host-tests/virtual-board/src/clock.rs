@@ -3,7 +3,7 @@
 //! The crate's clock tree switches over as the clock security system does, and breaks TIM1, but it cannot raise the
 //! exception that nothing masks. Its handler is entered as the frame guard's interrupt, which has the highest priority.
 //! Nor does the tree know of an oscillator that never gets ready: its enable is taken back as soon as it is set. It takes
-//! any divider of the PLL: those that the manual calls wrong are told as a gap.
+//! any divider of the PLL: those that the manual forbids are reported as a gap.
 
 use crate::board::FingerBoard;
 use rigless::device::{DeviceContext, RegisterFile};
@@ -21,18 +21,18 @@ const NMI_VECTOR: u64 = 0x0800_0008;
 const GUARD_VECTOR: u64 = 0x0800_0000 + 4 * (16 + 50);
 const GUARD_LINE: InterruptLine = InterruptLine::new(50).expect("there are more lines");
 
-/// Whether it is there.
+/// State of the external clock.
 #[derive(Clone, Debug, Default)]
 pub struct ExternalClock {
     lost: bool,
     /// The last setting of the PLL with a divider Q or R below 2.
     pub wrong_pll: Option<u64>,
-    /// The guard's vector, while another stands in its place.
+    /// The guard's own vector, while the NMI's replaces it.
     vector: Option<u64>,
 }
 
 impl ExternalClock {
-    /// It stops, or is there again for the next start.
+    /// Stops the clock, or restores it for the next start.
     pub fn set_lost(&mut self, lost: bool, session: &mut Session<FingerBoard>, host: &mut dyn Host, stop: Stop) {
         self.lost = lost;
         let guarded = |clocks: &mut Rcc, registers: &mut RegisterFile, context: &mut DeviceContext<'_>| {

@@ -1,11 +1,11 @@
-//! The converters with what the crate's own lack: the external trigger, two of them at once, and the array at their
-//! inputs.
+//! The converters, with features that the crate's own lack: the external trigger, two of them at once, and the array at
+//! their inputs.
 //!
 //! A sequence with DMA is one event, at its last conversion: the inputs are sampled at each rank's own instant, and the
 //! words wait together for [`crate::streams`]. Nothing that the image can see depends on the words in between, and 110
 //! conversions a frame cost 22 events. In a scene they cost one, see [`crate::front_end::Scan`]. Not modelled: an injected
-//! group with a trigger of its own, continuous and discontinuous mode, analogue watchdog, resolutions other than 12 bits;
-//! asking for one is told to the run.
+//! group with a separate trigger, continuous and discontinuous mode, analogue watchdog, resolutions other than 12 bits;
+//! a request for one is reported as a gap.
 
 use crate::front_end::{Shared, Slot};
 use crate::inside;
@@ -33,7 +33,7 @@ struct Running {
     event: Option<EventId>,
     begun_ns: u64,
     ranks: usize,
-    /// In a scene.
+    /// Slot of a scene; `None` outside a scene.
     slot: Option<Slot>,
 }
 
@@ -48,7 +48,7 @@ pub struct Converter {
     rank: usize,
     injected: Injected,
     interrupt: Level,
-    /// Whether reference and sensor are on, by the register that the converters share.
+    /// True if the reference and the temperature sensor are on, by the register that the converters share.
     pub inside_on: bool,
 }
 
@@ -78,8 +78,8 @@ impl Converter {
         begun_ns + (cycles * 1_000_000_000).div_ceil(self.clock_hz)
     }
 
-    /// The next slot of a scene: the sequence of the one before is over, and one begins at the trigger. It is an event
-    /// only where somebody waits for it: at the frame's end.
+    /// Begins the next slot of a scene: the sequence of the slot before has ended, and the new one starts at the
+    /// trigger. Only the last slot of a frame is an event, as the image waits for it.
     fn next_slot(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         if let Some(running) = self.running.take_if(|running| running.event.is_none()) {
             self.finish(running, registers, context);

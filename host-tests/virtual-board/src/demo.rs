@@ -1,7 +1,7 @@
-//! The demonstration: the flash image touches an object, holds the forces asked for, and lets go.
+//! The demonstration: the flash image touches an object, holds the requested forces, and releases the object.
 //!
-//! The host sees the board only over its bus; the figures are of the simulated world's true force. A second run of the same scene must
-//! leave the same trace.
+//! The host sees the board only over its bus; the figures are of the simulated world's true force. A second run of the
+//! same scene must leave the same trace.
 
 pub mod figures;
 pub mod flashable;
@@ -17,7 +17,7 @@ use sim::watch::{Step, Watch};
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// What the demonstration is told.
+/// Settings of the demonstration.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// The flash image, an ELF.
@@ -51,7 +51,7 @@ pub enum DemoError {
 /// Runs the demonstration and takes its figures.
 ///
 /// # Errors
-/// The image does not run, or does not do what it is asked.
+/// The image does not run, or does not reach the goals.
 pub fn run(plan: &Plan) -> Result<(Figures, Run), DemoError> {
     let begun = Instant::now();
     let scene = demo::scene(plan.quick)?;
@@ -88,7 +88,7 @@ pub fn run(plan: &Plan) -> Result<(Figures, Run), DemoError> {
     Ok((figures, run))
 }
 
-/// Nobody watches; the board is read as often as where somebody does.
+/// Empty watcher, with which the board is read as often as with a real one.
 struct Nobody;
 
 impl Watch for Nobody {
@@ -99,7 +99,7 @@ impl Watch for Nobody {
     fn step(&mut self, _: &Step) {}
 }
 
-/// What is kept and what is shown.
+/// Recorded trace and display.
 struct Seen {
     trace: Trace,
     screen: Screen,

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-/// A run could not start or go on.
+/// Reason why a run could not start or continue.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The image could not be read.
@@ -29,7 +29,7 @@ pub enum Error {
     Emulator {
         /// The last instant that the run is known to have reached.
         at_ns: u64,
-        /// What it said.
+        /// Reason reported by the emulator.
         why: String,
     },
     /// A snapshot could not be taken or read.
@@ -55,24 +55,24 @@ pub enum Error {
     /// Some of its checks fail.
     #[error("{0} checks fail; see the table")]
     Failed(usize),
-    /// The plant was asked for where the board stands in a scene.
-    #[error("the board stands in a scene, not in the plant")]
+    /// The plant was requested, but the board runs in a scene.
+    #[error("the board runs in a scene: it has no plant")]
     InAScene,
-    /// A scene was asked for where there is none.
+    /// A scene was requested, but the board runs in the plant.
     #[error("there is no scene around the board")]
     NoScene,
     /// A scene cannot be simulated.
     #[error(transparent)]
     Scene(#[from] sim::SimError),
-    /// The board did not do what a scene's host asked of it.
+    /// The board did not carry out a request of a scene's host.
     #[error("{at_ms:.3} ms after power-on: {why}")]
     Host {
-        /// When.
+        /// Time since power-on, ms.
         at_ms: f64,
-        /// What it did.
+        /// Failure of the board.
         why: String,
     },
-    /// The run touched what the emulator lacks and the allow-list does not name.
+    /// The run used features that the emulator lacks and the allow-list does not name.
     #[error("emulator gaps that are not on the allow-list:\n{0}")]
     Gaps(String),
 }

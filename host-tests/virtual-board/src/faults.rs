@@ -1,4 +1,4 @@
-//! What can be broken while it runs, beside the defects that the world itself has (`Plant::faults`).
+//! Faults that can be injected during a run, in addition to the defects of the world itself (`Plant::faults`).
 
 use crate::board::FingerBoard;
 use crate::error::Error;
@@ -18,7 +18,7 @@ const HALFWAY_VECTOR: u64 = 0x0800_0000 + 4 * (16 + 57);
 const FREE_FLASH: u64 = 0x0803_f000;
 /// `movw r0, #0xfffc; movt r0, #0x1fff; str r0, [r0]; bx lr`.
 const STORE_BELOW_RAM: [u64; 6] = [0xf64f, 0x70fc, 0xf6c1, 0x70ff, 0x6000, 0x4770];
-/// Where nothing answers.
+/// Address at which no device answers.
 const NOWHERE: u64 = 0xd000_0000;
 
 /// A defect of the board or the microcontroller.
@@ -30,7 +30,7 @@ pub enum Fault {
     BridgeFault,
     /// The scan's interrupt never reaches the core, as if its enable were lost.
     ScanInterruptLost,
-    /// The core stands still, as in a loop with interrupts off. It goes on after the next reset.
+    /// The core hangs, as in a loop with interrupts off. It runs again after the next reset.
     CoreHangs,
     /// The external clock stops, and is not there at a start. The emulated part has no exception that nothing masks:
     /// its handler is entered as the frame guard's interrupt, which has the highest priority.

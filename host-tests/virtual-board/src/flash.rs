@@ -1,9 +1,9 @@
-//! What the flash holds, for the sectors of the stored parameters.
+//! Content of the flash sectors with the stored parameters.
 //!
-//! The crate's flash interface times operations but keeps nothing: its memory map names nobody who programs the flash.
-//! The part therefore shows the emulator a map of its own while that lays out memory ([`layout`]), and the run then
-//! programs and erases here, under the interface's registers. While a word is programmed the core stands, as one that
-//! runs from the same bank does. Errors that the interface would flag are not modelled.
+//! The crate's flash interface times operations but keeps nothing: its memory map has no device that programs the
+//! flash. The part therefore shows the emulator a map of its own while that lays out memory ([`layout`]), and the run
+//! then programs and erases here, under the interface's registers. While a word is programmed the core stalls, as one
+//! that runs from the same bank does. Errors that the interface would flag are not modelled.
 
 use crate::board::FingerBoard;
 use rigless::emulator::{Access, AccessKind, Host};
@@ -23,14 +23,14 @@ pub const SECTOR: Range<u64> = 0x0806_0000..0x0808_0000;
 pub const OTHER_SECTOR: Range<u64> = 0x0804_0000..0x0806_0000;
 /// Both.
 pub const SECTORS: Range<u64> = OTHER_SECTOR.start..SECTOR.end;
-/// The sector of this number, where it is one of the two.
+/// Sector of this number; `None` for any but the two.
 fn sector(number: u64) -> Option<Range<u64>> {
     [(6, OTHER_SECTOR), (7, SECTOR)].into_iter().find_map(|(own, sector)| (own == number).then_some(sector))
 }
 /// Flash of the F446, which has less than the emulated part.
 const FLASH_BYTES: u64 = 512 << 10;
 
-/// The part's memory with the F446's flash, and somebody to program it.
+/// The part's memory with the F446's flash and a device that programs it.
 static PROGRAMMABLE: [Region; MEMORY.len()] = {
     let mut memory = MEMORY;
     memory[0] = Region::flash("flash", MEMORY[0].base, FLASH_BYTES).erased_to(0xff).programmed_by("FLASH");
@@ -45,18 +45,18 @@ pub fn layout(of: &Bus) -> Result<Bus, Error> {
     Bus::builder(CPU, &PROGRAMMABLE, of.peripherals().copied()).build()
 }
 
-/// What was changed in the sectors. A snapshot keeps the bytes.
+/// Changes of the flash sectors. A snapshot includes the bytes.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Kept {
     changed: bool,
     bytes: Vec<u8>,
-    /// How long the core stands while a word is programmed: 16 us is typical, 100 us the most (DS10693).
+    /// Time for which the core stalls while a word is programmed, ns: typically 16 us, at most 100 us (DS10693).
     pub word_ns: u64,
-    /// How many words were programmed.
+    /// Number of words programmed.
     pub words: u64,
-    /// How many sectors were erased.
+    /// Number of sectors erased.
     pub erases: u64,
-    /// Until then the core stands.
+    /// Time at which a stall of the core ends.
     stands_until_ns: Option<u64>,
 }
 
@@ -97,7 +97,7 @@ impl Kept {
         }
     }
 
-    /// Whether a word is done at this instant, so that the core goes on.
+    /// Returns true if the programming of a word ends at this time, so that the core runs on.
     pub fn word_done(&mut self, now_ns: u64) -> bool {
         let done = self.stands_until_ns.is_some_and(|until_ns| until_ns <= now_ns);
         self.stands_until_ns = self.stands_until_ns.filter(|_| !done);

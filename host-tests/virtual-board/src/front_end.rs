@@ -22,9 +22,9 @@ const SUPPLY_RATIO: f64 = 11.0;
 /// Codes of the converter.
 const CODES: f64 = 4096.0;
 
-/// The rows' drive since an instant, and what the columns settle to under it.
+/// Rows driven, and the time since which they are.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-struct Drive {
+struct RowDrive {
     rows: u16,
     since_ns: u64,
 }
@@ -33,38 +33,38 @@ struct Drive {
 /// later.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Slot {
-    /// When the converters begin in it.
+    /// Start time of the conversions, ns.
     pub begun_ns: u64,
-    /// The rows that are driven; in the frame's last there are none.
+    /// Bits of the driven rows; 0 in the last slot of a frame.
     pub rows: u16,
 }
 
-/// The scan of a scene. The image hears of it when half of the rows are driven, then looks at how far it is, and hears
-/// of it again when a frame is complete. Nothing else that it can see depends on when the slots in between are worked
-/// out. So that is done for all of them at once, by then: four events a frame in place of three a slot.
+/// Scan of a scene. The image gets an interrupt when half of the rows are driven, reads the progress, and gets another
+/// interrupt when a frame is complete. Nothing else that it can observe depends on when the slots in between are
+/// simulated. So they are simulated all at once, at these times: four events a frame instead of three a slot.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Scan {
-    /// From an update to the trigger.
+    /// Time from an update to the trigger, ns.
     pub edge_ns: u64,
     /// Updates whose words are still to be moved.
     pub due_ns: VecDeque<u64>,
-    /// Words that the rows' stream has moved in its round, and those of a round.
+    /// Words that the rows' stream has moved in this round, and words of a round.
     pub words: [usize; 2],
-    /// Since half of the rows were driven the image looked at how far the streams are.
+    /// True if the image has read the stream counters since half of the rows were driven.
     pub looked: bool,
-    /// The slot that was begun last.
+    /// Slot that began last.
     pub slot: Slot,
 }
 
 impl Scan {
-    /// The slot that begins so many updates after the next.
+    /// Slot that begins at the update `updates` after the next one.
     fn slot_after(&self, updates: usize) -> usize {
         let [moved, round] = self.words;
         (moved + self.due_ns.len() + updates) % round.max(1)
     }
 }
 
-/// What the columns settle to under the drive of that place and under the one before it.
+/// Index of a row drive, with the settled voltages of the columns under it and under the drive before it.
 type Settled = Option<(usize, [f64; COLUMNS], [f64; COLUMNS])>;
 
 /// The DAC's first channel, on the pin of column 5: codes, newest first, and since when. Its buffer is off; it is quick.
@@ -76,14 +76,14 @@ const DAC_COLUMN: usize = 5;
 const DAC_CR: u64 = 0;
 const DAC_DHR12R1: u64 = 8;
 
-/// What the converters have done.
+/// Counts of the converters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ScanCounts {
     /// Words converted by the two scanning converters.
     pub conversions: u64,
     /// Scans of the array whose last slot was converted.
     pub frames: u64,
-    /// When the last of these ended.
+    /// End time of the last of these scans, ns.
     pub frame_end_ns: u64,
     /// Triggers that reached the converters.
     pub triggers: u64,
@@ -92,26 +92,26 @@ pub struct ScanCounts {
 /// The board's analogue side, with the world behind it. Converters and stepping share it.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct FrontEnd {
-    /// What the fingertip touches and what moves it.
+    /// Simulated world around the board.
     pub world: Surroundings,
     /// The trigger line between timer and converters is cut.
     pub trigger_cut: bool,
     /// The interrupt of the scan's stream does not reach the core.
     pub scan_interrupt_lost: bool,
-    /// What the converters have done.
+    /// Counts of the converters.
     pub counts: ScanCounts,
-    /// In a scene.
+    /// Scan of a scene; `None` outside a scene.
     pub scan: Option<Scan>,
-    /// What the pins of the rows' port that are no rows did, while somebody asks; a snapshot does not keep it.
+    /// Edges of the other pins of the rows' port, if they are recorded; a snapshot does not include them.
     #[serde(skip)]
     pub pin_edges: Option<Vec<PinEdge>>,
-    /// What the DAC's first channel drives its pin to; none while it is off. A snapshot does not keep it.
+    /// Output of the DAC's first channel; `None` while it is off. A snapshot does not include it.
     #[serde(skip)]
     pub dac: Option<Dac>,
-    /// Words of each converter that nobody has fetched yet.
+    /// Words of each converter that are not fetched yet.
     pub waiting: [VecDeque<u16>; 3],
-    /// Newest first: a sample just before an edge still sees what was before it.
-    drives: [Drive; 3],
+    /// Row drives, newest first: a sample just before an edge still sees the earlier one.
+    drives: [RowDrive; 3],
 }
 
 /// The front end as the board and the stepping hold it.
@@ -131,11 +131,11 @@ impl Shared {
             pin_edges: None,
             dac: None,
             waiting: Default::default(),
-            drives: [Drive::default(); 3],
+            drives: [RowDrive::default(); 3],
         })))
     }
 
-    /// The front end; everything runs on one thread at a time, so nobody waits.
+    /// Locks the front end. Only one thread runs at a time, so this never waits.
     pub fn lock(&self) -> MutexGuard<'_, FrontEnd> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -149,7 +149,7 @@ impl FrontEnd {
         if self.drives[0].since_ns != at_ns {
             self.drives.rotate_right(1);
         }
-        self.drives[0] = Drive { rows, since_ns: at_ns };
+        self.drives[0] = RowDrive { rows, since_ns: at_ns };
     }
 
     /// The image wrote to a register of the DAC.
@@ -165,15 +165,15 @@ impl FrontEnd {
         }
     }
 
-    /// A pin of the rows' port that is no row changed.
+    /// Records an edge of a pin of the rows' port that is no row.
     pub fn note_edge(&mut self, pin: usize, high: bool, at_ns: u64) {
         if let Some(edges) = &mut self.pin_edges {
             edges.push(PinEdge { pin, at_ns, high });
         }
     }
 
-    /// In a scene: a word for the rows' port, to set the pins of its lower half and reset those of its upper, begins a
-    /// slot. It ends here: that the pins follow is seen where the board is in the plant.
+    /// In a scene: begins a slot with a word for the rows' port, whose lower half sets pins and whose upper half resets
+    /// pins. The pins do not follow it in a scene; they do if the board is in the plant.
     pub fn begin_slot(&mut self, word: u64, words: [usize; 2]) {
         if let Some(scan) = &mut self.scan {
             let [set, reset] = [word as u16, (word >> 16) as u16].map(|pins| pins & ((1 << ROWS) - 1));
@@ -184,7 +184,7 @@ impl FrontEnd {
         }
     }
 
-    /// The part was reset: its pins let go of the rows, and what it had converted is gone.
+    /// Resets the part: its pins release the rows, and converted words are lost.
     pub fn restart(&mut self, at_ns: u64) {
         self.waiting = Default::default();
         self.scan = self.scan.take().map(|_| Scan::default());
@@ -193,7 +193,7 @@ impl FrontEnd {
         }
     }
 
-    /// In a scene, while the rows are driven: so many updates on, the image hears of the scan.
+    /// Number of updates until the scan next raises an interrupt; `None` outside a scene and before the scan is set up.
     pub fn updates_to_sleep(&self) -> Option<usize> {
         let scan = self.scan.as_ref()?;
         let ([_, round], begun) = (scan.words, scan.slot_after(0));
@@ -207,7 +207,7 @@ impl FrontEnd {
         })
     }
 
-    /// In a scene: when the next updates will be.
+    /// In a scene: passes the times of the next updates to the finger.
     pub fn expect(&mut self, updates_ns: impl Iterator<Item = u64>) {
         if let (Some(scan), Surroundings::Scene(finger)) = (&self.scan, &mut self.world) {
             let slots = (0..).map(|updates| scan.slot_after(updates));
@@ -255,7 +255,7 @@ impl FrontEnd {
         }
     }
 
-    /// An input that is no column's: the supply, and what is inside the microcontroller where that is on.
+    /// Word of an input that is no column: the supply, or an internal input if those are on.
     pub fn word(&self, converter: usize, input: usize, inside_on: bool, at_ns: u64) -> u16 {
         let inside = inside::volts(converter, input, self.world.chip_c(at_ns)).filter(|_| inside_on);
         let supply = (input == SUPPLY_INPUT).then(|| self.world.supply_v() / SUPPLY_RATIO);
@@ -281,14 +281,14 @@ impl FrontEnd {
 /// A column's voltage under the drive of a place.
 fn column_volts(
     world: &mut Plant,
-    drives: &[Drive; 3],
+    drives: &[RowDrive; 3],
     newest: usize,
     column: usize,
     at_ns: u64,
     settled: &mut Settled,
 ) -> f64 {
     let (drive, before) = (drives[newest], drives[(newest + 1).min(2)]);
-    let mut settles = |drive: Drive| world.settled_volts(&std::array::from_fn(|row| drive.rows >> row & 1 == 1));
+    let mut settles = |drive: RowDrive| world.settled_volts(&std::array::from_fn(|row| drive.rows >> row & 1 == 1));
     let (_, end, start) = *match settled {
         Some(known) if known.0 == newest => known,
         _ => settled.insert((newest, settles(drive), settles(before))),

@@ -13,7 +13,7 @@ pub struct Firmware {
 }
 
 impl Firmware {
-    /// Reads it.
+    /// Reads an image.
     ///
     /// # Errors
     /// The file is missing, or is no ELF.
@@ -26,7 +26,7 @@ impl Firmware {
         Ok(Self { path: path.into(), elf, symbols })
     }
 
-    /// Where it was read from.
+    /// Path of the image file.
     pub fn path(&self) -> &Path {
         &self.path
     }

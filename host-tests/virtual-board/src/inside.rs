@@ -1,5 +1,5 @@
-//! What the first converter sees of the microcontroller itself: its reference, its temperature's sensor, and what the
-//! factory read of both.
+//! Internal inputs of the first converter: the reference and the temperature sensor of the microcontroller, and the
+//! factory's readings of both.
 
 use fingertip::chip::Factory;
 
@@ -7,21 +7,21 @@ use fingertip::chip::Factory;
 pub const CONVERTER: usize = 0;
 pub const REFERENCE_INPUT: usize = 17;
 pub const SENSOR_INPUT: usize = 18;
-/// Both want to be sampled for so long (DS10693).
+/// Minimum sampling time of both inputs, ns (DS10693).
 pub const SAMPLING_NS: u64 = 10_000;
-/// Where the factory keeps its codes: the reference's, and the sensor's at 30 and 110 degrees Celsius.
+/// Address of the factory's codes: of the reference, and of the temperature sensor at 30 and 110 degrees Celsius.
 pub const FACTORY_AT: u64 = 0x1fff_7a2a;
-/// What is around a board of which nothing else is said.
+/// Default ambient temperature of the board, degrees Celsius.
 pub const ROOM_C: f64 = 25.0;
 
-/// By its sheet (DS10693), typical.
+/// Typical values of the data sheet (DS10693), V.
 const REFERENCE_V: f64 = 1.21;
 const SENSOR_V: f64 = 0.76;
 const SENSOR_V_PER_K: f64 = 0.0025;
 const FACTORY_V: f64 = 3.3;
 const CODES: f64 = 4096.0;
 
-/// What an input carries at a temperature; none where it is none of these.
+/// Voltage at an internal input of a converter for a chip temperature, V; `None` for any other input.
 pub fn volts(converter: usize, input: usize, chip_c: f64) -> Option<f64> {
     match (converter, input) {
         (CONVERTER, REFERENCE_INPUT) => Some(REFERENCE_V),

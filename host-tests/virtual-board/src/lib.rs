@@ -1,8 +1,8 @@
 //! The flash image on an emulated STM32, with the fingertip board around it.
 //!
 //! The image is the one that is flashed, unmodified, built for the STM32F446RE. It runs on the STM32F427 of the crate
-//! `rigless`, whose peripherals the image cannot tell from the F446's. What that part lacks and the image needs stands
-//! in [`part`]: external triggers, the converters behind the tactile array, the timer's DMA request. The board around
+//! `rigless`, whose peripherals the image cannot tell from the F446's. What the image needs and that part lacks is in
+//! [`part`]: external triggers, the converters behind the tactile array, the timer's DMA request. The board around
 //! it ([`board`], [`front_end`], [`wire`]) ends in the simulated world of `sim`. [`rig::Rig`] runs it all.
 //!
 //! All of it is simulated; nothing here has touched silicon.

@@ -5,7 +5,7 @@ use crate::rig::{Order, Rig};
 use crate::wire::TimedByte;
 use std::sync::mpsc;
 
-/// How far the run goes between two looks at what the image sent.
+/// Time between two looks at the bytes that the image sent, ns.
 const LOOK_NS: u64 = 50_000;
 
 impl Rig {
@@ -18,7 +18,7 @@ impl Rig {
         })
     }
 
-    /// Takes what the image has sent.
+    /// Takes the bytes that the image has sent.
     pub fn take_received(&mut self) -> Result<Vec<TimedByte>, Error> {
         self.with(|stand| std::mem::take(&mut stand.bench.received))
     }
@@ -36,7 +36,7 @@ impl Rig {
     }
 }
 
-/// What listens for an answer while the board runs.
+/// Listener for an answer while the board runs.
 #[derive(Debug)]
 pub(crate) struct Listening {
     wait_ns: u64,
@@ -46,12 +46,12 @@ pub(crate) struct Listening {
 }
 
 impl Listening {
-    /// When to look at what has come next.
+    /// Time at which to look at the received bytes next, ns.
     pub(crate) fn next_look_ns(&self, now_ns: u64) -> u64 {
         now_ns + LOOK_NS
     }
 
-    /// Takes in what has come; tells whether more is to be waited for.
+    /// Appends the received bytes; returns true while the packet is incomplete and its wait has not run out.
     pub(crate) fn hear(&mut self, now_ns: u64, received: &[TimedByte], unsent: usize) -> bool {
         if !received.is_empty() || unsent > 0 {
             self.quiet_since_ns = now_ns;
@@ -60,19 +60,19 @@ impl Listening {
         !is_whole(&self.reply) && now_ns < self.quiet_since_ns + self.wait_ns
     }
 
-    /// Hands over what has come.
+    /// Sends the received bytes to the waiting thread.
     pub(crate) fn end(self) {
-        // Where nobody waits any more nobody misses it.
+        // An error means that nobody waits for the answer any more.
         let _ = self.answer.send(self.reply);
     }
 }
 
-/// Whether these bytes hold a whole packet of the protocol: FF FF FD 00, ID, length of what follows.
+/// Returns true if the bytes hold a whole packet of the protocol: FF FF FD 00, ID, length of the rest.
 pub fn is_whole(bytes: &[u8]) -> bool {
     packet_length(bytes).is_some_and(|length| bytes.len() >= length)
 }
 
-/// The length of the packet at the bytes' start, once it can be told; bytes that begin no packet count as one each.
+/// Length of the packet at the start of the bytes, once its header is complete; 1 if they begin no packet.
 pub fn packet_length(bytes: &[u8]) -> Option<usize> {
     const HEADER: [u8; 4] = [0xff, 0xff, 0xfd, 0x00];
     if bytes.iter().zip(HEADER).any(|(byte, header)| *byte != header) {

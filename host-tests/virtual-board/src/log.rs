@@ -14,9 +14,9 @@ const READ: u64 = 40;
 /// Whole frames, still encoded.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Frames {
-    /// When they were read out, virtual time.
+    /// Virtual time at which they were read, ns.
     pub at_ns: u64,
-    /// A zero ends each of them.
+    /// Frames, each ended by a zero.
     pub bytes: Vec<u8>,
 }
 
@@ -24,18 +24,18 @@ pub struct Frames {
 #[derive(Debug, Default)]
 pub struct Log {
     block: Option<u64>,
-    /// What arrived since the last whole frame.
+    /// Bytes received since the last whole frame.
     partial: Vec<u8>,
     frames: Vec<Frames>,
 }
 
 impl Log {
-    /// Of an image; one without a log stays silent.
+    /// Log of an image; stays empty for an image without a log.
     pub fn new(image: &Firmware) -> Self {
         Self { block: image.symbol("_SEGGER_RTT"), ..Self::default() }
     }
 
-    /// Takes what is in the buffer; an image that has not set it up yet has nothing.
+    /// Reads the log buffer; does nothing until the image has set it up.
     pub fn drain(&mut self, at_ns: u64, host: &mut dyn Host) {
         let Some(block) = self.block else { return };
         let mut word = |offset| host.read(block + offset, Width::W32).unwrap_or(0);
@@ -54,7 +54,7 @@ impl Log {
         self.frames.push(Frames { at_ns, bytes: self.partial.drain(..=end).collect() });
     }
 
-    /// The image starts anew: what it had begun to write is gone.
+    /// Drops a half-written line: the image restarts.
     pub fn restart(&mut self) {
         self.partial.clear();
     }
@@ -64,7 +64,7 @@ impl Log {
         &self.frames
     }
 
-    /// What a snapshot keeps.
+    /// State that a snapshot includes.
     pub fn state(&self) -> (&[u8], &[Frames]) {
         (&self.partial, &self.frames)
     }

@@ -8,9 +8,9 @@ use defmt_decoder::{DecodeError, Table};
 /// A line that the image logged.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LogLine {
-    /// When it was read out, virtual time.
+    /// Virtual time at which it was read, ns.
     pub at_ns: u64,
-    /// Level, where it has one.
+    /// Level, if it has one.
     pub level: Option<String>,
     /// The image's own timestamp and its text.
     pub text: String,

@@ -21,7 +21,7 @@ enum Command {
     /// Runs the image of `cargo xtask bringup` and judges its report.
     #[cfg(feature = "bringup")]
     Bringup(commands::bringup::Arguments),
-    /// Touches an object, holds forces, lets go; judges the figures and draws pictures.
+    /// Touches an object, holds forces, releases it; checks the figures and draws pictures.
     Demo(commands::demo::Arguments),
     /// Keeps the board alive for any DYNAMIXEL client, behind a pseudo-terminal or a TCP port.
     Serve(commands::serve::Arguments),

@@ -1,10 +1,10 @@
-//! The STM32F427 of `rigless` with what the image needs beyond it.
+//! The STM32F427 of `rigless` with additions that the image needs.
 //!
 //! - TIM8's update request reaches DMA2 stream 1 channel 7 (RM0390 table 29), and its compare 1 the converters.
 //! - The window watchdog, see `WindowWatchdog`.
 //! - The core may read a received byte before the DMA fetches it, see `bus_port.rs`.
 //! - TIM1 counts what moves the phase of the PWM, see [`crate::pwm_timer`].
-//! - A divider of the PLL that the manual calls wrong is told as a gap, see `clock`.
+//! - A divider of the PLL that the manual forbids is reported as a gap, see `clock`.
 //! - The converters take external triggers and read the fingertip's array; DMA2 takes their words a sequence at a time.
 
 use crate::bus_port::BusPort;
@@ -29,7 +29,7 @@ use rigless::soc::{Bus, Error};
 use rigless::time::VirtualNanos;
 use serde::{Deserialize, Serialize};
 
-/// What the buses run at out of reset: the internal oscillator.
+/// Clock of the buses after reset, Hz: the internal oscillator.
 const RESET_HZ: u64 = 16_000_000;
 const WINDOW_WATCHDOG: &str = "WWDG";
 /// TIM3 in the part's list of timers.
@@ -56,7 +56,7 @@ enum Model {
 /// The levels that the board holds on pins, through every reset of the part.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Inputs {
-    /// Where the encoder stands in its cycle of four.
+    /// Phase of the encoder in its quadrature cycle, 0 to 3.
     pub quarter: u8,
     /// nFAULT of the bridge.
     pub bridge_well: bool,
@@ -78,7 +78,7 @@ pub struct Part {
     layout: Bus,
     laying_out: bool,
     wiring: Vec<Model>,
-    /// USART2 and TIM1 on the bus, and what the converters share.
+    /// Slots of USART2, TIM1 and the registers that the converters share.
     port_slot: usize,
     pwm_slot: usize,
     common_slot: usize,
@@ -138,7 +138,7 @@ impl Part {
         std::array::from_fn(|nth| Converter::new(nth, front_end.clone(), RESET_HZ / 2))
     }
 
-    /// Whether the emulator is laying out memory just now: then the bus is one that knows who programs the flash.
+    /// Sets whether the emulator lays out memory at present: the bus then includes the device that programs the flash.
     pub fn set_laying_out(&mut self, laying_out: bool) {
         self.laying_out = laying_out;
     }
@@ -191,7 +191,7 @@ impl Part {
         });
     }
 
-    /// The crate's part knows of one watchdog: the flag of the other is put in its place.
+    /// Resets the part. The crate's part has one watchdog only: a reset by the other one sets its flag here.
     fn reset_chip(&mut self, at: VirtualNanos, cause: ResetCause) {
         if cause != ResetCause::Model(WINDOW_WATCHDOG) {
             return self.chip.reset(at, cause);

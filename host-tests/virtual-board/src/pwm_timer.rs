@@ -1,9 +1,9 @@
-//! The bridge's timer, asleep where nothing of it changes.
+//! The bridge's timer, which sleeps while its registers do not change.
 //!
 //! The crate's timer wakes at each edge that it makes, 50,000 times a virtual second, and the emulated core is stopped
-//! each time. Nobody hears these edges: of the bridge the world knows the duty, which follows from the registers in use
-//! ([`Tim::pulse`]). What the image writes is in use from the next update on. So the timer is let wake until that is
-//! over, and then sleeps until it is looked at or driven; it catches up by itself with what it slept through.
+//! each time. Nothing depends on these edges: the world only uses the duty, which follows from the registers in use
+//! ([`Tim::pulse`]). Written values are in use from the next update on. So the timer stays awake until that update,
+//! then sleeps until it is read or written; it then catches up by itself.
 
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
 use rigless::snapshot::store;
@@ -25,12 +25,12 @@ pub struct PwmTimer {
     counts: Counts,
 }
 
-/// What decides about the phase of the PWM: the image must not move it while it turns the outputs on.
+/// Events that can shift the phase of the PWM. The image must not shift it while it turns the outputs on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counts {
-    /// How often the main output enable was set.
+    /// Number of times that the main output enable was set.
     pub turned_on: u64,
-    /// How often the running counter was made to begin a period: by an update event, or by its own register.
+    /// Number of times that the image restarted the running counter, by an update event or by writing it.
     pub restarted: u64,
 }
 
@@ -43,12 +43,12 @@ impl PwmTimer {
         Self { timer, clock_hz, awake_until_ns: 0, on: false, counts: Counts::default() }
     }
 
-    /// What the image did to the phase since the reset.
+    /// Counts since the reset.
     pub fn counts(&self) -> Counts {
         self.counts
     }
 
-    /// The share of a period for which a channel's output is high; 0 where it is not driven.
+    /// Share of a period for which a channel's output is high; 0 if it is not driven.
     pub fn high_share(&self, channel: Channel, registers: &RegisterFile) -> f64 {
         match self.timer.pulse(channel, registers) {
             Some(pulse) => pulse.width.0 as f64 / pulse.period.0 as f64,
@@ -67,7 +67,7 @@ impl PwmTimer {
         self.timer.drive_break(level, registers, context);
     }
 
-    /// What is written is in use by then: the period under way has ended, at a whole instant.
+    /// Keeps the timer awake until the present period has ended and written values are in use, rounded up to 1 ns.
     fn wake(&mut self, registers: &RegisterFile, now: VirtualNanos) {
         let cycles = self.period_ticks(registers) * (registers.get(Register::Psc) + 1);
         self.awake_until_ns = now.0 + (cycles * 1_000_000_000).div_ceil(self.clock_hz.max(1)) + 1;
@@ -187,7 +187,7 @@ mod tests {
         assert!(run(&mut part, 1_000 * PERIOD_NS) <= 2);
     }
 
-    /// As `board::bridge` turns the outputs on.
+    /// The sequence with which `board::bridge` turns the outputs on.
     #[test]
     fn a_duty_written_without_preload_is_in_use_at_once_and_begins_no_period() {
         let timer = PwmTimer::new(CLOCK_HZ);

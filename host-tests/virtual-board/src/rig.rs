@@ -1,8 +1,7 @@
 //! The rig: an image on the board, run piece by piece from outside.
 //!
-//! The emulator owns its loop, so it runs on a thread of its own and hands over at instants of the world's grid. What
-//! is asked of it there happens between two instructions; nothing runs while nobody asks. The same calls give the same
-//! run.
+//! The emulator owns its loop, so it runs on a separate thread and halts at instants of the world's grid. Jobs execute
+//! at a halt, between two instructions; nothing runs without an order. The same calls give the same run.
 
 use crate::bench::{Bench, STEP_NS};
 use crate::board::FingerBoard;
@@ -29,18 +28,18 @@ use std::path::Path;
 use std::sync::mpsc;
 use std::thread::JoinHandle;
 
-/// What a run may be told beforehand.
+/// Settings of a run.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Instructions that the core retires in a second, flat: 125 million is a CPI of 1.34 at 168 MHz, what the
-    /// cycle estimate of the control step comes to.
+    /// Instructions that the core retires in a second, constant: 125 million is a CPI of 1.34 at 168 MHz, as in the
+    /// cycle estimate of the control step.
     pub instructions_per_second: NonZeroU64,
-    /// Bytes that stand in memory beside the image, at their addresses: a parameter sector for example.
+    /// Addresses and bytes that memory holds beside the image, for example a parameter sector.
     pub presets: Vec<(u64, Vec<u8>)>,
     /// Bits 3:2 of the option bytes: 0 is the brown-out level 3, as `cargo xtask flash` leaves them, and 3 is off, as
     /// the factory does.
     pub brown_out_bits: u8,
-    /// What the factory kept of the reference and of the sensor.
+    /// Factory codes of the reference and of the temperature sensor.
     pub factory: Factory,
 }
 
@@ -81,13 +80,13 @@ fn images(image: &Firmware, options: &Options) -> Result<Vec<Image>, Error> {
 
 type Job = Box<dyn FnOnce(&mut Stand<'_>) + Send>;
 
-/// What the rig asks of the emulator's thread.
+/// Orders to the emulator's thread.
 pub(crate) enum Order {
     /// Run to an instant of the grid.
     Run(u64),
     /// Run until an answer has come.
     Listen(Listening),
-    /// Do this where the run stands.
+    /// Do this at the present halt.
     Do(Job),
 }
 
@@ -113,7 +112,7 @@ impl Rig {
     /// The board as a snapshot kept it: the same image and options, at the instant at which it was taken.
     ///
     /// # Errors
-    /// As [`Rig::new`], or the snapshot is of something else.
+    /// Like [`Rig::new`]; also if the snapshot is of another image or other options.
     pub fn restore(image: &Path, snapshot: &Path, options: &Options) -> Result<Self, Error> {
         let world = Plant::new(&sim::setup::Setup::default());
         Self::start(image, world.into(), options, Some(Snapshot::read(snapshot)?))
@@ -145,12 +144,12 @@ impl Rig {
         &self.image
     }
 
-    /// Where the run stands, virtual ns since power-on.
+    /// Present time of the run, virtual ns since power-on.
     pub fn now_ns(&self) -> u64 {
         self.now_ns
     }
 
-    /// Runs to an instant, rounded up to the world's grid; an instant already past is where the run stands.
+    /// Runs to an instant, rounded up to the world's grid. Does nothing if the instant has passed.
     pub fn run_until_ns(&mut self, until_ns: u64) -> Result<(), Error> {
         if until_ns <= self.now_ns {
             return Ok(());
@@ -170,7 +169,7 @@ impl Rig {
         self.run_until_ns(self.now_ns + ms * 1_000_000)
     }
 
-    /// Does something where the run stands, between two instructions.
+    /// Executes a job at the present halt, between two instructions.
     pub fn with<T, F>(&mut self, job: F) -> Result<T, Error>
     where
         T: Send + 'static,
@@ -183,7 +182,7 @@ impl Rig {
     /// The plant, to look at or to change.
     ///
     /// # Errors
-    /// The emulator stopped, or the board stands in a scene.
+    /// The emulator stopped, or the board runs in a scene.
     pub fn world<T, F>(&mut self, job: F) -> Result<T, Error>
     where
         T: Send + 'static,
@@ -210,7 +209,7 @@ impl Rig {
         })?
     }
 
-    /// What the converters have done.
+    /// Counts of the converters.
     pub fn scan_counts(&mut self) -> Result<ScanCounts, Error> {
         self.with(|stand| stand.bench.front_end.lock().counts)
     }
@@ -237,7 +236,7 @@ impl Rig {
         self.order(Order::Do(Box::new(job)))
     }
 
-    /// Asks something where the run will then stand, and does not wait: [`Rig::answer`] does.
+    /// Queues a job for the next halt and does not wait; [`Rig::answer`] waits for its result.
     pub fn ask<T, F>(&mut self, job: F) -> Result<mpsc::Receiver<T>, Error>
     where
         T: Send + 'static,
@@ -245,13 +244,13 @@ impl Rig {
     {
         let (answer, answered) = mpsc::channel();
         self.post(move |stand| {
-            // Where nobody waits any more nobody misses it.
+            // An error means that nobody waits for the answer any more.
             let _ = answer.send(job(stand));
         })?;
         Ok(answered)
     }
 
-    /// What was asked before.
+    /// Waits for the result of a job of [`Rig::ask`].
     pub fn answer<T>(&mut self, asked: &mpsc::Receiver<T>) -> Result<T, Error> {
         asked.recv().map_err(|_| self.broken())
     }
@@ -261,7 +260,7 @@ impl Rig {
         if sent { Ok(()) } else { Err(self.broken()) }
     }
 
-    /// Waits until the run is where it set out for.
+    /// Waits until the run has reached its next halt.
     pub fn await_reached(&mut self) -> Result<(), Error> {
         self.now_ns = self.reached.recv().map_err(|_| self.broken())?;
         Ok(())

@@ -1,8 +1,8 @@
-//! A timer that tells the part what the crate's own keeps to itself: its first channel's edge, and that its update
+//! A timer that reports two events which the crate's timer does not: the edge of its first channel, and that its update
 //! request was served.
 //!
-//! In a scene the edge is no event of its own, and of the updates only those are that the image hears of, see
-//! [`crate::front_end::Scan`]: the timer sleeps through the others, and catches up with them.
+//! In a scene the edge is no separate event, and only updates that raise an interrupt are events, see
+//! [`crate::front_end::Scan`]: the timer sleeps through the other updates, and catches up with them.
 
 use crate::front_end::Shared;
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
@@ -29,7 +29,7 @@ pub struct ScanTimer {
     reference: Level,
     clock_hz: u64,
     updates: Updates,
-    /// In a scene: the event for which it sleeps, and the updates until then.
+    /// In a scene: the next scheduled wake-up, and the number of updates until then.
     wake: Option<(EventId, usize)>,
     #[serde(skip)]
     front_end: Option<Shared>,
@@ -62,15 +62,15 @@ impl ScanTimer {
         true
     }
 
-    /// The compare without preload counts at once, also while the counter stands: set below it, channel 1's reference
-    /// rises. The crate's timer looks again only when it runs.
+    /// Raises channel 1's reference if the compare is set below a stopped counter: without preload it takes effect at
+    /// once. The crate's timer compares only while it runs.
     fn compare_standing(&self, compare: u64, registers: &RegisterFile, context: &mut DeviceContext<'_>) {
         let mode = registers.get(Register::Ccmr1Output);
         let immediate = !ccmr1_output::OC1PE.is_set(mode) && ccmr1_output::OC1M.get(mode) == PWM_MODE_2;
-        let stands = !cr1::CEN.is_set(registers.get(Register::Cr1)) && ccer::CC1E.is_set(registers.get(Register::Ccer));
+        let still = !cr1::CEN.is_set(registers.get(Register::Cr1)) && ccer::CC1E.is_set(registers.get(Register::Ccer));
         let count = Device::peek(&self.timer, Register::Cnt, registers, context.now());
         let count = count.unwrap_or(registers.get(Register::Cnt));
-        if immediate && stands && self.reference == Level::Low && count >= compare {
+        if immediate && still && self.reference == Level::Low && count >= compare {
             context.request(COMPARE_1, Level::High);
         }
     }
@@ -101,7 +101,7 @@ impl ScanTimer {
         }
     }
 
-    /// In a scene: so many updates passed, or while the timer stands the image made one.
+    /// In a scene: queues the `passed` updates; while the timer is stopped, the one update that the image generated.
     fn tell_due(&mut self, passed: usize, now_ns: u64) {
         self.updates_served += passed as u64;
         let Some(front_end) = &self.front_end else { return };
@@ -114,7 +114,7 @@ impl ScanTimer {
         self.updates.pass(passed);
     }
 
-    /// In a scene: sleeps until the update of which the image hears next.
+    /// In a scene: sleeps until the next update that raises an interrupt.
     fn sleep(&mut self, context: &mut DeviceContext<'_>) {
         let Some(front_end) = &self.front_end else { return };
         let mut front_end = front_end.lock();
@@ -125,7 +125,7 @@ impl ScanTimer {
         });
     }
 
-    /// What the image writes may start or stop the timer.
+    /// Starts or stops the updates if the image started or stopped the timer.
     fn follow(&mut self, registers: &RegisterFile, context: &mut DeviceContext<'_>) {
         let runs = cr1::CEN.is_set(registers.get(Register::Cr1));
         if runs == self.updates.running() {
@@ -233,35 +233,35 @@ const NS: u128 = 1_000_000_000;
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Updates {
     hz: u64,
-    /// Where cycles are counted from.
+    /// Time at which the count of cycles begins, ns.
     epoch_ns: u64,
-    /// The cycle of the last update, or of the start, and from one to the next; none while the timer stands.
+    /// Cycle of the last update or of the start, and cycles between updates; `None` while the timer is stopped.
     running: Option<(u64, u64)>,
 }
 
 impl Updates {
-    /// The clock has this rate from an instant on.
+    /// Sets the clock rate from a time on, and stops the timer.
     fn clock(&mut self, hz: u64, at_ns: u64) {
         *self = Self { hz, epoch_ns: at_ns, running: None };
     }
 
-    /// The timer starts from 0 and has an update every so many cycles.
+    /// Starts the timer from 0, with an update every `cycles` cycles.
     fn start(&mut self, at_ns: u64, cycles: u64) {
         let since = u128::from(at_ns - self.epoch_ns) * u128::from(self.hz) / NS;
         self.running = Some((since as u64, cycles));
     }
 
-    /// The timer stands.
+    /// Stops the timer.
     fn stop(&mut self) {
         self.running = None;
     }
 
-    /// Whether the timer runs.
+    /// Returns true while the timer runs.
     fn running(&self) -> bool {
         self.running.is_some()
     }
 
-    /// The instants of so many updates to come; none while the timer stands.
+    /// Times of the next `count` updates, ns; empty while the timer is stopped.
     fn next_ns(&self, count: usize) -> impl DoubleEndedIterator<Item = u64> + use<> {
         let Self { hz, epoch_ns, running } = *self;
         let (last, cycles) = running.unwrap_or_default();
@@ -272,7 +272,7 @@ impl Updates {
         })
     }
 
-    /// So many updates have passed.
+    /// Advances by `count` updates.
     fn pass(&mut self, count: usize) {
         if let Some((last, cycles)) = &mut self.running {
             *last += count as u64 * *cycles;

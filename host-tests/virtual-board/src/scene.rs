@@ -2,18 +2,18 @@
 //!
 //! The scene's parameters lie in the image's parameter sector. The host tares, enables torque, and writes the script's
 //! goals over the bus at the times at which the scene's link lets them through; it reads the status registers once in
-//! ten frames, and when its grip asks for it. A step of the run is what an answer says, together with the frame that it
-//! was made from and what was true at that frame's end. What the core has inside and no register shows is not in it, so
-//! a recording of such a run cannot be fed through the core again.
+//! ten frames, and when its grip requests it. A step of the run consists of an answer, the frame that it was made
+//! from, and the true state at that frame's end. It does not include the internal state of the core, so a recording of
+//! such a run cannot be replayed through the core.
 //!
-//! What makes a run slow are the instants at which the emulated core is stopped, and the code that must be translated
-//! because it was stopped in it. So the world moves on where something depends on it, and else in steps of
-//! [`finger::Finger::grid_ns`]; the scan's slots are worked out together ([`crate::front_end::Scan`]), the bridge's
-//! timer sleeps ([`crate::pwm_timer`]), and the host takes its turns where the core stands anyway.
+//! A run is slow because of the halts of the emulated core, and of the code that must be translated after each halt. So
+//! the world advances when something depends on it, and otherwise in steps of
+//! [`finger::Finger::grid_ns`]; the scan's slots are simulated together ([`crate::front_end::Scan`]), the bridge's
+//! timer sleeps ([`crate::pwm_timer`]), and the host acts only where the core is stopped anyway.
 //!
-//! The world stands still until a millisecond before the scene's start: the boards come up and are tared in it.
+//! The world is frozen until a millisecond before the scene's start: the boards boot and are tared in it.
 //!
-//! A scene with two fingers has two boards, each on a line of its own, in the one world.
+//! A scene with two fingers has two boards in one world, each on a separate bus.
 
 pub mod bus;
 pub mod finger;
@@ -40,13 +40,13 @@ use std::path::Path;
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
-/// One millisecond of the board: how often the host reads.
+/// One millisecond of the board: time between two reads of the host, ns.
 const MS: u64 = 1_000_000;
-/// The scan and the guards have settled by then.
+/// Time after which the scan and the guards have settled, ns.
 const BOOT_NS: u64 = 20 * MS;
-/// From the end of a tare to the scene's start: the host sets the board up.
+/// Time from the end of the tare to the scene's start, in which the host sets the board up, ns.
 const SET_UP_NS: u64 = 9 * MS;
-/// An answer takes at most this long.
+/// Longest time of an answer, ns.
 const WAIT_NS: u64 = 2 * MS;
 /// 3 Mbaud by the protocol's code, and no pause before a reply: a read a millisecond leaves room for goals.
 const BAUD_CODE: u8 = 5;
@@ -56,7 +56,7 @@ const WATCHDOG_MS: i64 = 20;
 /// Runs a scene. The times of the board and of the scene's script begin together.
 ///
 /// # Errors
-/// The image does not run, or what the scene asks for cannot be simulated.
+/// The image does not run, or the scene cannot be simulated.
 pub fn simulate(image: &Path, scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, Error> {
     let mut boards = Boards::power_on(image, scene)?;
     let summary = boards.run(scene, watch)?;
@@ -66,7 +66,7 @@ pub fn simulate(image: &Path, scene: &Scene, watch: &mut dyn Watch) -> Result<Su
 
 /// A scene's boards, a board for each finger.
 pub struct Boards {
-    /// In the order of the fingers.
+    /// Rigs in the order of the fingers.
     pub rigs: Vec<Rig>,
     params: Params,
     // As on the native board, all boards have the first one's clock.
@@ -80,7 +80,7 @@ impl Boards {
     /// Boots and tares them and enables torque: the scene begins a millisecond later.
     ///
     /// # Errors
-    /// As [`simulate`].
+    /// Like [`simulate`].
     pub fn power_on(image: &Path, scene: &Scene) -> Result<Self, Error> {
         let begun = Instant::now();
         let params = scene.params();
@@ -108,7 +108,7 @@ impl Boards {
     /// Runs the scene from its beginning to its end, once.
     ///
     /// # Errors
-    /// As [`simulate`].
+    /// Like [`simulate`].
     pub fn run(&mut self, scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, Error> {
         let begun = Instant::now();
         let fingers = self.rigs.len();
@@ -129,7 +129,7 @@ impl Boards {
                     ahead.push_back(set_out(rig, self.now_ns, second_s, wants)?);
                 }
                 self.now_ns += MS;
-                // The boards go on while what they did is looked at.
+                // The boards run on while their results are processed.
                 if ahead.len() == fingers {
                     continue;
                 }
@@ -148,7 +148,7 @@ impl Boards {
         let (mut costs, mut digests) = (self.clock_link.costs().collect::<Vec<_>>(), Vec::new());
         for rig in &mut self.rigs {
             costs.extend(rig.finger(|finger| finger.costs())?);
-            // The host goes: the line is free for whoever asks the board next.
+            // The host is removed: the line is free for other requests.
             let of_link = rig.with(|stand| stand.bench.host.take().map(|host| host.costs().collect::<Vec<_>>()))?;
             costs.extend(of_link.into_iter().flatten());
             digests.push(rig.trace_hash()?);
@@ -164,10 +164,10 @@ impl Boards {
     }
 }
 
-/// What a millisecond gave to show, and what is wrong with the board, if anything.
+/// Steps to show of a millisecond, and the failure of the board, if there is one.
 type Made = (Vec<Shown>, Option<&'static str>);
 
-/// Sends a board through a millisecond.
+/// Starts the next millisecond of a board.
 fn set_out(rig: &mut Rig, now_ns: u64, second_s: f64, wants_pressures: bool) -> Result<Receiver<Made>, Error> {
     rig.post(move |stand| begin(stand.bench, now_ns, second_s, wants_pressures))?;
     rig.set_out(now_ns + MS)?;
@@ -219,7 +219,7 @@ fn set_up(rig: &mut Rig, scene: &Scene, start_ns: u64) -> Result<(), Error> {
     Ok(())
 }
 
-/// From the converters' number of a frame to the image's own, which the image counts where the symbol says.
+/// Offset from the converters' frame number to the image's own, which is in memory at the symbol.
 ///
 /// The status alone does not tell it: by how many frames an answer is late at the least depends on the load of the
 /// core.

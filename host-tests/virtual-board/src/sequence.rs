@@ -1,7 +1,7 @@
 //! A converter's sequences as its registers describe them: the inputs in their order, and for how long each is sampled.
 //!
-//! The injected group follows each regular sequence by itself. It is no event of its own: its words appear in their
-//! registers when the core looks after the last conversion.
+//! The injected group follows each regular sequence automatically. It is no separate event: its words appear in their
+//! registers when the core reads them after the last conversion.
 
 use rigless::device::RegisterFile;
 use rigless::soc::FieldSpec;
@@ -79,12 +79,12 @@ impl Injected {
         Self { words, done_ns }
     }
 
-    /// Whether conversions are under way.
+    /// Returns true while conversions run.
     pub fn runs(&self, now_ns: u64) -> bool {
         now_ns < self.done_ns
     }
 
-    /// Shows what is done by now, and the flag of it in a status.
+    /// Updates the completed conversions, and their flag in a status.
     pub fn show(&mut self, now_ns: u64, status: u64, registers: &mut RegisterFile) -> u64 {
         if self.runs(now_ns) || self.words.is_empty() {
             return status;

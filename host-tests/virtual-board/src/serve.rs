@@ -4,25 +4,25 @@ use crate::{Error, Rig};
 use fingertip::shipped::address;
 use serve::Finger;
 
-/// The image is up by then.
+/// Time after which the image has started, ms.
 const BOOT_MS: u64 = 20;
-/// Its address on the bus, and how long it may take to answer.
+/// ID of the board on the bus, and longest time of an answer, ns.
 const ID: u8 = 1;
 const WAIT_NS: u64 = 20_000_000;
-/// A tare takes less.
+/// Time after which a tare has ended, ms.
 const TARE_MS: u64 = 300;
-/// Its torque is on for so long, with no force asked for.
+/// Time with torque on and a goal of 0, ms.
 const TORQUE_MS: u64 = 20;
 
 /// A board behind a port.
 pub struct Board(Rig);
 
 impl Board {
-    /// Lets a board start, then has it do all that a client may ask of it: what the emulator runs for the first time it
-    /// compiles, for up to 200 ms, and clients do not wait that long. Ends with a reboot.
+    /// Starts a board and executes all requests of clients once: the emulator compiles new code for up to 200 ms,
+    /// longer than clients wait. Ends with a reboot.
     ///
     /// # Errors
-    /// It does not answer, or the emulator stopped.
+    /// The board does not answer, or the emulator stopped.
     pub fn warm(mut rig: Rig) -> Result<Self, Error> {
         rig.run_ms(BOOT_MS)?;
         let state = (address::PRESENT_MODE, address::LOOP_TIME_US + 2 - address::PRESENT_MODE);
@@ -58,7 +58,7 @@ impl Board {
     }
 }
 
-/// Something that may be written to the first parameter: what it has.
+/// Value that may be written to the first parameter: its default.
 fn bus_default() -> u32 {
     fingertip::params::Params::DEFAULT.tip_radius_um as u32
 }

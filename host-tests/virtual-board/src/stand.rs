@@ -1,4 +1,4 @@
-//! Where the emulator hands over: the driver that it calls, and what stands open at a halt.
+//! The driver that the emulator calls, and access to the emulated board at a halt.
 
 use crate::bench::Bench;
 use crate::board::FingerBoard;
@@ -52,13 +52,13 @@ impl Hall {
         Self { bench, orders, reached, firmware, until_ns, listening: None, begun: false }
     }
 
-    /// From an instant of the grid to the next stop.
+    /// Runs from an instant of the grid to the next stop.
     fn go_on(&mut self, session: &mut Session<FingerBoard>, stop: Stop) -> VirtualNanos {
         self.bench.go_on();
         self.bench.next_stop(session.board_mut(), stop.at)
     }
 
-    /// Where an answer is listened for: looks at what has come, and tells whether to run on.
+    /// Passes received bytes to the listener, if there is one; returns true if the run must go on for its answer.
     fn hears_on(&mut self, session: &mut Session<FingerBoard>) -> bool {
         let Some(listening) = &mut self.listening else { return false };
         let (now_ns, received) = (self.bench.next_ns, std::mem::take(&mut self.bench.received));
@@ -72,7 +72,7 @@ impl Hall {
         false
     }
 
-    /// Takes orders until one says to run on; false when nobody will order any more.
+    /// Executes orders until one continues the run; returns false after the last order.
     fn halt(&mut self, session: &mut Session<FingerBoard>, stop: Stop, host: &mut dyn Host) -> bool {
         let Self { bench, orders, reached, firmware, until_ns, listening, begun } = self;
         if !*begun {

@@ -94,8 +94,8 @@ impl Streams {
         }
     }
 
-    /// In a scene a row's word ends here: it begins a slot of both converters, and where more updates have passed, it
-    /// is the next one's turn.
+    /// In a scene: uses a row's word to begin a slot of both converters instead of moving it; requests the next word if
+    /// more updates have passed.
     fn begin_slot(&mut self, stream: usize, word: u64, context: &mut DeviceContext<'_>) -> bool {
         let state = &self.streams[stream];
         let mut front_end = self.front_end.lock();
@@ -206,7 +206,7 @@ impl Device for Streams {
                     self.refresh(registers, context);
                 }
                 Source::ScanTimer => {
-                    // In a scene a request stands for all updates that passed.
+                    // In a scene one request covers all updates that passed.
                     if self.front_end.lock().scan.as_ref().is_some_and(|scan| scan.due_ns.is_empty()) {
                         return;
                     }

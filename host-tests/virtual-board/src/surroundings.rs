@@ -39,14 +39,14 @@ impl Surroundings {
         }
     }
 
-    /// The bridge does this from now on. The plant is told with each step.
+    /// Sets the bridge state from now on. The plant gets it with each step instead.
     pub fn hold(&mut self, bridge: Bridge) {
         if let Self::Scene(finger) = self {
             finger.hold(bridge);
         }
     }
 
-    /// The grid of instants at which it must be stepped.
+    /// Time between two steps of the world, ns.
     pub fn grid_ns(&self) -> u64 {
         match self {
             Self::Plant(_) => STEP_NS,
@@ -54,7 +54,7 @@ impl Surroundings {
         }
     }
 
-    /// Whether it is stepped where a frame ends, too: its grid is coarser than what the control step would notice.
+    /// Returns true if the world is also stepped at the end of each frame: its grid is too coarse for the control step.
     pub fn follows_frames(&self) -> bool {
         matches!(self, Self::Scene(_))
     }
@@ -75,7 +75,7 @@ impl Surroundings {
         }
     }
 
-    /// What the timer in encoder mode has counted by an instant, unwrapped.
+    /// Unwrapped counts of the timer in encoder mode at a board time.
     pub fn encoder_counts(&self, at_ns: u64) -> i32 {
         match self {
             Self::Plant(world) => world.encoder_counts(),

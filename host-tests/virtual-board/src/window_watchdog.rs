@@ -22,14 +22,14 @@ pub struct WindowWatchdog {
     divider: u32,
     /// The count, and the tick since time 0 in which it was that.
     since: Option<(u64, u64)>,
-    /// There is one at a time: it looks whether the time has come.
+    /// The one scheduled event, which checks for a time-out.
     pending: Option<EventId>,
 }
 
 store!(WindowWatchdog);
 
 impl WindowWatchdog {
-    /// Tells it the clock of APB1.
+    /// Sets the clock of APB1, Hz.
     pub fn set_clock(&mut self, hz: u64) {
         self.clock_hz = hz;
     }
@@ -42,7 +42,7 @@ impl WindowWatchdog {
         self.since.map(|(count, tick)| count.saturating_sub(self.tick(now) - tick))
     }
 
-    /// When the count is below its end.
+    /// Time at which the count falls below its end.
     fn bites(&self) -> Option<VirtualNanos> {
         let (count, tick) = self.since?;
         let cycles = (tick + count + 1 - END) * (CYCLES << self.divider);

@@ -10,9 +10,9 @@ use std::collections::VecDeque;
 /// A byte and the instant at which its stop bit ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TimedByte {
-    /// Virtual time.
+    /// Virtual time of the end of its stop bit, ns.
     pub at_ns: u64,
-    /// What it was.
+    /// Value of the byte.
     pub byte: u8,
 }
 
@@ -31,12 +31,12 @@ impl Wire {
         self.outgoing.extend(bytes.iter().map(|byte| (from_ns, *byte)));
     }
 
-    /// Whether the port is in single-wire mode: its receiver is on the transmit pin, and hears what it sends.
+    /// Sets single-wire mode: the receiver is on the transmit pin and receives what the port sends.
     pub fn set_single(&mut self, single: bool) {
         self.single = single;
     }
 
-    /// From when on the next byte may go out.
+    /// Earliest time at which the next byte may be sent, ns.
     pub fn sends_ns(&self) -> Option<u64> {
         self.outgoing.front().map(|(from_ns, _)| *from_ns)
     }

@@ -28,7 +28,7 @@ fn frames(rig: &mut Rig) -> u64 {
     rig.scan_counts().expect("it runs").frames
 }
 
-/// At several instants of a frame, driven or not, and while the scan starts.
+/// The core hangs at several instants of a frame, with and without torque, and while the scan starts.
 #[test]
 fn a_core_that_hangs_is_reset_within_two_milliseconds_and_comes_up_in_fault() {
     let mut driven = holding();

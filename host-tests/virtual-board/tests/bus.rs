@@ -178,7 +178,7 @@ fn no_byte_of_a_fast_bus_is_lost() {
     }
 }
 
-/// How often the bridge is turned on: between two of them the motor is shorted until it stands.
+/// Number of times that the bridge is turned on. The motor is shorted until it rests between two of them.
 const TURNS: u64 = 10;
 
 /// The edges of a duty meet the same rows of the scan as long as no period of the PWM is begun out of turn.

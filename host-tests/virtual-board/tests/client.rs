@@ -20,7 +20,7 @@ fn a_slow_machine_changes_nothing() {
     assert_eq!(quick, slow);
 }
 
-/// What the board leaves unanswered costs virtual time only, and the client goes on.
+/// A packet without an answer costs virtual time only, and the client goes on.
 #[test]
 fn silence_is_told_in_virtual_time() {
     let mut rig = holding();

@@ -1,9 +1,9 @@
-"""Clients that nobody here wrote, on a served fingertip: each tries what it can of the bus, by its own ways.
+"""Third-party clients on a served fingertip: each uses as much of the bus as it supports, in its usual manner.
 
     python clients.py PORT FOLDER --patience-ms 7200000
 
-FOLDER holds `dynamixel.model` and `fingertip.model`. With --patience-ms 0 each client waits as long as it does by itself;
-a test waits longer, so that it passes on a slow machine. One line tells what each client did.
+FOLDER holds `dynamixel.model` and `fingertip.model`. With --patience-ms 0 each client waits for its own default time;
+a test waits longer, so that it passes on a slow machine. One line reports what each client did.
 """
 
 import argparse

@@ -25,7 +25,7 @@ pub fn image() -> PathBuf {
     path.expect("FINGERTIP_IMAGE must name the flash image: run `cargo xtask test`, which builds it and sets it").into()
 }
 
-/// What a client does on the bus of a board that answers.
+/// Result of a client on the bus of a board that must answer.
 pub fn on_bus<T: Send, E: Debug + Send>(rig: &mut Rig, ask: impl FnOnce(&mut Client) -> Result<T, E> + Send) -> T {
     rig.client(WAIT_NS, ask).expect("the client runs").expect("the image answers and obeys")
 }
@@ -72,7 +72,7 @@ pub fn reboot(rig: &mut Rig, ms: u64) {
     rig.run_ms(ms).expect("it runs");
 }
 
-/// What a write is refused with.
+/// Error with which a write is refused.
 pub fn refused(rig: &mut Rig, register: u16, value: u8) -> u8 {
     let written = rig.client(WAIT_NS, move |bus| bus.write_u8(1, register, value).map(drop));
     match written.expect("the client runs") {
@@ -110,7 +110,7 @@ pub fn away(distance_mm: f64) -> Setup {
 }
 
 /// A board that serves one test after another, in any order: to start one costs more than most of what is asked of it.
-/// Where a test fails the next one has a new board.
+/// Runs a test on a board that several tests share. After a test has failed, the next one gets a new board.
 pub fn on_a_shared(board: &Mutex<Option<Rig>>, start: impl FnOnce() -> Rig, test: impl FnOnce(&mut Rig)) {
     let mut shared = board.lock().unwrap_or_else(PoisonError::into_inner);
     let mut rig = shared.take().unwrap_or_else(start);
@@ -129,7 +129,7 @@ pub fn scratch(name: &str) -> PathBuf {
 /// Writes a parameter.
 pub fn write_param(rig: &mut Rig, name: &str, value: u32) {
     write_u32(rig, register(name), value);
-    // The scan starts anew.
+    // A changed parameter restarts the scan.
     rig.run_ms(5).expect("it runs");
 }
 

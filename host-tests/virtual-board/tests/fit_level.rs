@@ -1,5 +1,5 @@
-//! The fit level over the bus: what there is time for is used, what there is none for is held back and said, and no
-//! deadline is missed for it.
+//! The fit level over the bus: the controller runs the highest level that its time budget allows, reports a limit when
+//! it holds a requested level back, and misses no deadline.
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
@@ -9,7 +9,7 @@ use fingertip::shipped::address;
 use fingertip::state::Limits;
 use virtual_board::{Options, Rig};
 
-/// Holds 1 N half a millimetre away, over the array's edge: its last column is centred at 6.75 mm.
+/// Holds 1 N on a contact partly off the array, 0.5 mm away: the last column is centred at 6.75 mm.
 fn hold(rig: &mut Rig) {
     write_u8(rig, address::TORQUE_ENABLE, 1);
     write_goal(rig, 1_000);
@@ -18,7 +18,7 @@ fn hold(rig: &mut Rig) {
     assert!((0.95..1.05).contains(&force_n), "{force_n} N");
 }
 
-/// A board that holds a contact of which the array sees a half.
+/// A board that holds a contact half of which is off the array.
 fn holding_over_the_edge() -> Rig {
     let mut setup = away(0.5);
     (setup.wall.centre_x_mm, setup.wall.centre_y_mm) = (7.5, 1.0);
@@ -32,8 +32,7 @@ fn holding_over_the_edge() -> Rig {
     rig
 }
 
-/// What the board says, without a fault: the fit level in use, whether that is held back, and the longest loop time in
-/// us.
+/// Reports of a board without a fault: fit level in use, true if it is held back, and longest loop time in us.
 fn said(rig: &mut Rig) -> (u8, bool, u16) {
     assert_eq!(read_u8(rig, address::FAULT), 0);
     let limits = Limits(read_u16(rig, address::LIMITS));

@@ -83,7 +83,7 @@ fn it_answers_a_ping_at_its_baud_rate() {
     });
 }
 
-/// Also where control is at work just then: at many instants of a frame, with a contact to fit to.
+/// The stop bit ends at many instants of a frame, also while control computes a fit.
 #[test]
 fn the_line_is_given_back_right_after_the_last_stop_bit() {
     let mut rig = holding();
@@ -105,8 +105,8 @@ fn the_line_is_given_back_right_after_the_last_stop_bit() {
     assert!(late_ns[39] <= 5_000, "{} ns", late_ns[39]);
 }
 
-/// A compare set below the counter triggers the converters once too often, where it comes before the timer starts anew
-/// and leaves them time until the first row: each row would then be read a slot late.
+/// A compare value below the counter triggers the converters once too often, if it is set before the timer restarts and
+/// leaves them time until the first row: each row would then be read a slot late.
 #[test]
 fn a_settle_time_that_is_lowered_leaves_the_rows_in_step() {
     let mut rig = up();
@@ -125,7 +125,7 @@ fn the_bus_tells_how_the_board_is() {
         rig.run_ms(1_100).expect("it runs");
         assert_eq!(read_u32(rig, address::OPTION_BYTES) & 0xffff_fffe, 0x0fff_aae0);
         assert!((3_295..=3_305).contains(&read_u16(rig, address::ANALOGUE_SUPPLY_MV)));
-        let deepest = rig.stack_use().expect("it runs").expect("the image tells where its stack lies").used;
+        let deepest = rig.stack_use().expect("it runs").expect("the image names its stack").used;
         let told = u64::from(read_u16(rig, address::STACK_BYTES));
         assert!(told > 2_000 && told <= deepest, "{told} of {deepest} bytes");
         // A packet that arrives at the end of a frame delays its processing; an idle bus delays no frame.
@@ -189,7 +189,7 @@ fn at_least_half_of_the_stack_is_never_used() {
     };
     rig.client(WAIT_NS, read).expect("the client runs");
     rig.run_ms(50).expect("it runs");
-    let stack = rig.stack_use().expect("it runs").expect("the image tells where its stack lies");
+    let stack = rig.stack_use().expect("it runs").expect("the image names its stack");
     println!("stack: {} of {} bytes used", stack.used, stack.size);
     assert!(stack.used > 2_000 && 2 * stack.used <= stack.size, "{stack:?}");
 }

@@ -15,10 +15,10 @@ use virtual_board::{Fault, Options, Rig};
 /// Two frames of 99.8 us. A taxel that fails just after it was read is read again a frame later; the step at that
 /// frame's end would be too late for the first rows, the check of the partial frame in its middle is not.
 const TWO_FRAMES_US: f64 = 199.5;
-/// Where in a frame a fault of the array begins: every 9 us, so in each slot.
+/// Times in a frame at which a fault of the array begins, in steps of 9 us, so that each slot is covered.
 const PHASES_US: std::ops::Range<u64> = 0..11;
 const PHASE_STEP_US: u64 = 9;
-/// Both inputs high, with the driver awake.
+/// Bridge that brakes: both inputs high, with the driver awake.
 const BRAKES: Bridge = Bridge::Driven { duty: 0.0 };
 
 /// Faults that put the driver to sleep: nobody who could brake is left, or the driver is not to be trusted.
@@ -33,13 +33,13 @@ fn until_off_us(rig: &mut Rig, limit_ms: u64) -> f64 {
     off.map_or(f64::INFINITY, |edge| (edge.at_ns - from_ns) as f64 / 1e3)
 }
 
-/// What the bridge does now.
+/// Present state of the bridge.
 fn bridge(rig: &mut Rig) -> Bridge {
     rig.with(|stand| stand.session.board_mut().bridge()).expect("it runs")
 }
 
-/// How far the tip, which pressed with 1 N, goes back in a fault that brakes: no farther than its own indentation, the
-/// clearance and 1 mm.
+/// Checks the retreat of a tip that pressed with 1 N after a fault that brakes: at most the indentation, the clearance
+/// and 1 mm together.
 fn check_way_back(rig: &mut Rig, name: &str, held_mm: f64) {
     let params = Params::DEFAULT;
     let indentation_mm = (1e6 / (std::f64::consts::PI * f64::from(params.modulus_pa))).sqrt();

@@ -1,5 +1,5 @@
 //! The tests of the flash image on the emulated board, as one program: it is linked once, both cores have work until the
-//! end, and a board that holds 1 N is started once. One file of them: `cargo test ... --test board warmth::`.
+//! end, and a board that holds 1 N is started once. One file of them: `cargo test ... --test board temperature::`.
 
 mod board_faults;
 mod bringup;
@@ -18,8 +18,8 @@ mod parameters;
 mod refused_writes;
 mod scenes;
 mod serve;
+mod temperature;
 mod trace_pins;
-mod warmth;
 
 /// A file that is not in the list above would never be compiled.
 #[test]

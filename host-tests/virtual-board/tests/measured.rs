@@ -4,7 +4,7 @@
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
 use crate::common::{away, let_go, on_bus, read_u8, read_u16, read_u32, running, write_goal, write_param, write_u8};
-use fingertip::measure::{State, Task};
+use fingertip::measure::{MeasureState, Task};
 use fingertip::params::Params;
 use fingertip::shipped::address;
 use fingertip::state::Mode;
@@ -23,13 +23,13 @@ fn measure(rig: &mut Rig, task: Task) {
     for _ in 0..LONGEST_MS / 20 {
         let mode = read_u8(rig, address::PRESENT_MODE);
         let state = read_u8(rig, address::MEASURE_STATE);
-        if state != State::Running as u8 {
+        if state != MeasureState::Running as u8 {
             let value = read_u32(rig, address::MEASURE_VALUE).cast_signed();
             let told = [address::MEASURE_ENDED, address::FAULT].map(|register| read_u8(rig, register));
             let loop_us = read_u16(rig, address::LOOP_TIME_MAX_US);
             let missed = read_u32(rig, address::MISSED_FRAMES);
             println!("{task:?}: {loop_us} us at most, {missed} frames missed");
-            assert_eq!((state, told, value), (State::Done as u8, [0; 2], 0), "state, end and fault, value");
+            assert_eq!((state, told, value), (MeasureState::Done as u8, [0; 2], 0), "state, end and fault, value");
             return;
         }
         assert_eq!(mode, if task == Task::Press { Mode::Press } else { Mode::Strokes } as u8);

@@ -13,11 +13,11 @@ use virtual_board::{Options, Rig};
 
 const SECTOR_BYTES: usize = 128 << 10;
 const SLOTS: usize = SECTOR_BYTES / SLOT_BYTES;
-/// What a board with this much to read needs to start.
+/// Start time of a board with full sectors to read, ms.
 const START_MS: u64 = 100;
-/// The longest that a word may take (DS10693).
+/// Longest time to program a word, ns (DS10693).
 const WORD_MAX_NS: u64 = 100_000;
-/// What an erase at 8 bits takes on the emulated part.
+/// Time of an erase at 8 bits on the emulated part, ms.
 const ERASE_MS: u64 = 2_000;
 
 fn record(pitch_um: i32) -> Record {
@@ -26,7 +26,7 @@ fn record(pitch_um: i32) -> Record {
     record
 }
 
-/// A sector with so many records.
+/// Bytes of a sector with `count` records.
 fn filled(count: usize, first_sequence: u32) -> Vec<u8> {
     (0..count).flat_map(|place| encode(&record(1_000 + place as i32), first_sequence + place as u32)).collect()
 }

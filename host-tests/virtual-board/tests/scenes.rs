@@ -109,7 +109,7 @@ fn a_run_repeats_and_shows_a_step_nearly_each_millisecond() {
     );
     assert!(first.times_s[0] < 0.0);
     assert_eq!(first.goal_n, 1.0);
-    // The status is of the very frame whose truth stands beside it: on the way, at 120 N/s, a frame is 12 mN.
+    // Status and truth belong to the same frame: during the ramp of 120 N/s the force changes by 12 mN a frame.
     assert!(first.error_n < 0.012, "{} N", first.error_n);
 }
 
@@ -144,7 +144,7 @@ fn along_a_thing(read_ms: f64) -> Scene {
 
 #[test]
 fn the_host_s_grip_acts_on_what_it_reads_over_the_bus() {
-    // 1 mm along a surface of 1 N/mm, of which it trusts 0.4 N for each newton: 2.5 N, or somewhat more.
+    // A lift by 1 mm loads the grip with 1 N; at a trusted friction of 0.4 that needs 2.5 N, or somewhat more.
     let (mut blind, mut gripping, mut native) = (Kept::default(), Kept::default(), Kept::default());
     run(&along_a_thing(0.0), &mut blind);
     run(&along_a_thing(2.0), &mut gripping);

@@ -48,7 +48,7 @@ impl Drop for Board {
     }
 }
 
-/// What an example of the Python package says, with the board at a port.
+/// Output of an example of the Python package with the board at a port.
 fn example(name: &str, port: &Path, arguments: &[&str]) -> String {
     let package = Path::new(env!("FINGERTIP_ROOT")).join("python");
     let mut python = Command::new(named("FINGERTIP_PYTHON"));

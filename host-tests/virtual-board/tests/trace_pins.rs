@@ -23,7 +23,7 @@ fn edges(rig: &mut Rig, ms: u64) -> Vec<PinEdge> {
     rig.with(|stand| stand.bench.front_end.lock().pin_edges.take()).expect("it runs").expect("they were asked for")
 }
 
-/// From each rise of a pin to its fall, and from rise to rise.
+/// Times from each rise of a pin to its fall, and to the next rise, ns.
 fn widths_ns(edges: &[PinEdge], pin: usize) -> Vec<[u64; 2]> {
     let own: Vec<_> = edges.iter().filter(|edge| edge.pin == pin).skip_while(|edge| !edge.high).collect();
     own.windows(3).step_by(2).map(|three| [three[1].at_ns - three[0].at_ns, three[2].at_ns - three[0].at_ns]).collect()

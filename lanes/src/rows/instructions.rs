@@ -9,8 +9,8 @@ const PAIRS: usize = 2 * WRITTEN_OUT;
 
 /// [`super::portable_pass`].
 ///
-/// For rows of ten columns it is written out, because the compiler has too few registers for any order of these
-/// instructions, and keeps loading and storing. It works through a row in about 170 cycles.
+/// Written out in assembly for rows of ten columns: for any order of these instructions the compiler runs out of
+/// registers and spills to the stack. A row takes about 170 cycles.
 #[inline(always)]
 pub fn pass<const ROWS: usize, const COLUMNS: usize>(
     codes: &Codes<ROWS, COLUMNS>,

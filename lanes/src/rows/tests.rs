@@ -98,7 +98,7 @@ fn is_what_its_parts_say<const ROWS: usize, const COLUMNS: usize>(mix: &mut Mix,
         second += (sum(&row.moments) * i64::from(row.boost)) >> 32;
         running += first >> 2;
     }
-    // Exact, so nothing passed 32 bits; but the running sum may, what is made of it not.
+    // These are exact, so no sum overflowed 32 bits. The running sum may wrap; the result computed from it is exact.
     assert_eq!([total.first, total.second].map(i64::from), [first, second]);
     assert_eq!(total.running, running as i32);
     i32::try_from((first >> 2) * (ROWS as i64 + 1) - 2 * running).expect("the moment fits");

@@ -1,7 +1,7 @@
 //! The joint least squares over all strokes.
 
 use super::model::{ALL, FITTED, Form, Law, Parameters, Path, index};
-use super::{Record, Refusal};
+use super::{NoDrive, Record};
 use nalgebra::{Cholesky, Matrix3, SMatrix, SVector, Vector3};
 
 /// A vector over all parameters.
@@ -27,8 +27,8 @@ const TAU_S: f64 = 9e-3;
 const STEP: f64 = 0.7;
 /// Speed at the start of a path at least, rad/s.
 const SPEED_LEAST: f64 = 0.05;
-/// Samples that tell as much as one above which friction differs from path to path; by this voltage below, V, and
-/// by this share of friction above.
+/// Ratio `Fit::common` from which friction counts as different from path to path. The deviation between paths is
+/// `EVEN_V` (V) below that ratio, and the share `UNEVEN` of the friction voltage above it.
 const COMMON: f64 = 4.0;
 const EVEN_V: f64 = 1e-6;
 const UNEVEN: f64 = 0.05;
@@ -48,7 +48,7 @@ pub struct Fit {
     /// Variance of k by the strokes' scatter, as a multiple of that by the samples' scatter.
     common: f64,
     scatter: Matrix,
-    /// For each parameter that is not fitted: its value if it were, the uncertainty, and how the others would change.
+    /// Parameters that are not fitted: the value of each if it were, its uncertainty, and the change of the others.
     probes: Vec<(f64, f64, Vector)>,
 }
 
@@ -70,7 +70,7 @@ struct Normal {
     matrix: Matrix,
     /// Gradient of each stroke.
     gradients: Vec<Vector>,
-    /// For each path, how its own unknowns follow the parameters.
+    /// Derivatives of the unknowns of each path by the parameters.
     follow: Vec<(Own, SMatrix<f64, 3, ALL>)>,
 }
 
@@ -130,7 +130,7 @@ impl Problem<'_> {
     }
 
     /// The least cost near a point, by damped Gauss-Newton steps (Levenberg and Marquardt).
-    fn minimum(&self, mut at: Point) -> Result<Point, Refusal> {
+    fn minimum(&self, mut at: Point) -> Result<Point, NoDrive> {
         let mut damping = 1e-3;
         let mut rounds = 0;
         loop {
@@ -146,7 +146,7 @@ impl Problem<'_> {
             loop {
                 rounds += 1;
                 if rounds > ROUNDS {
-                    return Err(Refusal::Unsolved(ROUNDS));
+                    return Err(NoDrive::Unsolved(ROUNDS));
                 }
                 let normal = Normal::new(&blocks, damping);
                 let (matrix, gradient) = self.equations(&normal, &at.p, damping);
@@ -227,8 +227,8 @@ impl Fit {
     /// Fits of all forms of friction, the best one first.
     ///
     /// First with one friction for all strokes. Where they do not agree on one, each path may have its own beside it.
-    pub fn all(paths: &[Path], record: &Record, slowest: f64) -> Result<Vec<Self>, Refusal> {
-        let mut failed = Refusal::Unsolved(0);
+    pub fn all(paths: &[Path], record: &Record, slowest: f64) -> Result<Vec<Self>, NoDrive> {
+        let mut failed = NoDrive::Unsolved(0);
         for even in [true, false] {
             let mut fits = Vec::new();
             for form in Form::ALL {
@@ -245,7 +245,7 @@ impl Fit {
         Err(failed)
     }
 
-    fn new(paths: &[Path], law: Law, record: &Record, even: bool) -> Result<Self, Refusal> {
+    fn new(paths: &[Path], law: Law, record: &Record, even: bool) -> Result<Self, NoDrive> {
         let least = core::f64::consts::TAU / record.counts_per_turn / 12_f64.sqrt();
         let point = guess(paths);
         let mut prior = [(0.0, 0.0); FITTED];

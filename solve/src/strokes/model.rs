@@ -51,9 +51,9 @@ pub mod index {
     pub const K: usize = 0;
     /// ln a, a = R J / k in V s^2/rad.
     pub const A: usize = 1;
-    /// ln of the friction voltage at high speed, forward; the next is that back.
+    /// ln of the friction voltage at high speed, forward; the next index is backward.
     pub const COULOMB: usize = 2;
-    /// What friction has beyond that at the speed of the slowest stroke, V, forward; the next is that back.
+    /// Additional friction voltage at the speed of the slowest stroke, V, forward; the next index is backward.
     pub const STRIBECK: usize = 4;
     /// ln of the Stribeck speed, rad/s.
     pub const SPEED: usize = 6;

@@ -309,10 +309,10 @@ impl Recorder {
     }
 }
 
-/// Way of a press in the plans, from the air to the deepest place, mm, and its part in front of the contact.
+/// Stroke of a press in the plans, from the air to the deepest place, mm, and its part in front of the contact.
 const WAY_MM: f64 = 3.5;
 const AIR_MM: f64 = 0.5;
-/// A step: this part of the way.
+/// Length of a step: a 30th of the stroke, mm.
 const STEP_MM: f64 = WAY_MM / 30.0;
 
 /// The press that the chip makes: a quick cycle, then a slow one with a hold.

@@ -12,7 +12,7 @@ use solve::gains::Condition;
 use solve::press::{Branch, Press};
 use solve::record::{Ended, MAGIC, Reason};
 use solve::scale::{Held, Scale};
-use solve::strokes::Refusal;
+use solve::strokes::NoDrive;
 use solve::{Value, creep, gains, scale, temperature};
 use std::f64::consts::TAU;
 
@@ -214,7 +214,7 @@ fn refusals_are_sentences_with_their_number() {
     assert!(ended(Reason::Restless, 7).contains("7 counts"));
     assert!(ended(Reason::Stalled, 850).contains("0.85 mm"));
     assert!(ended(Reason::Full, 120).contains("120 records"));
-    let touched = Refusal::from(Ended { reason: Reason::Touched, value: 51 }).to_string();
+    let touched = NoDrive::from(Ended { reason: Reason::Touched, value: 51 }).to_string();
     assert_eq!(
         touched,
         "the strokes were ended early: the array measured 0.051 N, more than allowed here: clear the tip's way, hold the plate fast"

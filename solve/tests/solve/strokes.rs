@@ -3,16 +3,16 @@
 mod drive;
 
 use core::ops::Range;
-use drive::{DELAY_S, Drive, FRAME_S, Rig};
+use drive::{DELAY_S, FRAME_S, Rig, SimulatedDrive};
 use fingertip::measure::Ended;
 use fingertip::measure::series::{CHECK, HEAD, Head, Out};
-use fingertip::measure::strokes::{Kept, Strokes, View};
-use fingertip::measure::{MeasureStatus, Row, State, Task};
+use fingertip::measure::strokes::{Kept, StrokeInputs, Strokes};
+use fingertip::measure::{MeasureState, MeasureStatus, Row, Task};
 use fingertip::params::Params;
 use fingertip::shipped::Config;
 use fingertip::units::Newtons;
 use solve::record::{self, Reason};
-use solve::strokes::{Record, Refusal, solve};
+use solve::strokes::{NoDrive, Record, solve};
 
 /// Recorded strokes: all, and the slow ones alone.
 const ALL: usize = 32;
@@ -59,7 +59,7 @@ impl Figures {
         name: &str,
         numbers: Range<usize>,
         strokes: usize,
-        draw: impl Fn(&mut fastrand::Rng, usize) -> Drive,
+        draw: impl Fn(&mut fastrand::Rng, usize) -> SimulatedDrive,
     ) -> Self {
         let mut figures = Self::default();
         let count = numbers.len();
@@ -154,33 +154,33 @@ impl Figures {
 
 #[test]
 fn ordinary_drives_are_measured() {
-    Figures::of("ordinary", 0..30, ALL, |rng, _| Drive::ordinary(rng)).judge(27);
+    Figures::of("ordinary", 0..30, ALL, |rng, _| SimulatedDrive::ordinary(rng)).judge(27);
 }
 
 #[test]
 fn varied_drives_are_measured() {
-    Figures::of("varied", 0..30, ALL, |rng, _| Drive::varied(rng)).judge(27);
+    Figures::of("varied", 0..30, ALL, |rng, _| SimulatedDrive::varied(rng)).judge(27);
 }
 
 #[test]
 #[ignore = "takes minutes"]
 fn two_hundred_drives_of_each_kind_are_measured() {
-    Figures::of("ordinary", 0..200, ALL, |rng, _| Drive::ordinary(rng)).judge(180);
-    Figures::of("varied", 0..200, ALL, |rng, _| Drive::varied(rng)).judge(180);
+    Figures::of("ordinary", 0..200, ALL, |rng, _| SimulatedDrive::ordinary(rng)).judge(180);
+    Figures::of("varied", 0..200, ALL, |rng, _| SimulatedDrive::varied(rng)).judge(180);
 }
 
-/// Slow strokes alone do not tell k from friction that falls with speed: nothing is wrong without saying so.
+/// Slow strokes alone do not separate k from friction that falls with speed. The uncertainties must cover that.
 #[test]
 fn slow_strokes_alone_say_how_little_they_tell() {
-    Figures::of("slow", 0..4, SLOW, |rng, _| Drive::varied(rng)).judge(0);
+    Figures::of("slow", 0..4, SLOW, |rng, _| SimulatedDrive::varied(rng)).judge(0);
 }
 
-/// Friction that changes along the way and from stroke to stroke is not in the model.
+/// Friction that changes along the travel and from stroke to stroke is not in the model.
 #[test]
 fn friction_that_is_not_even_is_not_silently_wrong() {
     let draw = |rng: &mut fastrand::Rng, number| {
         let ripple = if number % 2 == 0 { 0.05 } else { 0.0 };
-        Drive { ripple, unrest: 0.05, ..Drive::varied(rng) }
+        SimulatedDrive { ripple, unrest: 0.05, ..SimulatedDrive::varied(rng) }
     };
     Figures::of("uneven", 0..8, ALL, draw).judge(4);
 }
@@ -189,10 +189,10 @@ fn friction_that_is_not_even_is_not_silently_wrong() {
 #[test]
 fn other_motors_are_measured_too() {
     let mut rng = fastrand::Rng::with_seed(7);
-    let drive = Drive::ordinary(&mut rng);
+    let drive = SimulatedDrive::ordinary(&mut rng);
     let motors = [
         // Without a gear on a short crank; a small quick one with a high gear; three times the inertia of the sheet.
-        Drive {
+        SimulatedDrive {
             k: 16e-3,
             sheet_k: 16e-3,
             winding_ohm: 8.0,
@@ -205,7 +205,7 @@ fn other_motors_are_measured_too() {
             counts_per_turn: 4096.0,
             ..drive.clone()
         },
-        Drive {
+        SimulatedDrive {
             k: 3.2e-3,
             sheet_k: 3.2e-3,
             winding_ohm: 9.0,
@@ -216,7 +216,7 @@ fn other_motors_are_measured_too() {
             friction_nm: 0.05e-3,
             ..drive.clone()
         },
-        Drive { inertia: 2.1e-7, ..drive },
+        SimulatedDrive { inertia: 2.1e-7, ..drive },
     ];
     Figures::of("other", 0..3, ALL, |_, number| motors[number].clone()).judge(2);
 }
@@ -224,7 +224,7 @@ fn other_motors_are_measured_too() {
 #[test]
 fn a_refusal_states_its_reason_and_the_number_behind_it() {
     let mut rng = fastrand::Rng::with_seed(7);
-    let drive = Drive::ordinary(&mut rng);
+    let drive = SimulatedDrive::ordinary(&mut rng);
     let refused = |record: &Record| {
         let refusal = solve(record).expect_err("nothing to solve");
         println!("{refusal}");
@@ -232,9 +232,9 @@ fn a_refusal_states_its_reason_and_the_number_behind_it() {
     };
     // The controller's own: the motor's leads swapped, and an encoder without supply.
     for (counts, reason) in [(-1, Reason::Reversed), (0, Reason::Still)] {
-        let mut rig = Rig::new(Drive { counts, ..drive.clone() }, 1);
+        let mut rig = Rig::new(SimulatedDrive { counts, ..drive.clone() }, 1);
         let refusal = refused(&measure(&mut rig, ALL));
-        let Refusal::Ended(ended) = refusal else { panic!("{refusal}") };
+        let NoDrive::Ended(ended) = refusal else { panic!("{refusal}") };
         assert_eq!(ended.reason, reason);
         assert!(ended.value > 0 && rig.travel_mm < TRAVEL_MM);
     }
@@ -250,19 +250,19 @@ fn a_refusal_states_its_reason_and_the_number_behind_it() {
         record
     };
     let counts = 1.4 * record.rad_per_mm / core::f64::consts::TAU * record.counts_per_turn;
-    let Refusal::Reversed(found) = refused(&changed(|count| -count)) else { panic!("not reversed") };
+    let NoDrive::Reversed(found) = refused(&changed(|count| -count)) else { panic!("not reversed") };
     assert!((f64::from(found) - counts).abs() < 0.1 * counts);
-    assert_eq!(refused(&changed(|_| 7)), Refusal::Still(0));
-    assert!(matches!(refused(&changed(|count| if count > 60 { count + 50 } else { count })), Refusal::Astray(_)));
+    assert_eq!(refused(&changed(|_| 7)), NoDrive::Still(0));
+    assert!(matches!(refused(&changed(|count| if count > 60 { count + 50 } else { count })), NoDrive::Astray(_)));
     // A memory that was full before the motions ended: the strokes in it count, but for the last.
     let full = record::Ended { reason: Reason::Full, value: 5_000 };
     let cut = Record { strokes: record.strokes[..25].to_vec(), ended: Some(full), ..record.clone() };
     let whole = Record { strokes: record.strokes[..24].to_vec(), ..record.clone() };
     assert_eq!(solve(&cut), solve(&whole));
     assert!(solve(&cut).is_ok());
-    assert_eq!(refused(&Record { strokes: record.strokes[..4].to_vec(), ..record.clone() }), Refusal::Few(2));
+    assert_eq!(refused(&Record { strokes: record.strokes[..4].to_vec(), ..record.clone() }), NoDrive::Few(2));
     let touched = record::Ended { reason: Reason::Touched, value: 50 };
-    assert_eq!(refused(&Record { ended: Some(touched), ..record }), Refusal::Ended(touched));
+    assert_eq!(refused(&Record { ended: Some(touched), ..record }), NoDrive::Ended(touched));
 }
 
 /// Something 0.02 to 0.8 mm away, every second time unseen by the array: as hard as glass under the tip, or soft.
@@ -282,7 +282,7 @@ fn in_the_way(count: usize) {
     let (mut reasons, mut through) = (Vec::new(), Vec::new());
     for number in 0..count {
         let mut rng = fastrand::Rng::with_seed(1000 + number as u64);
-        let draw = if number % 4 < 2 { Drive::ordinary } else { Drive::varied };
+        let draw = if number % 4 < 2 { SimulatedDrive::ordinary } else { SimulatedDrive::varied };
         let mut drive = draw(&mut rng);
         let kpa = [250.0, 40.0, 400.0][number % 3];
         drive.object = Some((0.02 + 0.78 * rng.f64(), kpa));
@@ -336,7 +336,7 @@ fn measure(rig: &mut Rig, strokes: usize) -> Record {
     let (mut check, mut length, mut begun, mut applied, mut full) = (CHECK, 0, 0, 0.0, false);
     while run.running() {
         let now = rig.view();
-        let view = View {
+        let view = StrokeInputs {
             encoder: now.count,
             force: Newtons::from_bits((now.force_n * 65_536.0) as i32),
             supply_mv: (1e3 * now.supply_v).round() as u16,
@@ -361,7 +361,7 @@ fn measure(rig: &mut Rig, strokes: usize) -> Record {
         applied = duty * now.supply_v;
         rig.frame(duty);
     }
-    assert_ne!(standing.state, State::Running);
+    assert_ne!(standing.state, MeasureState::Running);
     let [frame_ns, delay_ns] = [FRAME_S, DELAY_S].map(|time_s| (1e9 * time_s).round() as u32);
     let rows = (length / 4) as u32;
     let ended = if full { Ended::Full } else { standing.ended };

@@ -8,7 +8,7 @@ use crate::link::packet::{
     BROADCAST, CRC_START, HEADER, Packet, REPLY_MAX, Reply, Sender, StatusError, error_byte, instruction, update_crc,
 };
 use crate::link::snapshot::Snapshot;
-use crate::link::table::{self, READ_MAX, View};
+use crate::link::table::{self, READ_MAX, TableView};
 
 /// Longest pause in a packet that the devices share, ms, at the slowest speed too: after a longer one the bytes
 /// belong to another packet.
@@ -41,7 +41,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Device<ROWS, COLUMNS> {
         self.reply_delay_us = self.settings.return_delay_us();
         let mut sender = Sender::status(reply, self.settings.record.id, request.err(), self.stand.faulted);
         if let Ok(Request { address, length }) = request {
-            table::read(View { state: self, snapshot }, address, length, |byte| sender.push(byte));
+            table::read(TableView { state: self, snapshot }, address, length, |byte| sender.push(byte));
         }
         sender.finish();
     }
@@ -68,7 +68,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Device<ROWS, COLUMNS> {
         put(error_byte(readable.err(), self.stand.faulted));
         put(self.settings.record.id);
         match readable {
-            Ok(_) => table::read(View { state: self, snapshot }, request.address, request.length, &mut put),
+            Ok(_) => table::read(TableView { state: self, snapshot }, request.address, request.length, &mut put),
             Err(_) => (0..request.length).for_each(|_| put(0)),
         }
         for byte in update_crc(shared.crc, reply).to_le_bytes() {

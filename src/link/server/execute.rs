@@ -6,7 +6,7 @@ use crate::link::packet::{BROADCAST, Packet, Reply, Sender, StatusError, instruc
 
 use crate::link::settings::Saved;
 use crate::link::snapshot::Snapshot;
-use crate::link::table::{self, Staged, View, address};
+use crate::link::table::{self, Staged, TableView, address};
 
 use crate::store::Record;
 
@@ -97,7 +97,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Device<ROWS, COLUMNS> {
         }
         let mut sender = Sender::status(reply, id, None, self.stand.faulted);
         for (address, length) in [(address::MODEL_NUMBER, 2), (address::FIRMWARE_VERSION, 1)] {
-            table::read(View { state: self, snapshot }, address, length, |byte| sender.push(byte));
+            table::read(TableView { state: self, snapshot }, address, length, |byte| sender.push(byte));
         }
         sender.finish();
     }
@@ -137,7 +137,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Device<ROWS, COLUMNS> {
         Ok(())
     }
 
-    /// Executes an instruction that has a register of its own, requested by an option and a key against mistakes.
+    /// Executes an instruction that also has a register; an option selects it, and a key prevents mistakes.
     /// Other options are for functions that do not exist here.
     fn on_key(&mut self, params: &[u8], key: [u8; 5], request: u16) -> Result<(), StatusError> {
         let params: [u8; 5] = params.try_into().map_err(|_| StatusError::Length)?;

@@ -76,13 +76,13 @@ macro_rules! control_table {
 
         /// The value of an element, as its low bytes; 0 where there is no such register.
         pub(super) fn get<const ROWS: usize, const COLUMNS: usize>(
-            view: View<'_, ROWS, COLUMNS>,
+            view: TableView<'_, ROWS, COLUMNS>,
             address: u16,
             element: usize,
         ) -> u32 {
             match address {
                 $($address => {
-                    let get: fn(View<'_, ROWS, COLUMNS>, usize) -> u32 = $get;
+                    let get: fn(TableView<'_, ROWS, COLUMNS>, usize) -> u32 = $get;
                     get(view, element)
                 })*
                 _ => super::pictures::get(view, address, element),
@@ -169,7 +169,7 @@ impl Kind {
 pub struct Register {
     /// The constant in [`address`](super::address), or the field of [`Params`].
     pub name: &'static str,
-    /// Of its first byte.
+    /// Address of its first byte.
     pub address: u16,
     /// Format of its numbers.
     pub kind: Kind,

@@ -70,7 +70,7 @@ const fn data(address: u16) -> Cell {
 pub(super) static CELLS: [Cell; 4] =
     [addresses(INDIRECT_ADDRESS_1), data(INDIRECT_DATA_1), addresses(INDIRECT_ADDRESS_29), data(INDIRECT_DATA_29)];
 
-/// As their documentation has them.
+/// The indirect registers, as documented.
 pub(super) const REGISTERS: [Register; 4] = [
     register("INDIRECT_ADDRESS_1", addresses(INDIRECT_ADDRESS_1), 0xFFFF, Some(0), ADDRESS_DOC),
     register("INDIRECT_DATA_1", data(INDIRECT_DATA_1), 0xFF, None, DATA_DOC),

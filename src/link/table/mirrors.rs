@@ -21,7 +21,7 @@ macro_rules! mirrors {
         pub(super) static CELLS: [Cell; PLACES.len()] =
             [$(Cell { address: $address, ..Cell::of(registers::address::$of) }),*];
 
-        /// As their documentation has them.
+        /// The mirror registers, as documented.
         pub(super) const REGISTERS: &[Register] = &[$(Register {
             name: stringify!($name),
             address: $address,

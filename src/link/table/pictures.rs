@@ -1,6 +1,6 @@
 //! The tactile images of the array: registers whose number of values, and so their address, depends on its shape.
 //!
-//! The first image begins at [`FIRST`], or at [`FIRST_OF_MANY`], and each of the others at the next multiple of 256.
+//! The first image begins at [`FIRST`], or at [`FIRST_OF_MANY`], and each further image at the next multiple of 256.
 
 use crate::frame::Shape;
 
@@ -8,7 +8,7 @@ use crate::link::packet::StatusError;
 use crate::pressure::{GAIN_MAX, GAIN_ONE};
 
 use super::registers::FIXED;
-use super::{Access, Cell, Kind, Register, Staged, View, address};
+use super::{Access, Cell, Kind, Register, Staged, TableView, address};
 
 /// Address of the first image.
 pub(super) const FIRST: u16 = 768;
@@ -90,7 +90,7 @@ const fn after(cell: &Cell) -> u16 {
     cell.end().next_multiple_of(256)
 }
 
-/// As their documentation has them.
+/// The registers of the images, as documented.
 pub(super) const fn registers<const ROWS: usize, const COLUMNS: usize>() -> [Register; COUNT] {
     let cells = cells::<ROWS, COLUMNS>();
     [register(0, &cells), register(1, &cells), register(2, &cells), register(3, &cells)]
@@ -106,7 +106,7 @@ const fn register(picture: usize, cells: &[Cell; COUNT]) -> Register {
 
 /// Returns the value of an element; 0 if there is no such image.
 pub(super) fn get<const ROWS: usize, const COLUMNS: usize>(
-    view: View<'_, ROWS, COLUMNS>,
+    view: TableView<'_, ROWS, COLUMNS>,
     address: u16,
     element: usize,
 ) -> u32 {

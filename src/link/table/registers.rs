@@ -22,7 +22,7 @@ use super::values::{
 /// The defaults do not depend on the shape.
 type Record = store::Record<3, 3>;
 
-use super::{Access, Cell, Kind, Register, Staged, View, thousandths};
+use super::{Access, Cell, Kind, Register, Staged, TableView, thousandths};
 
 /// Model number: the letters FT.
 const MODEL: u16 = u16::from_le_bytes(*b"FT");
@@ -179,16 +179,16 @@ control_table! {
     /// The bridge's supply.
     312 SUPPLY_MV: U16 ReadOnly, "mV" * 1, 0 to 0xFFFF,
         |view, _| u32::from(view.snapshot.supply_mv);
-    /// From a frame's last conversion to the new duty, last time.
+    /// Time from a frame's last conversion to the new duty, of the last frame.
     314 LOOP_TIME_US: U16 ReadOnly, "us" * 1, 0 to 0xFFFF,
         |view, _| u32::from(view.snapshot.loop_time_us);
     /// The longest loop time since reset.
     316 LOOP_TIME_MAX_US: U16 ReadOnly, "us" * 1, 0 to 0xFFFF,
         |view, _| u32::from(view.snapshot.loop_time_max_us);
-    /// When the frame's last conversion ended, since the controller started; wraps after 71 minutes.
+    /// Time from the controller's start to the end of the frame's last conversion; wraps after 71 minutes.
     318 FRAME_TIME_US: U32 ReadOnly, "us" * 1, 0 to 0xFFFF_FFFF,
         |view, _| view.snapshot.frame_time_us;
-    /// From frame to frame, by the scan's parameters.
+    /// Time between two frames, by the scan's parameters.
     322 FRAME_PERIOD_NS: U32 ReadOnly, "ns" * 1, 0 to 0xFFFF_FFFF,
         |view, _| view.snapshot.frame_ns;
     /// Refused with the result error.
@@ -252,9 +252,9 @@ control_table! {
     /// Line of the source where it panicked; 0 where it is not known.
     394 CRASH_LINE: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
         |view, _| u32::from(view.snapshot.crash.line);
-    /// 1 does what a fault asks for before torque can be enabled again: resets a tripped bus watchdog, turns
-    /// torque off, takes the goal back and clears the fault. Refused with a result error while something stands
-    /// in the way: see recover_hindrance. Reads 0.
+    /// 1 does all that a fault requires before torque can be enabled again: resets a tripped bus watchdog, turns
+    /// torque off, sets the goal to 0 and clears the fault. Refused with a result error while
+    /// recover_hindrance is not 0. Reads 0.
     396 RECOVER: U8 ReadWrite, "" * 1, 0 to 1 = 0,
         |_, _| 0,
         set_recover;
@@ -265,18 +265,18 @@ control_table! {
     /// The option bytes as the last reset loaded them: FLASH_OPTCR of the microcontroller.
     484 OPTION_BYTES: U32 ReadOnly, "" * 1, 0 to 0xFFFF_FFFF,
         |view, _| view.snapshot.health.option_bytes;
-    /// The analogue supply, by the internal reference, over 256 frames; 0 where it is not known.
+    /// Analogue supply, measured by the internal reference over 256 frames; 0 if unknown.
     488 ANALOGUE_SUPPLY_MV: U16 ReadOnly, "mV" * 1, 0 to 0xFFFF,
         |view, _| u32::from(view.snapshot.health.analogue_mv);
-    /// The deepest that the stack has been since reset, looked up each second.
+    /// Largest stack use since reset, bytes, checked each second.
     490 STACK_BYTES: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
         |view, _| u32::from(view.snapshot.health.stack_bytes);
-    /// The longest that a frame's end came late to the processor: behind a critical section, or behind an
-    /// interrupt that is no less urgent.
+    /// Longest delay of a frame's end interrupt: by a critical section, or by an interrupt of the same or a
+    /// higher priority.
     492 FRAME_LATE_NS: U16 ReadOnly, "ns" * 1, 0 to 0xFFFF,
         |view, _| u32::from(view.snapshot.health.late_ns);
-    /// Frames that were there and not whole: a bank was missing. Those of missed_frames that are in none of
-    /// these four counts came and went unseen.
+    /// Incomplete frames: a bank was missing. Frames of missed_frames that none of these four registers counts
+    /// were not seen at all.
     494 BANK_MISSING: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
         |view, _| u32::from(view.snapshot.health.broken_frames[0]);
     /// The same: the banks were out of step with the rows.

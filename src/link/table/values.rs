@@ -12,8 +12,8 @@ use super::Staged;
 /// The bus watchdog's unit.
 const WATCHDOG_MS: u16 = 20;
 
-/// Torque enable: refused in a fault, after a tripped watchdog, where nobody confirmed which way the motor goes, before
-/// a tare, and after one while something touched the tip. Off takes the goal back.
+/// Sets torque enable. On is refused in a fault, after a tripped watchdog, with an unconfirmed motor direction, before
+/// a tare, and after a tare during which something touched the tip. Off sets the goal to 0.
 pub(super) fn set_torque<const ROWS: usize, const COLUMNS: usize>(
     staged: &mut Staged<ROWS, COLUMNS>,
     value: i64,

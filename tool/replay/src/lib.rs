@@ -31,9 +31,9 @@ pub struct Difference {
     pub frame: u32,
     /// Field that differs.
     pub field: Field,
-    /// Its value as captured.
+    /// Value in the capture.
     pub captured: i64,
-    /// Its value in the replay.
+    /// Value in the replay.
     pub replayed: i64,
 }
 
@@ -69,24 +69,24 @@ impl std::fmt::Display for Difference {
     }
 }
 
-/// Replays a capture; `each` is handed every frame with what the core reports here. It goes on behind a difference.
+/// Replays a capture and continues after a difference. `each` gets every frame with the status of the core here.
 ///
 /// # Errors
 /// The bytes are no capture that this version replays, or damaged.
 pub fn replay<const ROWS: usize, const COLUMNS: usize>(
     bytes: &[u8],
     clocks: &Clocks,
-    mut each: impl FnMut(&Taken<ROWS, COLUMNS>, &Status),
-) -> Result<Replayed<ROWS, COLUMNS>, Refusal> {
+    mut each: impl FnMut(&CapturedFrame<ROWS, COLUMNS>, &Status),
+) -> Result<Replayed<ROWS, COLUMNS>, ReplayError> {
     let (head, frames) = Frames::<ROWS, COLUMNS>::new(bytes)?;
-    let config = Shaped::new(&head.params, clocks).map_err(Refusal::Config)?;
+    let config = Shaped::new(&head.params, clocks).map_err(ReplayError::Config)?;
     let (captured, here) = (head.frame_ns, config.timing.frame_ns);
     if captured != here {
-        return Err(Refusal::FrameTime { captured, here });
+        return Err(ReplayError::FrameTime { captured, here });
     }
     let mut pipeline = Pipeline::new(&config);
     pipeline.calibrate(&Calibration::of(&head.gains));
-    let winding = Winding::of_words(&head.winding, &config).ok_or(Refusal::Damaged)?;
+    let winding = Winding::of_words(&head.winding, &config).ok_or(ReplayError::Damaged)?;
     pipeline.renew(head.taken, head.missed_frames, winding);
     let (mut difference, mut running) = (None, head.seed());
     for (frame, taken) in (0..).zip(frames) {
@@ -115,44 +115,44 @@ pub fn replay<const ROWS: usize, const COLUMNS: usize>(
 
 // The frames of a capture, read.
 
-/// Why bytes are no capture that this version replays.
+/// Reason why bytes cannot be replayed as a capture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Refusal {
-    /// They do not begin as a capture does.
+pub enum ReplayError {
+    /// The bytes do not begin like a capture.
     NoCapture,
-    /// Another version of the layout.
+    /// Capture with another version of the layout.
     Version(u8),
-    /// Of an array with other rows and columns.
+    /// Capture of an array with another number of rows or columns.
     Shape {
-        /// Its rows.
+        /// Number of rows in the capture.
         rows: u8,
-        /// Its columns.
+        /// Number of columns in the capture.
         columns: u8,
     },
-    /// Of a firmware with other parameters.
+    /// Capture of a firmware with another set of parameters.
     Layout,
-    /// It was not ended on the board.
+    /// Capture that was not ended on the board.
     Unfinished,
     /// Bytes are missing.
     Cut,
-    /// There is more than a capture.
+    /// Bytes follow the capture.
     Longer,
-    /// It is not as the board wrote it.
+    /// The capture has changed since the board wrote it.
     Damaged,
-    /// Parameters that make no configuration.
+    /// Parameters without a valid configuration.
     Config(ConfigError),
-    /// The scan's time by the parameters is another: other clocks.
+    /// Another frame time than the parameters give: the board had other clocks.
     FrameTime {
-        /// As captured, ns.
+        /// Frame time in the capture, ns.
         captured: u32,
-        /// By the parameters, ns.
+        /// Frame time by the parameters, ns.
         here: u32,
     },
-    /// The bits of a frame, counted from 0, make no frame.
+    /// Number, from 0, of a frame whose bits are invalid.
     Frame(u32),
 }
 
-impl std::fmt::Display for Refusal {
+impl std::fmt::Display for ReplayError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::NoCapture => f.write_str("no capture: it does not begin as one"),
@@ -178,11 +178,11 @@ impl std::fmt::Display for Refusal {
     }
 }
 
-impl std::error::Error for Refusal {}
+impl std::error::Error for ReplayError {}
 
-/// A frame as the board took it, and what it answered.
+/// A captured frame, and the answer of the board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Taken<const ROWS: usize, const COLUMNS: usize> {
+pub struct CapturedFrame<const ROWS: usize, const COLUMNS: usize> {
     /// The frame.
     pub frame: Frame<ROWS, COLUMNS>,
     /// Sensed values other than the frame.
@@ -209,29 +209,29 @@ pub struct Frames<'a, const ROWS: usize, const COLUMNS: usize> {
 }
 
 impl<'a, const ROWS: usize, const COLUMNS: usize> Frames<'a, ROWS, COLUMNS> {
-    /// Of a capture, and its beginning.
+    /// Reads the head of a capture; returns it and the frames.
     ///
     /// # Errors
     /// The bytes are no capture, or one of another array, layout or version; or the capture is damaged, shorter or longer
     /// than it says.
-    pub fn new(bytes: &'a [u8]) -> Result<(Head<ROWS, COLUMNS>, Self), Refusal> {
+    pub fn new(bytes: &'a [u8]) -> Result<(Head<ROWS, COLUMNS>, Self), ReplayError> {
         let head = read_head(bytes)?;
-        let body = bytes.get(Head::<ROWS, COLUMNS>::BYTES..).ok_or(Refusal::Cut)?;
+        let body = bytes.get(Head::<ROWS, COLUMNS>::BYTES..).ok_or(ReplayError::Cut)?;
         let need = head.bits.div_ceil(8) as usize;
         if body.len() < need {
-            return Err(Refusal::Cut);
+            return Err(ReplayError::Cut);
         }
         if body.len() > need {
-            return Err(Refusal::Longer);
+            return Err(ReplayError::Longer);
         }
         if check(body, head.bits) != head.check {
-            return Err(Refusal::Damaged);
+            return Err(ReplayError::Damaged);
         }
         let frames = Self { bits: Reader::new(body, head.bits), last: Last::NONE, read: 0, count: head.frames };
         Ok((head, frames))
     }
 
-    fn take(&mut self) -> Option<Taken<ROWS, COLUMNS>> {
+    fn take(&mut self) -> Option<CapturedFrame<ROWS, COLUMNS>> {
         let (bits, last) = (&mut self.bits, &mut self.last);
         let step = bits.signed(width::SEQUENCE)?.cast_unsigned().wrapping_add(1);
         let sequence = last.frame.sequence.wrapping_add(step);
@@ -251,12 +251,12 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> Frames<'a, ROWS, COLUMNS> {
             *code = unfold(folded, *code);
         }
         *last = Last { frame, sense, command, duty, spread, ..*last };
-        Some(Taken { frame, sense, command, duty: Duty(duty), mode: last.mode, fault: last.fault, digest })
+        Some(CapturedFrame { frame, sense, command, duty: Duty(duty), mode: last.mode, fault: last.fault, digest })
     }
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Iterator for Frames<'_, ROWS, COLUMNS> {
-    type Item = Result<Taken<ROWS, COLUMNS>, Refusal>;
+    type Item = Result<CapturedFrame<ROWS, COLUMNS>, ReplayError>;
 
     /// The next frame; after one that makes no sense there are no more.
     fn next(&mut self) -> Option<Self::Item> {
@@ -270,7 +270,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Iterator for Frames<'_, ROWS, COLU
             Some(taken) if !over => Some(Ok(taken)),
             _ => {
                 self.count = self.read;
-                Some(Err(Refusal::Frame(self.read - 1)))
+                Some(Err(ReplayError::Frame(self.read - 1)))
             }
         }
     }
@@ -316,29 +316,29 @@ fn command(bits: &mut Reader<'_>, last: &Command) -> Option<Command> {
 ///
 /// # Errors
 /// The bytes are no capture, or one of another array, layout or version.
-fn read_head<const ROWS: usize, const COLUMNS: usize>(bytes: &[u8]) -> Result<Head<ROWS, COLUMNS>, Refusal> {
+fn read_head<const ROWS: usize, const COLUMNS: usize>(bytes: &[u8]) -> Result<Head<ROWS, COLUMNS>, ReplayError> {
     let mut words = bytes.as_chunks::<4>().0.iter().copied();
-    let mut next = || words.next().ok_or(Refusal::Cut);
+    let mut next = || words.next().ok_or(ReplayError::Cut);
     let magic = next()?;
     if magic[..3] != MAGIC[..3] {
-        return Err(Refusal::NoCapture);
+        return Err(ReplayError::NoCapture);
     }
     if magic != MAGIC {
-        return Err(Refusal::Version(magic[3]));
+        return Err(ReplayError::Version(magic[3]));
     }
     let [rows, columns, ended, zero] = next()?;
     if [usize::from(rows), usize::from(columns)] != [ROWS, COLUMNS] {
-        return Err(Refusal::Shape { rows, columns });
+        return Err(ReplayError::Shape { rows, columns });
     }
     if u32::from_le_bytes(next()?) != LAYOUT {
-        return Err(Refusal::Layout);
+        return Err(ReplayError::Layout);
     }
-    let ended = Ended::of(ended).filter(|&ended| ended != Ended::No).ok_or(Refusal::Unfinished)?;
+    let ended = Ended::of(ended).filter(|&ended| ended != Ended::No).ok_or(ReplayError::Unfinished)?;
     let [frames, bits] = [u32::from_le_bytes(next()?), u32::from_le_bytes(next()?)];
     let [digest, check] = [u32::from_le_bytes(next()?), u32::from_le_bytes(next()?)];
     let missed_frames = u32::from_le_bytes(next()?);
-    let taken = pipeline::Taken::from_word(u32::from_le_bytes(next()?)).filter(|_| zero == 0);
-    let taken = taken.ok_or(Refusal::Damaged)?;
+    let taken = pipeline::AcknowledgedRequests::from_word(u32::from_le_bytes(next()?)).filter(|_| zero == 0);
+    let taken = taken.ok_or(ReplayError::Damaged)?;
     let frame_ns = u32::from_le_bytes(next()?);
     let mut winding = [0; control::WINDING_WORDS];
     for word in &mut winding {
@@ -351,7 +351,7 @@ fn read_head<const ROWS: usize, const COLUMNS: usize>(bytes: &[u8]) -> Result<He
     let mut gains = Gains::ONE;
     for word in 0..Gains::<ROWS, COLUMNS>::WORDS {
         if !gains.set_word(word, u32::from_le_bytes(next()?)) {
-            return Err(Refusal::Damaged);
+            return Err(ReplayError::Damaged);
         }
     }
     let params = Params::from_array(&values);
@@ -370,7 +370,7 @@ pub struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// From the first bit on.
+    /// Reader at the first bit.
     pub fn new(bytes: &'a [u8], bits: u32) -> Self {
         Self { bytes, at: 0, end: bits }
     }

@@ -8,7 +8,7 @@ use crate::messages::device;
 use crate::state::unix_ns;
 use crate::whole::Part;
 use crate::{Client, Error, numbers, table};
-use fingertip::capture::State;
+use fingertip::capture::CaptureState;
 use fingertip::shipped::address;
 use fingertip::state::Limits;
 use serde_json::json;
@@ -18,9 +18,9 @@ use std::time::{Duration, Instant};
 /// Interval of the checks.
 const LOOK: Duration = Duration::from_millis(5);
 /// `CAPTURE_STATE`.
-const ARMED: i64 = State::Armed as i64;
-const RECORDING: i64 = State::Recording as i64;
-const DONE: i64 = State::Done as i64;
+const ARMED: i64 = CaptureState::Armed as i64;
+const RECORDING: i64 = CaptureState::Recording as i64;
+const DONE: i64 = CaptureState::Done as i64;
 /// Licence of contributed captures.
 const LICENCE: &str = "Apache-2.0 OR MIT, as the project: contributed by who captured it";
 
@@ -43,10 +43,10 @@ pub struct Args {
     /// Number of frames after which the capture ends; without it, when the memory is full
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     frames: Option<u32>,
-    /// The board: what it is, and what hangs on it
+    /// Description of the board and its connections
     #[arg(long, default_value = "not told")]
     board: String,
-    /// The image on it, by its SHA-256 as `cargo xtask flash` prints it
+    /// Image on the board, by its SHA-256 as `cargo xtask flash` prints it
     #[arg(long, default_value = "not told")]
     image: String,
     /// Notes: object, distance, what happened
@@ -73,14 +73,14 @@ impl Args {
 /// Arms a capture, tares and, where asked to, presses; reads what the board kept, and writes it as a file.
 ///
 /// # Errors
-/// There is a fault, torque is on, the capture does not start, or the file cannot be written.
+/// The controller is in fault, torque is on, the capture does not start, or the file cannot be written.
 pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     no_fault(client)?;
     motion::alone(client)?;
     if client.number(address::TORQUE_ENABLE)? != 0 {
         return Err("torque is on: a capture begins with a tare, for which the tip must be free".into());
     }
-    if client.number(address::CAPTURE_STATE)? == State::Recording as i64 {
+    if client.number(address::CAPTURE_STATE)? == CaptureState::Recording as i64 {
         client.set(address::CAPTURE, 0)?;
     }
     if args.press.is_some() {

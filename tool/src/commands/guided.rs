@@ -109,8 +109,8 @@ impl Ask {
     /// Asks until the answer can be parsed. `idle` runs every 50 ms meanwhile. `option` gives the answer without a question.
     ///
     /// # Errors
-    /// With `--json` there are no questions; the text names the option. Nobody answers, a signal came, or three answers
-    /// were wrong.
+    /// With `--json` no question is possible; the text names the option instead. Without it: the input ended, a signal
+    /// came, or three answers were wrong.
     pub fn parsed<T>(
         &self,
         question: &str,

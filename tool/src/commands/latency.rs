@@ -14,7 +14,7 @@ const LENGTH: u16 = 54;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  fingertip latency --seconds 10")]
 pub struct Args {
-    /// For how long
+    /// Duration of the measurement
     #[arg(long, default_value_t = 5.0, value_parser = numbers::seconds)]
     seconds: f64,
 }

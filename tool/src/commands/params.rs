@@ -3,7 +3,7 @@
 pub(super) mod file;
 
 use super::{say, say_json};
-use crate::state::ANEW;
+use crate::state::RESTARTED;
 use crate::table::{self, name};
 use crate::{Client, Error};
 use fingertip::link::table::Register;
@@ -15,7 +15,7 @@ use serde_json::{Map, json};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// Of `SAVED_STATE`.
+/// Values of `SAVED_STATE`.
 const SAME: i64 = 0;
 const CHANGED: i64 = 1;
 /// A save makes the core wait for the flash.
@@ -58,7 +58,7 @@ pub enum Command {
     },
     /// Set all that a file has, all of them or none; address and bus speed stay
     Restore {
-        /// What `backup` wrote
+        /// File that `backup` wrote
         file: PathBuf,
         /// Keep them over a reset
         #[arg(long)]
@@ -66,7 +66,7 @@ pub enum Command {
     },
     /// Show what differs from a file, or from the defaults
     Diff {
-        /// What `backup` wrote; the defaults without it
+        /// File that `backup` wrote; the defaults without it
         file: Option<PathBuf>,
     },
 }
@@ -137,7 +137,7 @@ fn read_all(client: &mut Client) -> Result<Vec<Value>, Error> {
     table::stored().map(read).collect()
 }
 
-/// As [`change`], with the taxels' gains.
+/// Like [`change`], with the taxels' gains.
 fn restore(
     values: &[Value],
     gains: Option<&[Vec<u16>]>,
@@ -192,7 +192,7 @@ pub(super) fn save(client: &mut Client, json: bool) -> Result<(), Error> {
     let saved = saved?;
     // A controller that restarted has the values of the flash, and reports no difference.
     if saved == SAME && read_all(client)? != meant {
-        return Err(format!("not saved: {ANEW}, and has what the flash holds. Set them again").into());
+        return Err(format!("not saved: {RESTARTED}, and has what the flash holds. Set them again").into());
     }
     match saved {
         SAME if json => Ok(()),
@@ -280,16 +280,16 @@ fn told(json: bool, values: &[Value], text: &str) {
 // Sets stored registers, all of them or none.
 //
 // The parameters lie side by side, so they go out in one packet, which the controller takes whole or not at all. The
-// few others have a packet each: where one is refused, what was set before is put back.
+// few others have a packet each: if one is refused, earlier changes are undone.
 
-/// A register, what it was, and what it is now.
+/// A register, its old value, and its new one.
 pub(in crate::commands) type Changed = (&'static Register, i64, i64);
 
-/// Sets them; what changed.
+/// Sets parameters; returns those that changed.
 ///
 /// # Errors
-/// Something is wrong with a value, or torque is on: nothing was changed. Or the controller refused: the text says how
-/// it stands.
+/// Something is wrong with a value, or torque is on: nothing was changed. Or the controller refused: the text says
+/// what was changed nevertheless.
 pub(in crate::commands) fn set(values: &[Value], client: &mut Client) -> Result<Vec<Changed>, Error> {
     let wrong: Vec<String> = values.iter().filter_map(wrong).chain(twice(values)).collect();
     if !wrong.is_empty() {

@@ -2,7 +2,7 @@
 
 use super::moving::Moving;
 use super::{Interrupt, aside, no_fault, say, say_json, stopped};
-use crate::state::{ANEW, Clock, State};
+use crate::state::{Clock, RESTARTED, State};
 use crate::{Client, Error, numbers, table};
 use fingertip::shipped::address;
 use fingertip::state::{Limits, Mode};
@@ -63,7 +63,7 @@ struct Held {
 /// Touches, holds, releases, turns torque off. Whatever ends it, it releases before.
 ///
 /// # Errors
-/// There is a fault, the tip is not tared, or the force is not reached or not held.
+/// The controller is in fault, the tip is not tared, or the force is not reached or not held.
 pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     no_fault(client)?;
     if Limits(client.number(address::LIMITS)? as u16).has(Limits::NOT_TARED) {
@@ -150,7 +150,7 @@ fn press(args: &Args, client: &mut Client, json: bool, clear: &str, interrupt: &
     let mut near_s = None;
     loop {
         let state = client.again(State::read)?;
-        let time_s = clock.time_s(&state).ok_or(ANEW)?;
+        let time_s = clock.time_s(&state).ok_or(RESTARTED)?;
         if state.fault != 0 {
             return Err(stopped(state.fault));
         }

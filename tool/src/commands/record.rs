@@ -2,7 +2,7 @@
 
 use super::{Interrupt, aside, say_json};
 use crate::messages::{Topic, device};
-use crate::state::{ANEW, SHAPE, Stamp, Stamps, State};
+use crate::state::{RESTARTED, SHAPE, Stamp, Stamps, State};
 use crate::whole::Part;
 use crate::{Client, Error, numbers};
 use clap::ValueEnum;
@@ -34,19 +34,19 @@ const BUFFER: usize = 1 << 20;
 pub struct Args {
     /// The file, `.csv` or `.mcap`; `-` is the standard output, as CSV without --format
     file: PathBuf,
-    /// For how long; without it, until Ctrl-C
+    /// Duration; without it, until Ctrl-C
     #[arg(long, value_parser = numbers::seconds)]
     seconds: Option<f64>,
     /// Requested states per second; 0 requests as fast as answers come
     #[arg(long, default_value_t = 200.0, value_parser = numbers::rate_hz_or_all)]
     rate_hz: f64,
-    /// With the pressure of each taxel
+    /// Also records the pressure of each taxel
     #[arg(long)]
     pressures: bool,
     /// Write over a file that is there
     #[arg(long)]
     force: bool,
-    /// In place of what the file's name ends with
+    /// Format, if not by the end of the file's name
     #[arg(long, value_enum)]
     format: Option<Format>,
 }
@@ -64,9 +64,9 @@ pub enum Format {
 trait Sink {
     /// One more, with its times.
     fn put(&mut self, stamp: &Stamp, state: &State) -> io::Result<()>;
-    /// Hands on what was put, readable as it is.
+    /// Writes out all samples so far, so that the file is readable.
     fn flush(&mut self) -> io::Result<()>;
-    /// There are no more.
+    /// Ends the file.
     fn finish(self: Box<Self>) -> io::Result<()>;
 }
 
@@ -126,7 +126,7 @@ struct Counts {
     last_s: f64,
 }
 
-/// Takes states until something ends it: what was counted, and what was lost.
+/// Records states until an end; returns the counts, and the reason of a loss.
 fn take(
     args: &Args,
     client: &mut Client,
@@ -141,7 +141,7 @@ fn take(
         match read {
             Ok(state) => {
                 row = 0;
-                let Some(stamp) = stamps.stamp(&state) else { return Ok((counts, Some(ANEW.into()))) };
+                let Some(stamp) = stamps.stamp(&state) else { return Ok((counts, Some(RESTARTED.into()))) };
                 if args.seconds.is_some_and(|seconds| stamp.time_s > seconds) {
                     break;
                 }

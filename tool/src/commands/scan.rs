@@ -18,7 +18,7 @@ pub struct Args {
 /// Lists the devices that answer.
 ///
 /// # Errors
-/// Nothing is, or the port that was named cannot be opened.
+/// No controller is found, or the named port cannot be opened.
 pub fn run(args: &Args, reach: &Reach, json: bool) -> Result<(), Error> {
     let ports = reach.port.clone().map_or_else(line::ports, |port| vec![port]);
     if ports.is_empty() {

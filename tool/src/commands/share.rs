@@ -28,9 +28,9 @@ const READS: [u8; 6] = [
     instruction::BULK_READ,
     instruction::FAST_BULK_READ,
 ];
-/// Registers to which everybody may write 0: to stop a finger.
+/// Registers to which every client may write 0, to stop a finger.
 const STOPS: [u16; 2] = [address::TORQUE_ENABLE, address::GOAL_FORCE_MN];
-/// Longest release of a finger whose client left, in seconds of the controller's clock. Others wait for so long.
+/// Longest release of a finger whose client left, s of the controller's clock. Other clients wait that long.
 const RELEASE_S: f64 = 0.5;
 /// Longest wait for a client that does not take its answers.
 const SLOW: Duration = Duration::from_secs(1);
@@ -54,7 +54,7 @@ pub struct Args {
     listen: SocketAddr,
 }
 
-/// The bus and who commands on it.
+/// The bus, and the client that commands on it.
 struct Bus {
     client: Client,
     commander: Option<Commander>,

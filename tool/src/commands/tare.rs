@@ -8,7 +8,7 @@ use fingertip::state::Limits;
 use serde_json::json;
 use std::time::Duration;
 
-/// Of `TARE_STATE`.
+/// Values of `TARE_STATE`.
 const RUNNING: i64 = 1;
 const DONE: i64 = 2;
 

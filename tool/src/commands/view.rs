@@ -120,9 +120,9 @@ fn watch(
 
 /// Columns of characters for a taxel: three digits of kPa and a space.
 const TAXEL: u16 = 4;
-/// Of 256 colours, from what is not pressed to what is pressed most.
+/// Terminal colours (of 256), from no pressure to the highest.
 const HEAT: [u8; 10] = [234, 17, 18, 54, 90, 126, 161, 196, 208, 226];
-/// From which of them on writing is dark.
+/// First of these colours on which the text is dark.
 const BRIGHT: usize = 8;
 /// Least pressure of the hottest colour, Pa.
 const HOTTEST_PA: i64 = 20_000;

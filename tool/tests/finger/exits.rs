@@ -15,7 +15,7 @@ fn said(child: &mut Child, begin: &str) {
         assert!(reader.read_line(&mut line).expect("text") > 0, "no line begins with {begin}: {all}");
         all += &line;
     }
-    // What comes later is for nobody, and must not block the program.
+    // Later output is read and dropped, so that it does not block the program.
     std::thread::spawn(move || reader.read_to_end(&mut Vec::new()));
 }
 

@@ -303,7 +303,7 @@ fn resumes(procedure: &[&str], end: End, packets: u64, reference: &Value) -> (bo
         }
     }
     child.wait().expect("it ends");
-    // After a loss of power nothing drives the finger away: the motor's friction holds the tip where it stands.
+    // After a loss of power nothing drives the finger away: the motor's friction holds the tip in place.
     let left_n = if matches!(end, End::Power) { FRICTION_N } else { RESIDUAL_N };
     let ended_s = finger.now_s();
     while finger.now_s() < ended_s + 1.0 {
@@ -312,8 +312,8 @@ fn resumes(procedure: &[&str], end: End, packets: u64, reference: &Value) -> (bo
     let state = finger.command("state");
     assert!(finger.true_force_n() < left_n, "{what}: {state}");
     if matches!(end, End::Power) {
-        let stands = finger.command("state");
-        assert_eq!(stands, state, "{what}: it stands");
+        let later = finger.command("state");
+        assert_eq!(later, state, "{what}: it rests");
         // The report of a tare asks for this: free the tip.
         finger.command("remove");
         finger.command("put");

@@ -1,4 +1,4 @@
-//! Recordings: their times, whose they are, and what is left of one whose program was killed.
+//! Recordings: their times, their owners, and the rest of one whose program was killed.
 
 use crate::served::Served;
 use mcap::read::Options;

@@ -1,7 +1,7 @@
 //! The image of `cargo xtask bringup`: measures a bare NUCLEO-F446RE with the firmware's own board layer, closes the
 //! loop on a finger that it simulates, and reports all of it on the virtual COM port.
 //!
-//! It judges nothing: `bringup::checks` does, on the host. What ends in a reset comes first, see `stages`.
+//! It judges nothing: `bringup::checks` does, on the host. Checks that end in a reset come first, see `stages`.
 #![no_std]
 #![no_main]
 
@@ -39,7 +39,7 @@ use cortex_m::peripheral::DWT;
 use defmt_rtt as _;
 use fingertip::control::Winding;
 use fingertip::link::snapshot::CrashCause;
-use fingertip::pipeline::Taken;
+use fingertip::pipeline::AcknowledgedRequests;
 use fingertip::shipped::{Config, Pipeline};
 use stages::{Kept, Stage};
 use static_cell::{ConstStaticCell, StaticCell};
@@ -114,7 +114,7 @@ fn main() -> ! {
     on_chip::run(bench, pipeline);
     converters::noise(&mut scan, bench, pipeline);
     scan.stop();
-    pipeline.renew(Taken::default(), 0, Winding::new());
+    pipeline.renew(AcknowledgedRequests::default(), 0, Winding::new());
     report::number("loop_bits", bench.digest(pipeline));
     kernels::run(config, bench, pipeline);
     report::end();
@@ -127,7 +127,7 @@ fn make_config() -> &'static Config {
     CONFIG.init(config)
 }
 
-/// A function of its own, because a pipeline that is being made takes most of the stack only here.
+/// Makes the pipeline. A separate function, so that its large temporaries take stack only here.
 #[inline(never)]
 fn make_pipeline(config: &Config) -> &'static mut Pipeline {
     PIPELINE.init_with(|| Pipeline::new(config))

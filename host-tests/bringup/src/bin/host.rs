@@ -20,7 +20,7 @@ struct Arguments {
     /// The ST-LINK's virtual COM port.
     #[arg(long, value_name = "PORT")]
     port: PathBuf,
-    /// SHA-256 of what was flashed.
+    /// SHA-256 of the flashed image.
     #[arg(long, value_name = "SHA-256")]
     sha256: String,
     /// Number of frames for which the rows are read back.

@@ -6,7 +6,7 @@ use core::hint::black_box;
 /// The core's cycle counter.
 const CYCCNT: u32 = 0xE000_1004;
 
-/// Arguments of a call by the hard-float calling convention; afterwards what it returned.
+/// Arguments of a call by the hard-float calling convention; after the call its results.
 #[derive(Clone, Copy, Default)]
 #[repr(C)]
 pub struct Registers {

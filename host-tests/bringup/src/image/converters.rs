@@ -1,5 +1,5 @@
-//! The converters: their noise beside the running step, what the first one tells of the microcontroller, and when a
-//! sample ends by a step of the DAC, which is on the pin of column 5.
+//! The converters: their noise beside the running step, the supply and temperature that the first one measures, and the
+//! end of a sample, found by a step of the DAC on the pin of column 5.
 
 use bringup::script::Bench;
 use cortex_m::peripheral::DWT;
@@ -19,7 +19,7 @@ const MIDDLE: u16 = 2_048;
 const COLUMN: usize = 5;
 /// The slot in which it steps.
 const SLOT: usize = 2;
-/// The step, and what a sample that saw it is above.
+/// Code of the step, and threshold above which a sample includes the step.
 const STEP: u16 = 3_000;
 const SEEN: u16 = 1_500;
 /// Ticks of the scan's timer between two places of the step.
@@ -81,7 +81,7 @@ fn start_dac() {
     });
 }
 
-/// From the trigger to the end of the column's sample: the latest step that it still sees.
+/// Measures the time from the trigger to the end of the column's sample: the latest step of the DAC that it includes.
 pub fn sample_instant(scan: &mut scan::Scan, timing: ScanTiming) {
     start_dac();
     let (from, to) = (timing.settle.0 as u16, timing.slot.0 as u16);
@@ -99,7 +99,7 @@ pub fn sample_instant(scan: &mut scan::Scan, timing: ScanTiming) {
     }
 }
 
-/// Steps up at a tick of the slot; when that was, and what the column's code became of it.
+/// Steps the DAC up at a tick of the slot; returns the actual tick, and the column's code.
 fn step_at(scan: &mut scan::Scan, at: u16) -> Option<(u16, u16)> {
     let set = |code: u16| pac::DAC1.dhr12r(0).write(|w| w.set_dhr(code));
     let stepped = cortex_m::interrupt::free(|_| {

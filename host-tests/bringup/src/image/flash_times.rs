@@ -1,4 +1,4 @@
-//! Times of the flash, in a parameter sector that is blank and blank again afterwards: what is stored stays.
+//! Times of the flash, in a blank parameter sector that is erased again afterwards: stored parameters are kept.
 
 use cortex_m::peripheral::DWT;
 use embassy_stm32::Peri;

@@ -3,13 +3,13 @@
 
 use bringup::script::{Bench, RECORDS};
 use fingertip::control::Winding;
-use fingertip::pipeline::Taken;
+use fingertip::pipeline::AcknowledgedRequests;
 use fingertip::shipped::Pipeline;
 use images::record::Record;
 
 use crate::host::fail;
 
-/// As `study few` writes them.
+/// Inputs written by `study few`.
 static BYTES: &[u8] = include_bytes!("../inputs.bin");
 
 /// Address of the next byte.
@@ -20,7 +20,7 @@ pub struct Inputs<'a> {
 }
 
 impl<'a> Inputs<'a> {
-    /// From the start. Takes what makes the records.
+    /// Inputs from the start; bench and pipeline make the records.
     pub fn new(bench: &'a mut Bench, pipeline: &'a mut Pipeline) -> Self {
         Self { place: 0, bench, pipeline }
     }
@@ -57,7 +57,7 @@ impl<'a> Inputs<'a> {
     pub fn seek(&mut self, place: usize) {
         if place >= BYTES.len() {
             self.bench.restart();
-            self.pipeline.renew(Taken::default(), 0, Winding::new());
+            self.pipeline.renew(AcknowledgedRequests::default(), 0, Winding::new());
         }
         self.place = place;
     }

@@ -34,7 +34,7 @@ pub fn run(bench: &mut Bench, pipeline: &mut Pipeline) {
                 break newest;
             }
             if passed(since, 10_000 * CYCLES_PER_US) {
-                return report::say(format_args!("the scan stands"));
+                return report::say(format_args!("the scan has stopped"));
             }
         };
         // The first may have waited.

@@ -28,7 +28,7 @@ const LOOKS: u32 = 50_000;
 /// The external clock by the internal one, which runs the core just now; `None` without a capture.
 pub fn external_by_internal() -> Option<f32> {
     pac::RCC.apb2enr().modify(|w| w.set_tim11en(true));
-    // A megahertz, as the manual asks for.
+    // 1 MHz, as the manual requires.
     pac::RCC.cfgr().modify(|w| w.set_rtcpre(8));
     let timer = pac::TIM11;
     // SAFETY: the option register of TIM11, which nothing else uses.

@@ -1,5 +1,5 @@
-//! Lines on the virtual COM port, USART2 at 115,200 baud: what any terminal shows without a set-up, and what needs no
-//! probe's program to be read.
+//! Lines on the virtual COM port, USART2 at 115,200 baud: any terminal shows them without a set-up or a probe's
+//! program.
 
 use core::fmt::{Arguments, Write};
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -40,7 +40,7 @@ pub fn set_baud(baud: u32) {
     pac::USART2.cr1().modify(|w| w.set_ue(true));
 }
 
-/// A line that is no part of the report: how far it is.
+/// Prints a progress line, which is not part of the report.
 pub fn say(words: Arguments) {
     let _ = writeln!(Port, "# {words}");
 }
@@ -61,12 +61,12 @@ pub fn figure(name: &str, value: f32) {
     line(format_args!("figure {name} {value:.4}"));
 }
 
-/// A whole number of the report, to its last digit.
+/// Reports a whole number with all digits.
 pub fn number(name: &str, value: u32) {
     line(format_args!("figure {name} {value}"));
 }
 
-/// A kernel's cycles, their median and the most.
+/// Reports median and maximum of a kernel's cycles.
 pub fn cycles(kernel: &str, median: u32, most: u32) {
     line(format_args!("cycles {median} {most} {kernel}"));
 }
@@ -129,7 +129,7 @@ impl Write for Port {
     }
 }
 
-/// The port, and the check that goes on.
+/// The port, with the running check.
 struct Checked;
 
 impl Write for Checked {

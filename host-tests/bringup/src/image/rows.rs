@@ -8,7 +8,7 @@ use fingertip::shipped::ROWS;
 use crate::{CYCLES_PER_US, passed, report};
 
 const ALL: u32 = (1 << ROWS) - 1;
-/// A slow edge is over by then: 200 ns.
+/// Time after which a slow edge has ended: 200 ns.
 const EDGE_CYCLES: u32 = 34;
 /// Number of progress lines.
 const LINES: u32 = 10;
@@ -20,9 +20,9 @@ pub fn run(frames: u32) {
     // The scan needs no processor; its interrupts would only be late here.
     interrupt::DMA2_STREAM1.disable();
     interrupt::DMA2_STREAM2.disable();
-    let mut seen = Seen { frames: 0, wrong: 0, least: u32::MAX, most: 0, frame_cycles: 0, stands: false };
+    let mut seen = Seen { frames: 0, wrong: 0, least: u32::MAX, most: 0, frame_cycles: 0, stopped: false };
     // A line takes many slots: the watch restarts behind it.
-    while seen.frames < frames && !seen.stands {
+    while seen.frames < frames && !seen.stopped {
         seen.watch(frames.min(seen.frames + frames / LINES + 1));
         report::say(format_args!("rows: {} frames", seen.frames));
         report::flush();
@@ -48,10 +48,10 @@ struct Seen {
     wrong: u32,
     least: u32,
     most: u32,
-    /// Of all frames.
+    /// Cycles of all frames.
     frame_cycles: u64,
-    /// The rows do not move.
-    stands: bool,
+    /// True if the rows do not move.
+    stopped: bool,
 }
 
 fn driven() -> u32 {
@@ -71,7 +71,7 @@ impl Seen {
         while self.frames < frames {
             if driven() == rows {
                 if passed(looked, 1_000 * CYCLES_PER_US) {
-                    (self.stands, self.wrong) = (true, self.wrong + 1);
+                    (self.stopped, self.wrong) = (true, self.wrong + 1);
                     return;
                 }
                 continue;

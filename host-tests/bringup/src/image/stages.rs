@@ -1,4 +1,4 @@
-//! What ends in a reset, one after another, and what is kept through it: in memory that a start leaves alone.
+//! Checks that end in a reset, one after another. Their state is in memory that start-up does not clear.
 
 use core::mem::MaybeUninit;
 use cortex_m::peripheral::{DWT, SCB};
@@ -13,23 +13,23 @@ use crate::{CYCLES_PER_US, passed, report};
 /// Next stage.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
-    /// For the host.
+    /// Waits for the host.
     Waits,
-    /// The window watchdog bites.
+    /// Reset by the window watchdog.
     Window,
-    /// The independent watchdog bites.
+    /// Reset by the independent watchdog.
     Independent,
-    /// A store below the stack's foot.
+    /// Fault by a store below the stack.
     Foot,
-    /// All else.
+    /// All other checks.
     Rest,
 }
 
 const MAGIC: u32 = 0x4252_5550;
 const STAGES: [Stage; 5] = [Stage::Waits, Stage::Window, Stage::Independent, Stage::Foot, Stage::Rest];
-/// A watchdog that has not bitten by then will not: twice the independent one's longest time.
+/// Time after which a reset by a watchdog is no longer expected: twice the longest time of the independent one.
 const BITES_BY: u32 = 50_000 * CYCLES_PER_US;
-/// The independent watchdog has taken its time by then: a millisecond.
+/// Time after which the independent watchdog has accepted its new period: 1 ms.
 const TAKES_BY: u32 = 1_000 * CYCLES_PER_US;
 /// The word below RAM.
 const BELOW_RAM: *mut u32 = 0x1FFF_FFFC as *mut u32;
@@ -93,7 +93,7 @@ pub fn window(kept: Kept, independent: Peri<'static, IWDG>, window: Peri<'static
     bitten(Kept { stage: Stage::Independent, ..kept }, 0)
 }
 
-/// Lets the independent watchdog bite, while the other waits for as long as it can.
+/// Waits for a reset by the independent watchdog, with the longest time for the other one.
 pub fn independent(kept: Kept, independent: Peri<'static, IWDG>, window: Peri<'static, WWDG>, timing: ScanTiming) -> ! {
     let mut dogs = Watchdogs::new(independent, window);
     dogs.start();
@@ -104,7 +104,7 @@ pub fn independent(kept: Kept, independent: Peri<'static, IWDG>, window: Peri<'s
     bitten(Kept { stage: Stage::Foot, ..kept }, 1)
 }
 
-/// Notes how long it waits until it is reset.
+/// Records the time until the reset.
 fn bitten(mut kept: Kept, dog: usize) -> ! {
     let since = DWT::cycle_count();
     while !passed(since, BITES_BY) {
@@ -119,7 +119,7 @@ fn bitten(mut kept: Kept, dog: usize) -> ! {
 /// Stores below RAM, as a stack that runs over does: a hard fault, whose handler resets.
 pub fn foot(kept: Kept) -> ! {
     Kept { stage: Stage::Rest, ..kept }.store();
-    // SAFETY: nothing lies there; the memory protection unit refuses it, and where it does not nothing is lost.
+    // SAFETY: nothing is stored there; the memory protection unit refuses the write, and without it nothing is lost.
     unsafe { BELOW_RAM.write_volatile(0) };
     SCB::sys_reset()
 }

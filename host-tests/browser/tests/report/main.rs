@@ -49,7 +49,7 @@ fn a_report_of_two_fingers_has_nothing_wrong() {
     nothing_is_wrong("grasp");
 }
 
-/// A scene, what it looked like, and how it went.
+/// Runs a scene; returns it with its trace and its outcome.
 fn ran(name: &str) -> (Scene, Trace, Outcome) {
     let scene = format!("{}/host-tests/sim/tests/left_behind/{name}.toml", env!("FINGERTIP_ROOT"));
     let scene = cli::load(&scene, &[], None).unwrap();

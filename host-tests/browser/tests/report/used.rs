@@ -7,7 +7,7 @@ use sim::report::{Over, Report, page};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Writes the wall's report, with what is changed in its scene's name and about, over another one or not.
+/// Writes the report of the wall scene with a changed name and `about`, over another report or alone.
 fn write(path: &Path, name: &str, over: Option<&Over>) -> String {
     let (mut scene, trace, outcome) = ran("wall");
     scene.name = name.into();
@@ -107,7 +107,7 @@ fn a_drag_zooms_all_plots_and_a_double_click_shows_the_whole_run() {
     assert!(events(&browser, &address(&path)).is_empty(), "{:?}", events(&browser, &address(&path)));
 }
 
-/// Moves the slider to a thousandth of what is shown.
+/// Moves the slider to a position in thousandths of the shown range.
 fn slide(browser: &mut Browser, to: u32) {
     let slide = format!(
         "(() => {{
@@ -166,7 +166,7 @@ fn a_play_moves_the_cursor_and_stops() {
     assert_eq!(browser.evaluate("document.getElementById('play').textContent").unwrap(), "Stop");
     browser.click(play, 1).unwrap();
     browser.until("document.getElementById('play').textContent === 'Play'").unwrap();
-    // Nearly at the end it comes to the end, and stops by itself.
+    // From near the end it plays to the end and stops there.
     slide(&mut browser, 990);
     browser.click(play, 1).unwrap();
     browser.until("document.getElementById('time').value === '1000'").unwrap();

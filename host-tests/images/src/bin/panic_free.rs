@@ -1,6 +1,6 @@
 //! The control step, linked alone: an image that cannot link if the step can panic.
 //!
-//! Never run. Its panic handler calls a function that nobody defines; the linker drops the handler where no panic is
+//! Never run. Its panic handler calls an undefined function; the linker drops the handler where no panic is
 //! reachable, and refuses the image where one is. The controls show that both this and the search for floating-point
 //! calls can fail.
 #![no_std]

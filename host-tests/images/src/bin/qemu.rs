@@ -1,5 +1,5 @@
 //! The core on an emulated Cortex-M4F: replays a recording, or gives random inputs to every function of the model, and
-//! reports digests of what came out.
+//! reports digests of the results.
 //!
 //! Not for a board: it talks to the emulator by semihosting. The command line is one of
 //!
@@ -27,7 +27,7 @@ use images::record::{Digest, MAGIC, Record};
 use images::same_bits::Comparison;
 use static_cell::StaticCell;
 
-/// As large as half of the stack.
+/// Static, because it is as large as half of the stack.
 static PIPELINE: StaticCell<Pipeline> = StaticCell::new();
 
 /// SysTick counts down from here, 24 bits.
@@ -136,7 +136,7 @@ fn ticks(syst: &mut SYST, work: impl FnOnce()) -> u32 {
 
 /// Takes [`LOOP_INSTRUCTIONS`], two a turn.
 fn spin() {
-    // SAFETY: counts a register of its own down to 0, and touches nothing else.
+    // SAFETY: counts its own register down to 0, and changes nothing else.
     unsafe {
         core::arch::asm!(
             "2: subs {turns}, {turns}, #1",

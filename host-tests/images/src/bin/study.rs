@@ -1,4 +1,4 @@
-//! Every variant of every kernel of the study, over fixed inputs, for the timing model: reports what each returned.
+//! Every variant of every kernel of the study, over fixed inputs, for the timing model: reports all results.
 //!
 //! Not for a board: it talks to the emulator by semihosting. The command line names the file of inputs. A line
 //! `region NUMBER KERNEL: VARIANT` begins a variant, a line for each input follows; `docs/study.md` has the results.

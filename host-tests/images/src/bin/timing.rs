@@ -1,4 +1,4 @@
-//! The loop's kernels, each in a region of its own, for the timing model: replays a recording, and measures with real
+//! The loop's kernels, each in a separate region, for the timing model: replays a recording, and measures with real
 //! data.
 //!
 //! Not for a board: it talks to the emulator by semihosting. The command line names the recording. A line
@@ -18,7 +18,7 @@ use fingertip::contact;
 use fingertip::contact::Contact;
 use fingertip::control::{Reference, SpeedLoop, TemperatureDrift, Winding};
 use fingertip::grip::{Goal, Grip};
-use fingertip::shipped::{Array, COLUMNS, Config, Fit, Picture, Pipeline, ROWS};
+use fingertip::shipped::{Array, COLUMNS, Config, Fit, Pipeline, ROWS, TactileImage};
 use fingertip::state::{Limits, Mode};
 use fingertip::touch::Touch;
 use fingertip::units::{Celsius, Duty, Millimetres, Newtons};
@@ -36,14 +36,14 @@ static PRESS: StaticCell<Press> = StaticCell::new();
 /// Data that the kernels read and write.
 struct Bench<'a> {
     config: &'a Config,
-    /// With a characteristic that is no line, creep, and a gain that drifts with temperature.
+    /// Configuration with a nonlinear characteristic, creep, and a gain that drifts with temperature.
     curved: &'a Config,
     record: Record,
     pipeline: &'static mut Pipeline,
     array: Array,
-    picture: Picture,
+    picture: TactileImage,
     contact: Contact,
-    /// Of the whole contact, and of the one over the edge.
+    /// Fits of the whole contact, and of the one partly off the array.
     fits: [Fit; 2],
     depth: Millimetres,
     motion: SpeedLoop,
@@ -53,21 +53,21 @@ struct Bench<'a> {
     limits: Limits,
     duty: Duty,
     winding: Winding,
-    warmth: TemperatureDrift,
+    temperature_drift: TemperatureDrift,
     drift: Newtons,
     press: &'static mut Press,
 }
 
 type Kernel = extern "C" fn(&mut Bench);
 
-/// When a kernel is measured.
+/// Condition under which a kernel is measured.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum When {
     /// In every frame.
     Always,
-    /// With a contact, which the array sees as a whole.
+    /// With a contact that is completely on the array.
     Contact,
-    /// With the same contact, pushed over the array's edge.
+    /// With the same contact partly off the array.
     Edge,
     /// While the loop drives the motor.
     Driving,
@@ -87,7 +87,7 @@ const KERNELS: [(&str, Kernel, When); 24] = [
     ("speed law and limits", follow, Driving),
     ("duty from the voltage", duty, Driving),
     ("winding", winding, Always),
-    ("warmth, with a coefficient", warmth, Always),
+    ("warmth, with a coefficient", temperature_drift, Always),
     ("contact, whole, moments", read_moments, When::Contact),
     ("contact, whole, followed", follow_whole, When::Contact),
     ("contact, whole, one", read_one, When::Contact),
@@ -150,9 +150,9 @@ extern "C" fn winding(bench: &mut Bench) {
     bench.winding.observe(bench.motion.drive.acceleration(), bench.config);
 }
 
-extern "C" fn warmth(bench: &mut Bench) {
-    bench.warmth.observe(Some(Celsius::from_bits(30 << 16)), bench.curved);
-    bench.drift = bench.warmth.force(bench.record.command.goal, bench.curved);
+extern "C" fn temperature_drift(bench: &mut Bench) {
+    bench.temperature_drift.observe(Some(Celsius::from_bits(30 << 16)), bench.curved);
+    bench.drift = bench.temperature_drift.force(bench.record.command.goal, bench.curved);
 }
 
 fn read(bench: &mut Bench, refined: Refined) {
@@ -202,7 +202,7 @@ fn main() -> ! {
         record: Record::from_bytes(&[0; Record::BYTES]),
         pipeline: PIPELINE.init_with(|| Pipeline::new(&config)),
         array: Array::new(),
-        picture: Picture::EMPTY,
+        picture: TactileImage::EMPTY,
         contact: Contact::default(),
         fits: [Fit::default(), Fit::default()],
         depth: Millimetres::ZERO,
@@ -213,7 +213,7 @@ fn main() -> ! {
         limits: Limits::default(),
         duty: Duty::ZERO,
         winding: Winding::new(),
-        warmth: TemperatureDrift::default(),
+        temperature_drift: TemperatureDrift::default(),
         drift: Newtons::ZERO,
         press: PRESS.init_with(Press::new),
     };
@@ -263,9 +263,9 @@ fn measure_frame(bench: &mut Bench) {
 }
 
 /// Four columns to the side, so that the contact reaches over the edge.
-fn pushed_over_the_edge(picture: &Picture) -> Picture {
+fn pushed_over_the_edge(picture: &TactileImage) -> TactileImage {
     const BY: usize = 4;
-    let mut pushed = Picture::EMPTY;
+    let mut pushed = TactileImage::EMPTY;
     for row in 0..ROWS {
         let (mut row_sum, y) = (0, 2 * row as i32 - 9);
         for column in 0..COLUMNS - BY {

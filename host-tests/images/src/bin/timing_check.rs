@@ -1,6 +1,6 @@
 //! Published kernels for the timing model's check: code in assembly, so the compiler has no part in the figures.
 //!
-//! Not for a board. Each kernel is a region of its own, its place in [`KERNELS`] from 1 on;
+//! Not for a board. Each kernel is a region, numbered by its place in [`KERNELS`] from 1 on;
 //! `m4-timing/tests/silicon.rs` has the cycles that their authors measured, in the same order. With the command line
 //! `unknown`, a region holds an instruction that the core does not have.
 #![no_std]
@@ -67,7 +67,7 @@ enum Second {
 }
 use Second::{Input, Rounds};
 
-/// Each kernel with its second and last argument.
+/// Kernels, each with its second argument and its last one.
 const KERNELS: [(Kernel, Second, usize); 25] = [
     (AES_128_keyschedule, Input, 0),
     (AES_128_encrypt, Input, 0),

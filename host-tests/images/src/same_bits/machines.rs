@@ -20,7 +20,7 @@ use fingertip::units::{Celsius, CoreCycles, Millimetres, MillimetresPerSecond, M
 use lanes::{Codes, Common, Row, Total};
 use paper::{Relaxation, RelaxationState};
 
-/// A machine's name, and one step of it with what the step adds to its digest.
+/// Name of a machine, and function that makes one step and adds its results to the digest.
 pub type Step = (&'static str, fn(&mut Machines, &Sample, &mut Mix));
 /// The largest braking of the profile: 1000 m/s^2 in Q8 mm/s^2.
 const BRAKE_MAX: i32 = 1_000_000 << 8;
@@ -33,7 +33,7 @@ pub struct Machines {
     observer: Observer,
     drive: Drive,
     winding: Winding,
-    warmth: TemperatureDrift,
+    temperature_drift: TemperatureDrift,
     motion: SpeedLoop,
     grip: Grip,
     touch: Touch,
@@ -45,7 +45,7 @@ pub struct Machines {
 }
 
 impl Machines {
-    /// At rest, with a first configuration.
+    /// Machines at rest, with a first configuration.
     pub fn new(config: Config) -> Self {
         Self {
             config,
@@ -54,7 +54,7 @@ impl Machines {
             observer: Observer::new(),
             drive: Drive::new(),
             winding: Winding::new(),
-            warmth: TemperatureDrift::default(),
+            temperature_drift: TemperatureDrift::default(),
             motion: SpeedLoop::new(),
             grip: Grip::default(),
             touch: Touch::default(),
@@ -180,11 +180,11 @@ pub const STEPS: [Step; 20] = [
         mix.add(m.winding.share());
     }),
     ("TemperatureDrift::force", |m, s, mix| {
-        m.warmth.observe((s.share_q32 & 15 != 0).then_some(Celsius::from_bits(s.words[0])), &m.config);
+        m.temperature_drift.observe((s.share_q32 & 15 != 0).then_some(Celsius::from_bits(s.words[0])), &m.config);
         if s.share_q32 & 0xf0 == 0 {
-            m.warmth.zero(s.share_q32 as i32 & 0x1_ffff);
+            m.temperature_drift.zero(s.share_q32 as i32 & 0x1_ffff);
         }
-        mix.add(m.warmth.force(s.force, &m.config).to_bits());
+        mix.add(m.temperature_drift.force(s.force, &m.config).to_bits());
     }),
     ("Touch::observe and Grip::reference", |m, s, mix| {
         let contact = Contact { force: s.force, indentation: s.d, ..Contact::default() };
@@ -224,7 +224,7 @@ fn towards(machines: &Machines, sample: &Sample) -> Reference {
     )
 }
 
-/// Both halves of each word.
+/// Splits each word into its halves.
 fn halves(pairs: [u32; COLUMNS / 2]) -> [u16; COLUMNS] {
     core::array::from_fn(|column| (pairs[column / 2] >> (16 * (column % 2))) as u16)
 }

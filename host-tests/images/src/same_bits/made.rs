@@ -14,12 +14,12 @@ use fingertip::control::Reference;
 use fingertip::params::Params;
 use fingertip::pressure::{CalibrationError, GAIN_MAX};
 use fingertip::scan::ScanTiming;
-use fingertip::shipped::{COLUMNS, Calibration, Config, Frame, Picture, ROWS, SLOTS};
+use fingertip::shipped::{COLUMNS, Calibration, Config, Frame, ROWS, SLOTS, TactileImage};
 use fingertip::units::Newtons;
 use paper::units::Ratio;
 use paper::{Relaxation, RelaxationError, RelaxationState, RelaxationTerm};
 
-/// A constructor's name, and one call of it with what that adds to its digest.
+/// Name of a constructor, and function that calls it and adds the results to the digest.
 pub type Make = (&'static str, fn(&mut Machines, &mut Source, &mut Mix));
 
 /// Inputs between two that make new machines: each takes up to half a million instructions.
@@ -41,7 +41,7 @@ pub const MADE: [Make; 3] = [
         Err(_) => mix.add(-1),
     }),
     ("Calibration::new", |m, source, mix| match calibration(source) {
-        // The gains show in what the array reads.
+        // The gains change the readings of the array.
         Ok(calibration) => m.array.calibrate(&calibration),
         Err(CalibrationError::Gain { row, column, value }) => {
             mix.add(row as u32);
@@ -232,17 +232,17 @@ fn add_config(mix: &mut Mix, config: &Config) {
     mix.add(touch.to_bits());
 }
 
-// What the machines answer, number by number into a digest.
+// Adds the outputs of the machines to a digest, number by number.
 
-/// Reference of the profile.
+/// Adds a reference of the profile.
 pub fn add_reference(mix: &mut Mix, reference: Reference) {
     mix.add(reference.speed.to_bits());
     mix.add(reference.acceleration.to_bits());
 }
 
-/// All fields of a tactile image.
-pub fn add_picture(mix: &mut Mix, picture: &Picture) {
-    let Picture { taxels, sum, moment_x, moment_y, peak, bad, bad_count, bad_again, undriven_max, peak_codes } =
+/// Adds all fields of a tactile image.
+pub fn add_picture(mix: &mut Mix, picture: &TactileImage) {
+    let TactileImage { taxels, sum, moment_x, moment_y, peak, bad, bad_count, bad_again, undriven_max, peak_codes } =
         picture;
     taxels.iter().flatten().chain([sum, moment_x, moment_y, peak]).for_each(|number| mix.add(*number));
     bad.iter().for_each(|row| mix.add(*row));
@@ -251,7 +251,7 @@ pub fn add_picture(mix: &mut Mix, picture: &Picture) {
     mix.add(*bad_again);
 }
 
-/// All of a contact.
+/// Adds all fields of a contact.
 pub fn add_contact(mix: &mut Mix, contact: &Contact) {
     let Contact { force, indentation, centre_x, centre_y, radius, peak_pa, confidence, doubt, bad_taxels } = *contact;
     mix.add(force.to_bits());

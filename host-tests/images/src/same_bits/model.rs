@@ -4,7 +4,7 @@ use super::{Mix, Source};
 use core::num::NonZeroU16;
 use fingertip::arith::floor_sqrt;
 use fingertip::model::{MODULUS_MAX, MODULUS_MIN, RADIUS_MAX, RADIUS_MIN, Tip, TipError};
-use fingertip::shipped::{COLUMNS, Config, Picture, ROWS, TAXELS};
+use fingertip::shipped::{COLUMNS, Config, ROWS, TAXELS, TactileImage};
 use fingertip::units::{Kilopascals, Millimetres, Newtons};
 use paper::units::{NewtonMillimetres, Radians, Ratio, SquareMillimetres};
 use paper::{Displacement, LimitSurface, force_on, pressure_of, strain_of};
@@ -16,18 +16,18 @@ const TAXEL_MAX: i64 = (1 << 18) - 1;
 
 /// Tactile image, and the number of its uses.
 pub struct Pictures {
-    picture: Picture,
+    picture: TactileImage,
     used: u32,
 }
 
 impl Pictures {
     /// The first one shows nothing.
     pub const fn new() -> Self {
-        Self { picture: Picture::EMPTY, used: PICTURES }
+        Self { picture: TactileImage::EMPTY, used: PICTURES }
     }
 
-    /// The next picture: the last one with a taxel a little off, and now and then one that is wild or bad.
-    pub fn next(&mut self, sample: &Sample, config: &Config) -> &Picture {
+    /// Next tactile image: the last one with a small change of a taxel, and sometimes an arbitrary or bad taxel.
+    pub fn next(&mut self, sample: &Sample, config: &Config) -> &TactileImage {
         self.used += 1;
         if self.used > PICTURES {
             self.used = 1;
@@ -62,14 +62,14 @@ impl Default for Pictures {
     }
 }
 
-/// A contact anywhere on the array or a little beside it; each taxel shows the pressure at its middle.
-fn contact(sample: &Sample, config: &Config) -> Picture {
+/// A contact on the array or slightly off it; each taxel has the pressure at its middle.
+fn contact(sample: &Sample, config: &Config) -> TactileImage {
     let half_pitch = i64::from(config.half_pitch.to_bits());
     let deepest = i64::from(config.tip.depth_max().to_bits()) >> 1;
     let d = Millimetres::from_bits(((deepest * i64::from(sample.share_q32)) >> 32) as i32);
     let [x, y, ..] = sample.words.map(|word| (12 * half_pitch * i64::from(word)) >> 31);
     let gain = i64::from(config.params.codes_per_kpa_milli) * 16;
-    let mut picture = Picture::EMPTY;
+    let mut picture = TactileImage::EMPTY;
     for (row, line) in (0..).zip(&mut picture.taxels) {
         for (column, taxel) in (0..).zip(line) {
             let place = |taxel: i64, taxels: usize| (2 * taxel + 1 - taxels as i64) * half_pitch;
@@ -83,8 +83,8 @@ fn contact(sample: &Sample, config: &Config) -> Picture {
 }
 
 /// Sums, moments and peak, as reading a frame gives them.
-fn sum_up(picture: &mut Picture) {
-    let Picture { taxels, sum, moment_x, moment_y, peak, bad, bad_count, .. } = picture;
+fn sum_up(picture: &mut TactileImage) {
+    let TactileImage { taxels, sum, moment_x, moment_y, peak, bad, bad_count, .. } = picture;
     (*sum, *moment_x, *moment_y, *peak) = (0, 0, 0, 0);
     for (row, line) in (0..).zip(taxels) {
         for (column, taxel) in (0..).zip(line) {
@@ -99,7 +99,7 @@ fn sum_up(picture: &mut Picture) {
 
 // The model's functions: those of a tip, of a column, and the square root.
 
-/// A function's name and what it adds to its digest.
+/// Name of a function, and function that adds its results to the digest.
 pub type Function = (&'static str, fn(&Sample, &mut Mix));
 
 /// One input for every function.
@@ -123,7 +123,7 @@ pub struct Sample {
     pub peak: Kilopascals,
     /// The area of a column.
     pub area: SquareMillimetres,
-    /// A shift and a tilt beside the indentation.
+    /// Indentation, shift and tilt.
     pub displacement: Displacement,
     /// A coefficient of friction.
     pub mu: Ratio,
@@ -138,7 +138,7 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// Nothing but a tip.
+    /// Sample with a tip and all else 0.
     pub const fn new(tip: Tip) -> Self {
         Self {
             made: Ok(tip),

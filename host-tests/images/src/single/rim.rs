@@ -1,11 +1,11 @@
-//! Taxels under the rim, worked out closely: two lines across the taxel, each cut where it meets the rim.
+//! Taxels under the rim, computed more exactly: two lines across the taxel, each cut at the rim.
 //!
-//! The mean over the squared distance's spread, which the quick model uses, knows no direction and is off by up to half
-//! a percent of the peak for a taxel under the rim. Here the taxel is cut by two Gauss lines along its steeper
-//! direction, and what of each lies inside the contact has two Gauss points.
+//! The mean over the squared distance's spread, which the firmware's model uses, ignores the direction; its error is up
+//! to half a percent of the peak for a taxel under the rim. Here the taxel is cut by two Gauss lines along its steeper
+//! direction, and the part of each line inside the contact has two Gauss points.
 
 use fingertip::config::Geometry;
-use fingertip::contact::parts::{Guess, ONE, PLACE_BITS, SQUARE_BITS, Scale, between, interval, root};
+use fingertip::contact::parts::{Guess, ONE, PLACE_BITS, PeakScale, SQUARE_BITS, between, interval, root};
 
 /// 1/sqrt(3), Q15: Gauss points on -1 to 1.
 const GAUSS: i32 = 18_919;
@@ -29,7 +29,7 @@ pub struct Rim<'a> {
 }
 
 impl<'a> Rim<'a> {
-    pub fn new(guess: &Guess, scale: &Scale, geometry: &'a Geometry) -> Self {
+    pub fn new(guess: &Guess, scale: &PeakScale, geometry: &'a Geometry) -> Self {
         let half = (geometry.pitch >> (SQUARE_BITS - PLACE_BITS + 1)).max(1);
         let lift = (ONE - guess.height).leading_zeros();
         Self {

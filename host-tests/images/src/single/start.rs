@@ -7,7 +7,9 @@
 //! equation for s^2, and then D.
 
 use fingertip::config::Shaped;
-use fingertip::contact::parts::{CENTRE_BITS, Divisor, Guess, ONE, PEAK_BITS, SQUARE_BITS, View, clamp_to, high, root};
+use fingertip::contact::parts::{
+    CENTRE_BITS, Divisor, Guess, ONE, PEAK_BITS, SQUARE_BITS, ScaledImage, clamp_to, high, root,
+};
 
 /// Taxels below an eighth of the peak are left out: the rim crosses most of them.
 const SHARE_MIN: i32 = 1 << (PEAK_BITS - 3);
@@ -51,7 +53,7 @@ struct Sums {
     xx: i32,
     xy: i32,
     yy: i32,
-    /// Of x and of y, times their squared length.
+    /// Sums of x and of y, each times the squared length of the position.
     x_cube: i32,
     y_cube: i32,
     z: i32,
@@ -60,7 +62,7 @@ struct Sums {
 }
 
 impl Sums {
-    fn of<const ROWS: usize, const COLUMNS: usize>(view: &View<ROWS, COLUMNS>) -> Self {
+    fn of<const ROWS: usize, const COLUMNS: usize>(view: &ScaledImage<ROWS, COLUMNS>) -> Self {
         let z_drop = const { z_drop(ROWS, COLUMNS) };
         let mut all = Self::default();
         // 2^38 over Y as a share of the peak.
@@ -102,9 +104,9 @@ impl Sums {
     }
 }
 
-/// The plane's guess; None where the taxels lie on one line, or fit no contact.
+/// Start guess for a plane; `None` if the taxels lie on one line, or fit no contact.
 pub fn plane<const ROWS: usize, const COLUMNS: usize>(
-    view: &View<ROWS, COLUMNS>,
+    view: &ScaledImage<ROWS, COLUMNS>,
     config: &Shaped<ROWS, COLUMNS>,
 ) -> Option<Guess> {
     let geometry = &config.geometry;

@@ -3,7 +3,7 @@
 use core::arch::asm;
 use core::hint::black_box;
 
-/// Arguments of a call by the hard-float calling convention; afterwards what it returned.
+/// Arguments of a call by the hard-float calling convention; after the call its results.
 #[derive(Clone, Copy, Default)]
 #[repr(C)]
 pub struct Registers {

@@ -1,7 +1,7 @@
 //! A controller's step: proportional and integral by increments, its output held to a range and to a slew.
 //!
-//! y = y1 + (k_p + k_i) e - k_p e1, within 1 either way and within `SLEW` of y1. What is cut never enters y1: nothing
-//! winds up.
+//! y = y1 + (k_p + k_i) e - k_p e1, within 1 either way and within `SLEW` of y1. The cut part never enters y1, so
+//! nothing winds up.
 
 use super::call::pass_on;
 use super::inputs::Inputs;
@@ -98,7 +98,7 @@ const fn rounded(value: f64) -> i32 {
     (if value < 0.0 { value - 0.5 } else { value + 0.5 }) as i32
 }
 
-/// Within two bounds; a comparison each, where `max` and `min` would call a function for the sake of what is no number.
+/// Clamps to two bounds by comparisons: `max` and `min` would call a function to handle NaN.
 #[inline(always)]
 fn held<T: PartialOrd>(value: T, low: T, high: T) -> T {
     if value < low {

@@ -5,12 +5,12 @@ use super::inputs::Inputs;
 use crate::host::{fail, say};
 use fingertip::contact::{Contact, FitLevel};
 use fingertip::params::Params;
-use fingertip::shipped::{COLUMNS, Config, Fit, Picture, ROWS};
+use fingertip::shipped::{COLUMNS, Config, Fit, ROWS, TactileImage};
 use images::single::{self, Refined};
 
 /// Data that the variants read and write.
 struct Bench<'a> {
-    picture: Picture,
+    picture: TactileImage,
     config: &'a Config,
     fit: Fit,
     contact: Contact,
@@ -47,8 +47,8 @@ extern "C" fn follow(bench: &mut Bench) {
     bench.contact = bench.fit.read(&bench.picture, bench.config);
 }
 
-/// Measures all over the next section: for each pitch its cases, of as many pictures each. Variants without a fit level
-/// see the first picture only.
+/// Measures all variants over the next section: the cases of each pitch, with the same number of images each. Variants
+/// without a fit level get the first image only.
 #[inline(never)]
 pub fn run(kernel: &str, region: &mut u32, inputs: &mut Inputs) {
     let [count, frames] = inputs.words();
@@ -82,7 +82,7 @@ fn one_case(
     inputs: &mut Inputs,
 ) {
     let fit = Fit::new(fit_level.unwrap_or_default());
-    let mut bench = Bench { picture: Picture::EMPTY, config, fit, contact: Contact::default() };
+    let mut bench = Bench { picture: TactileImage::EMPTY, config, fit, contact: Contact::default() };
     for frame in 0..frames {
         bench.picture = picture(inputs);
         if frame == 0 || fit_level.is_some() {
@@ -95,11 +95,11 @@ fn one_case(
 }
 
 /// All taxels are good.
-fn picture(inputs: &mut Inputs) -> Picture {
+fn picture(inputs: &mut Inputs) -> TactileImage {
     let mut bytes = [0; 4 * ROWS * COLUMNS];
     inputs.read(&mut bytes);
     let mut values = bytes.as_chunks::<4>().0.iter().map(|bytes| i32::from_le_bytes(*bytes));
-    let mut picture = Picture::EMPTY;
+    let mut picture = TactileImage::EMPTY;
     for (row, line) in picture.taxels.iter_mut().enumerate() {
         for (column, taxel) in line.iter_mut().enumerate() {
             *taxel = values.next().unwrap_or(0);

@@ -6,7 +6,9 @@ use super::inputs::Inputs;
 use super::packed;
 use super::sparse::{self, Sparse};
 use crate::host::{fail, say};
-use fingertip::shipped::{Array, BANK_COLUMNS, COLUMNS, Calibration, Config, Frame, Picture, ROWS, SLOTS, TARE_FRAMES};
+use fingertip::shipped::{
+    Array, BANK_COLUMNS, COLUMNS, Calibration, Config, Frame, ROWS, SLOTS, TARE_FRAMES, TactileImage,
+};
 use fixed::types::I16F16;
 
 /// Sums in a format: of the taxels, weighted by -9, -7 .. 9 along the columns and along the rows, and the largest.
@@ -40,17 +42,17 @@ pub struct Bench {
     pub tare_sums: Sums<i32>,
     /// The same where gains are left out, sixteenths of a code.
     pub plain_tare: Sums<i32>,
-    /// In single precision.
+    /// Data in single precision.
     pub single: Float<f32>,
-    /// In double precision.
+    /// Data in double precision.
     pub double: Float<f64>,
-    /// In I16F16, of 32 codes.
+    /// Data in I16F16, unit 32 codes.
     pub fixed: Float<I16F16>,
-    /// In sixteenths of a code, or finer.
+    /// Results in sixteenths of a code, or finer.
     pub out: Sums<i32>,
-    /// In codes.
+    /// Results in codes, single precision.
     pub out_single: Sums<f32>,
-    /// In codes.
+    /// Results in codes, double precision.
     pub out_double: Sums<f64>,
     /// Earlier version of the firmware.
     pub sparse: Sparse,
@@ -150,7 +152,7 @@ impl Bench {
     /// State that the firmware's variant left in the array.
     fn collect(&mut self, format: Format) {
         if let Format::Picture = format {
-            let Picture { sum, moment_x, moment_y, peak, bad_count, .. } = *self.array.picture();
+            let TactileImage { sum, moment_x, moment_y, peak, bad_count, .. } = *self.array.picture();
             self.out = Sums { sum, moment_x, moment_y, peak };
             self.suspect = bad_count > 0;
         }

@@ -36,7 +36,7 @@ impl Inputs {
         self.place
     }
 
-    /// Goes back to a place.
+    /// Seeks to a position.
     pub fn seek(&mut self, place: usize) {
         // SAFETY: takes two numbers.
         if unsafe { syscall!(SEEK, self.file.handle, place) } as isize != 0 {

@@ -20,13 +20,13 @@ use crate::host::say;
 use fingertip::shipped::Config;
 use scalar::Tools;
 
-/// Only returns.
+/// Empty function: only returns.
 #[unsafe(naked)]
 extern "C" fn nothing(_: &mut ()) {
     core::arch::naked_asm!("bx lr")
 }
 
-/// Runs all of them. A line `region NUMBER KERNEL: VARIANT` begins each.
+/// Runs all kernels. A line `region NUMBER KERNEL: VARIANT` begins each.
 pub fn run(config: &Config, inputs: &mut Inputs) {
     say(format_args!("region 0 nothing: an empty call"));
     for _ in 0..256 {

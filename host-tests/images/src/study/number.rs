@@ -8,7 +8,7 @@ use fixed::types::I16F16;
 pub trait Number:
     Copy + PartialOrd + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
-    /// Its square root.
+    /// Square root of the number.
     fn root(self) -> Self;
     /// A small integer.
     fn from_small(n: u16) -> Self;

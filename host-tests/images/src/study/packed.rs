@@ -46,7 +46,7 @@ impl Frame {
             row.sum = lanes::dot(net, first[place], row.sum);
             row.moment = lanes::dot(net, second[place], row.moment);
         };
-        // Written out: the compiler would keep a loop where it builds for size.
+        // Unrolled by hand: the compiler keeps a loop when it builds for size.
         take(0);
         take(1);
         take(2);
@@ -79,7 +79,7 @@ fn larger(a: u32, b: u32) -> u32 {
     result
 }
 
-/// The sums of a frame; `read` makes a row's sum and its moment, `bits` finer than sixteenths of a code.
+/// Sums of a frame. `read` computes the sum and the moment of a row, with `bits` bits below sixteenths of a code.
 #[inline(always)]
 fn sums(bench: &mut Bench, bits: u32, read: impl Fn(&Row, u32) -> (i32, i32)) {
     let mut frame = Frame::new(bench);

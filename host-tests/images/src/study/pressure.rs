@@ -79,7 +79,7 @@ extern "C" fn sound_fixed(r: i32, d: i32, tools: &Tools) -> i32 {
     (sound(r * r, d, tools) * I16F16::from_small(1000)).to_bits()
 }
 
-/// By the textbook: the only rounding that counts is that of L.
+/// Textbook form of dL/L: the rounding of L dominates the error.
 #[inline(always)]
 pub fn strain(square_q16: i32, d: i32, tools: &Tools) -> (u32, u32) {
     let radius = tools.fixed.radius.to_bits();

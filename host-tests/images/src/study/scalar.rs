@@ -26,13 +26,13 @@ pub struct Constants<T> {
 
 /// RAM of a variant.
 pub struct Tools {
-    /// The firmware's own model.
+    /// Model of the firmware.
     pub tip: Tip,
-    /// In single precision.
+    /// Constants in single precision.
     pub single: Constants<f32>,
-    /// In double precision, by software.
+    /// Constants in double precision, computed by software.
     pub double: Constants<f64>,
-    /// In Q16.
+    /// Constants in Q16.
     pub fixed: Constants<I16F16>,
     /// pi Y in Q30.
     pub pi_y_q30: u32,
@@ -41,7 +41,7 @@ pub struct Tools {
 }
 
 impl Tools {
-    /// Of the firmware's default tip.
+    /// Constants of the firmware's default tip.
     pub fn new(config: &Config) -> Self {
         let (radius, modulus, pi) = (10.0_f64, 0.25_f64, core::f64::consts::PI);
         let (pi_y, inverse) = (pi * modulus, 1.0 / (pi * modulus));
@@ -88,11 +88,11 @@ pub fn root_f32(x: f32) -> f32 {
 pub enum Call {
     /// In 32 bits.
     Fixed(extern "C" fn(i32, i32, &Tools) -> i32, u32, u32),
-    /// From 64 bits to 32.
+    /// Fixed point, from 64 bits to 32.
     Wide(extern "C" fn(u64, &Tools) -> u32, u32, u32),
-    /// In single precision.
+    /// Single precision.
     Single(extern "C" fn(f32, f32, &Tools) -> f32),
-    /// In double precision.
+    /// Double precision.
     Double(extern "C" fn(f64, f64, &Tools) -> f64),
 }
 

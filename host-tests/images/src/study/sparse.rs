@@ -39,7 +39,7 @@ pub struct Sparse {
 }
 
 impl Sparse {
-    /// With these gains, plain and weighted.
+    /// Constants from the gains, plain and weighted.
     pub fn new(gain: &[Pairs; ROWS], weighted: &[Pairs; ROWS], config: &Config) -> Self {
         let dead = lanes::pair(config.dead_codes as i16, config.dead_codes as i16);
         let rows = core::array::from_fn(|row| {

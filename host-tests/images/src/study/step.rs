@@ -8,9 +8,9 @@ use fingertip::contact::{self, Contact, FitLevel};
 use fingertip::control::{Reference, SpeedLoop, TemperatureDrift, Winding};
 use fingertip::frame::Sense;
 use fingertip::grip::{Goal, Grip};
-use fingertip::pipeline::Taken;
+use fingertip::pipeline::AcknowledgedRequests;
 use fingertip::safety::guard::{Guard, Seen};
-use fingertip::shipped::{Array, Config, Picture, Pipeline};
+use fingertip::shipped::{Array, Config, Pipeline, TactileImage};
 use fingertip::state::{Limits, Mode};
 use fingertip::touch::Touch;
 use fingertip::units::{Celsius, Duty, Newtons};
@@ -25,21 +25,21 @@ static CORRECTED_CONFIG: StaticCell<Config> = StaticCell::new();
 /// Data that the parts read and write.
 struct Bench<'a> {
     config: &'a Config,
-    /// With a characteristic that is no line, creep, and a gain that drifts with temperature.
+    /// Configuration with a nonlinear characteristic, creep, and a gain that drifts with temperature.
     corrected: &'a Config,
     fit_level: FitLevel,
     record: Record,
     pipeline: &'a mut Pipeline,
     duty: Duty,
     array: Array,
-    picture: Picture,
+    picture: TactileImage,
     contact: Contact,
     motion: SpeedLoop,
     grip: Grip,
     touch: Touch,
     guard: Guard,
     winding: Winding,
-    warmth: TemperatureDrift,
+    temperature_drift: TemperatureDrift,
     drift: Newtons,
     reference: Reference,
     limits: Limits,
@@ -58,9 +58,9 @@ const STEPS: [(&str, FitLevel); 6] = [
     ("Pipeline::step, fit level 5", FitLevel::AllRows),
 ];
 
-/// The place of the first part that works on what those before it left.
+/// Index of the first part that uses the results of the parts before it.
 const OBSERVER: usize = 2;
-/// Records that the parts see at most; the step sees all.
+/// Maximum number of records for the parts; the step gets all.
 const PART_RECORDS: i32 = 3_000;
 
 /// The part, and whether it runs only while the loop drives the motor.
@@ -75,7 +75,7 @@ const PARTS: [(&str, Kernel, bool); 12] = [
     ("**guard**", guard, true),
     ("**Array::read, by a curve**", curved_read, false),
     ("**goal and profile, with creep**", creeping, true),
-    ("**warmth, with a coefficient**", warmth, false),
+    ("**warmth, with a coefficient**", temperature_drift, false),
     ("**winding**", winding, false),
 ];
 
@@ -98,9 +98,9 @@ extern "C" fn creeping(bench: &mut Bench) {
     bench.reference = images::reference(grip, goal, contact, touch, motion, corrected, limits);
 }
 
-extern "C" fn warmth(bench: &mut Bench) {
-    bench.warmth.observe(Some(Celsius::from_bits(30 << 16)), bench.corrected);
-    bench.drift = bench.warmth.force(bench.record.command.goal, bench.corrected);
+extern "C" fn temperature_drift(bench: &mut Bench) {
+    bench.temperature_drift.observe(Some(Celsius::from_bits(30 << 16)), bench.corrected);
+    bench.drift = bench.temperature_drift.force(bench.record.command.goal, bench.corrected);
 }
 
 extern "C" fn winding(bench: &mut Bench) {
@@ -151,7 +151,7 @@ extern "C" fn guard(bench: &mut Bench) {
 
 impl<'a> Bench<'a> {
     fn new(fit_level: FitLevel, [config, corrected]: [&'a Config; 2], pipeline: &'a mut Pipeline) -> Self {
-        pipeline.renew(Taken::default(), 0, Winding::new());
+        pipeline.renew(AcknowledgedRequests::default(), 0, Winding::new());
         Self {
             config,
             corrected,
@@ -160,14 +160,14 @@ impl<'a> Bench<'a> {
             pipeline,
             duty: Duty::ZERO,
             array: Array::new(),
-            picture: Picture::EMPTY,
+            picture: TactileImage::EMPTY,
             contact: Contact::default(),
             motion: SpeedLoop::new(),
             grip: Grip::default(),
             touch: Touch::default(),
             guard: Guard::default(),
             winding: Winding::new(),
-            warmth: TemperatureDrift::default(),
+            temperature_drift: TemperatureDrift::default(),
             drift: Newtons::ZERO,
             reference: Reference::default(),
             limits: Limits::default(),
@@ -176,7 +176,7 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// A function of its own, because a pipeline is large and takes stack only here.
+/// Makes the pipeline. A separate function, because a pipeline is large and takes stack only here.
 #[inline(never)]
 fn begin(config: &Config) -> (&'static mut Pipeline, &'static Config) {
     let Ok(corrected) = Config::shipped(&CORRECTED) else { fail("a curve is refused") };

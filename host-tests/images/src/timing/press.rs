@@ -3,7 +3,7 @@
 use super::Bench;
 use fingertip::config::newtons;
 use fingertip::fixed::types::I8F24;
-use fingertip::measure::press::{PARTS, Press as Motion, Step, View};
+use fingertip::measure::press::{PARTS, Press as Motion, PressInputs, Step};
 use fingertip::measure::series::{CHECK, Out, step_bytes};
 use fingertip::measure::{BuiltIn, MeasureStatus, Row, Task};
 use fingertip::shipped::{COLUMNS, ROWS};
@@ -20,7 +20,7 @@ pub struct Press {
 }
 
 impl Press {
-    /// Not begun.
+    /// Press that has not begun.
     pub fn new() -> Self {
         let standing = MeasureStatus::running(Task::Press);
         Self { motion: None, step: Step::NONE, standing, bytes: [0; step_bytes(ROWS * COLUMNS)], part: 0, frames: 0 }
@@ -37,7 +37,12 @@ pub extern "C" fn add(bench: &mut Bench) {
     motion.observer.travel = Millimetres(I8F24::from_num(if *frames == 3 { -3 } else { 0 }));
     let (sequence, encoder) = (record.frame.sequence, motion.observer.origin());
     let chip = record.sense.chip;
-    press.observe(&View { sequence, picture, contact, encoder, motion, applied_mv: 900, chip }, step, standing, config);
+    press.observe(
+        &PressInputs { sequence, picture, contact, encoder, motion, applied_mv: 900, chip },
+        step,
+        standing,
+        config,
+    );
 }
 
 pub extern "C" fn write(bench: &mut Bench) {

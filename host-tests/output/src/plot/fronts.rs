@@ -19,7 +19,7 @@ const NEAR_PX: f64 = 10.0;
 const STEP_PX: f64 = 5.0;
 const RINGS: u32 = 50;
 const DIRECTIONS: u32 = 24;
-/// From here on a line leads from the label to its point.
+/// Distance from which a line connects the label to its point, pixels.
 const FAR_PX: f64 = 14.0;
 
 /// A point.
@@ -108,7 +108,7 @@ fn power(value: &f64) -> String {
     if (0.001..100_000.0).contains(value) { super::number(value) } else { format!("1e{}", value.log10().round()) }
 }
 
-/// From each point of the front at its error to the next one's cost, then down.
+/// Step line of the front: from each point at constant error to the cost of the next point, then down.
 fn stairs(dots: &[Dot], place: impl Fn(&Dot) -> (f64, f64)) -> Vec<(f64, f64)> {
     let mut line: Vec<(f64, f64)> = Vec::new();
     for (x, y) in dots.iter().filter(|dot| dot.best).map(place) {
@@ -145,7 +145,7 @@ impl Box4 {
         })
     }
 
-    /// Its place nearest to another.
+    /// Point of the box nearest to another point.
     fn nearest(&self, (x, y): (f64, f64)) -> (f64, f64) {
         let Self([left, up, right, down]) = *self;
         (x.max(left).min(right), y.max(up).min(down))

@@ -10,7 +10,7 @@ pub fn program(arguments: &[&str]) -> Command {
     command
 }
 
-/// A process, and what runs in its terminal, ended when dropped.
+/// A process with all programs in its terminal, ended when dropped.
 pub struct Killed(pub Child);
 
 impl Drop for Killed {
@@ -55,7 +55,7 @@ impl Served {
         self.line()
     }
 
-    /// Ctrl-C: how it ended, what it said last, and what it complained of.
+    /// Sends Ctrl-C; returns success, the last output, and standard error.
     pub fn interrupt(mut self) -> (bool, String, String) {
         let pid = i32::try_from(self.child.0.id()).expect("a process number");
         let pid = rustix::process::Pid::from_raw(pid).expect("a process number");

@@ -10,7 +10,7 @@ use std::process::ExitCode;
 #[derive(Debug, Parser)]
 #[command(name = "budget", version, after_help = "Examples:\n  budget --fingers 300")]
 struct Args {
-    /// How many fingers, each run 14 times
+    /// Number of fingers, each run 14 times
     #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u32).range(1..))]
     fingers: u32,
 }

@@ -33,7 +33,7 @@ struct Args {
     /// Varies a key over N values (5 where N is not given); may be given many times: all combinations are run
     #[arg(long, value_name = "TABLE.KEY=LO..HI[:N]", value_parser = Vary::from_str)]
     vary: Vec<Vary>,
-    /// In place of what the scene says, in every run
+    /// Replaces a value of the scene, in every run
     #[arg(long, value_name = "TABLE.KEY=VALUE")]
     set: Vec<String>,
     /// Seeds at each point, counted on from the scene's
@@ -42,7 +42,7 @@ struct Args {
     /// Runs only the I-th of N shares, for merging
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
-    /// Where the results go; a folder of the sweep's own in target/sweep where it is not given
+    /// Folder for the results; by default a folder in target/sweep that is named after the sweep
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -54,7 +54,7 @@ enum Merge {
         /// The shards' files
         #[arg(required = true)]
         files: Vec<PathBuf>,
-        /// Where the results go
+        /// Folder for the results
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
     },

@@ -1,6 +1,6 @@
 //! Figures of a run against their bounds, as a table and as pictures.
 
-use crate::demo::{Asked, DemoError, Picture, Run};
+use crate::demo::{Asked, DemoError, HeldImage, Run};
 use crate::optimal::minimum_time_s;
 use crate::setup::Setup;
 use fingertip::params::Params;
@@ -108,7 +108,7 @@ impl Forces {
     /// Takes the figures of a run.
     ///
     /// # Errors
-    /// Nothing was touched, or a force was never reached.
+    /// The tip touched nothing, or a force was never reached.
     pub fn of(run: &Run) -> Result<Self, DemoError> {
         let (mut touch, mut steps, mut release) = (None, Vec::new(), None);
         for (place, asked) in run.goals.iter().enumerate() {
@@ -266,7 +266,7 @@ pub fn draw(run: &Run, forces: &Forces, folder: &Path) -> Result<Vec<PathBuf>, D
         let title = format!("{:.1} to {:.1} N", step.from_n, step.to_n);
         panels.push(panel(title, asked.at_s, Some(step.time_optimal_ms)));
     }
-    let map = |picture: &Picture| Map {
+    let map = |picture: &HeldImage| Map {
         title: format!("{} N", picture.goal_n),
         pressures_kpa: picture.pressures_kpa,
         centre_mm: picture.centre_mm,

@@ -58,13 +58,13 @@ pub trait Stages {
     }
     /// Calls the effects of the stage, in order.
     fn pressure(&mut self, _row: usize, _time_s: f64, _kpa: &mut Row) {}
-    /// As [`Stages::pressure`].
+    /// Like [`Stages::pressure`].
     fn conductance(&mut self, _row: usize, _time_s: f64, _siemens: &mut Row) {}
-    /// As [`Stages::pressure`].
+    /// Like [`Stages::pressure`].
     fn network(&mut self, _row: usize, _array: &[Row; ROWS], _seen: &mut Row) {}
-    /// As [`Stages::pressure`].
+    /// Like [`Stages::pressure`].
     fn volts(&mut self, _slot: usize, _time_s: f64, _volts: &mut Row) {}
-    /// As [`Stages::pressure`].
+    /// Like [`Stages::pressure`].
     fn codes(&mut self, _slot: usize, _time_s: f64, _codes: &mut Row) {}
 }
 

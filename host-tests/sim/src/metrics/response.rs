@@ -190,7 +190,7 @@ mod tests {
         let mut slips = Slips::default();
         for ms in 0..100 {
             let time_s = f64::from(ms) * 1e-3;
-            // Slips from 20 ms on, until the force is raised at 26 ms; again from 60 to 70 ms, and nobody notices.
+            // Slips from 20 ms on, until the force is raised at 26 ms; again from 60 to 70 ms without a reaction.
             let slip_mm = 0.1 * f64::from((ms - 19).clamp(0, 8) + (ms - 59).clamp(0, 11));
             slips.step(time_s, slip_mm, if ms < 26 { 1.0 } else { 1.5 });
         }

@@ -14,7 +14,7 @@ use crate::setup::Setup;
 use crate::watch::Truth;
 use fingertip::command::Command;
 use fingertip::frame::Sense;
-use fingertip::measure::{MeasureStatus, State, Task};
+use fingertip::measure::{MeasureState, MeasureStatus, Task};
 use fingertip::pipeline::Status;
 use fingertip::shipped::{COLUMNS, Capture, Config, Frame, Pipeline, ROWS, TARE_FRAMES};
 use images::record::Record;
@@ -37,8 +37,8 @@ impl<E: Set> Bench<E> {
         Ok(Self::around(Board::new(&scene.without_events(), Begun::default())?))
     }
 
-    /// Exchanges the world around the finger. Controller, tip and array stay: their effects remember what was before, and
-    /// time goes on.
+    /// Replaces the world around the finger. Controller, tip and array are kept with the memory of their effects, and
+    /// time continues.
     pub fn exchange(&mut self, scene: &Scene) -> Result<(), SimError> {
         let mut before = core::mem::replace(&mut self.board, Board::new(&scene.without_events(), Begun::default())?);
         let now = &mut self.board;
@@ -158,7 +158,7 @@ impl<E: Set> Bench<E> {
         for _ in 0..MEASURE_FRAMES {
             let Status { taken, measure, .. } = self.step();
             each(self);
-            if taken.measure == request && measure.state != State::Running {
+            if taken.measure == request && measure.state != MeasureState::Running {
                 return measure;
             }
         }

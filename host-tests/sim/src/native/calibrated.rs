@@ -16,7 +16,7 @@ use crate::scene::{Scene, read};
 use crate::watch::{Summary, Watch};
 use fastrand::Rng;
 use fingertip::config::newtons;
-use fingertip::measure::{State, Task};
+use fingertip::measure::{MeasureState, Task};
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
 use fingertip::pressure::GAIN_ONE;
@@ -106,7 +106,7 @@ pub fn calibrate(bench: &mut Bench<Named>, scene: &Scene) -> Result<Calibrated, 
         bench.tare();
         bench.run(0.02);
         let standing = bench.measure(Task::Press, |_| {});
-        if standing.state == State::Done {
+        if standing.state == MeasureState::Done {
             presses.push(record::press(bench.kept(), &params)?);
         } else {
             refused.push(format!("press: {:?} {}, {:?}", standing.ended, standing.value, bench.status().fault));
@@ -211,7 +211,7 @@ fn release(bench: &mut Bench<Named>) {
     bench.run(0.05);
 }
 
-/// Gains to store: the inverse of what the taxels read; 1 for taxels without a reading that follows the model.
+/// Gains to store: the inverse of the measured gains; 1 for taxels whose readings do not follow the model.
 fn gains_of(found: &Modulus, curve_permille: i32) -> Gains {
     let mut gains = Gains::ONE;
     for (place, taxel) in found.gains.taxels.iter().enumerate() {

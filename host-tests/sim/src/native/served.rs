@@ -41,7 +41,7 @@ pub struct Bus<E: Set> {
     answers: VecDeque<Answer>,
 }
 
-/// Firmware of a finger beside its pipeline.
+/// Firmware of a finger around its pipeline.
 struct Device {
     server: Server,
     /// Contents of the flash.
@@ -282,7 +282,7 @@ impl Device {
     }
 }
 
-/// Describes the true state of a finger beside its status.
+/// Describes the true state of a finger and its status.
 pub fn line(truth: &Truth, status: &Status) -> String {
     let sensed_n = f64::from(status.contact.force.0);
     let fault = status.fault.map_or(String::new(), |fault| format!(", fault {} ({fault:?})", fault as u32));
@@ -341,7 +341,7 @@ remove               takes the object away
 put                  puts it back where the scene has it, or in front of a tip that is beyond
 move MM [MM_PER_S]   moves its surface to where the tip meets it at this travel, at 20 mm/s or as said
 fault KIND [FINGER]  breaks something until it is mended; without KIND, says what can be broken
-mend                 mends all that is broken; the controller's fault stands until the host clears it
+mend                 mends all that is broken; the controller's fault remains until the host clears it
 state                says what is true of each finger
 help                 says this
 ";

@@ -35,16 +35,16 @@ pub struct Args {
     /// unlike
     #[arg(required = true)]
     population: Option<String>,
-    /// How many fingers the whole has
+    /// Number of fingers in the whole population
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..))]
     pub fingers: u32,
-    /// Of the draws
+    /// Seed of the draws
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
     /// Runs only the I-th of N shares of the fingers, for `merge`
     #[arg(long, value_name = "I/N", requires = "json")]
     shard: Option<Shard>,
-    /// What runs the controller: the same core on the host, or the flash image on the emulated microcontroller
+    /// Platform of the controller: the same core on the host, or the flash image on the emulated microcontroller
     #[arg(long, value_enum, default_value_t = Board::Native)]
     pub board: Board,
     /// Writes every finger's draws, promises and metrics for scripts
@@ -53,7 +53,7 @@ pub struct Args {
     /// Writes the scenes of the N worst fingers: those that broke a promise, then those nearest to a bound
     #[arg(long, value_name = "N", requires = "out")]
     worst: Option<usize>,
-    /// Where the scenes of the worst fingers go
+    /// Folder for the scenes of the worst fingers
     #[arg(long, value_name = "DIR", requires = "worst")]
     out: Option<PathBuf>,
 }
@@ -84,7 +84,7 @@ enum Merge {
         /// The shards' files
         #[arg(required = true)]
         files: Vec<PathBuf>,
-        /// Where the whole goes
+        /// File for the merged results
         #[arg(long, value_name = "FILE")]
         json: PathBuf,
     },
@@ -113,7 +113,7 @@ fn population(args: &Args, board: Run) -> Result<bool, RunError> {
     };
     let all = args.fingers as usize;
     let numbers = (0..all).filter(|number| shard.has(*number));
-    // A regular file has its progress beside it. Terminals and pipes receive the whole at the end.
+    // For a regular file the progress is kept in a file next to it. Terminals and pipes get everything at the end.
     let into_file = |path: &&PathBuf| fs::metadata(path).is_ok_and(|known| known.is_file()) || !path.exists();
     let mut part = None;
     let mut done = Vec::new();

@@ -13,7 +13,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml_edit::{ArrayOfTables, Document, DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
-/// Place and text of a mistake, and what is allowed.
+/// Place and text of a mistake, and allowed values.
 pub type Wrong = (Range<usize>, String, String);
 
 /// Names of the draws.
@@ -199,7 +199,7 @@ pub fn folder() -> PathBuf {
 /// Loads a population by its path, or by its name in the project.
 ///
 /// # Errors
-/// There is none, or it has mistakes. The text is for people.
+/// No such population, or a mistake in its file. The text is for people.
 pub fn load(name: &str) -> Result<Population, String> {
     let (path, text) = library::find(&folder(), "population", name)?;
     let file = path.to_string_lossy();
@@ -261,7 +261,7 @@ pub fn stem(file: &str) -> String {
     Path::new(file).file_stem().map_or(String::new(), |stem| stem.to_string_lossy().into_owned())
 }
 
-/// Keys of a population that a scene does not have, beside `extends`.
+/// Keys of a population that a scene does not have, except `extends`.
 const OWN: [&str; 4] = ["magnitude", "draw", "events", "count"];
 
 /// Reads the text of a population without `extends`.

@@ -31,7 +31,7 @@ pub struct Report {
     pub of_fingers: usize,
     /// Digest of the text of the population, the seed and the number of fingers: the same for all shards of a whole.
     pub id: String,
-    /// Counts beside the envelope.
+    /// Additional counts, not part of the envelope.
     pub counted: Vec<Counted>,
     /// Summary for scripts.
     pub summary: Value,
@@ -156,7 +156,7 @@ impl Report {
     /// Merges shards. The result is the same, byte for byte, as that of the whole.
     ///
     /// # Errors
-    /// They are not of one population, a finger is missing or duplicate, or a file cannot be read.
+    /// The shards are not of one population, a finger is missing or duplicate, or a file cannot be read.
     pub fn merge(files: &[PathBuf]) -> Result<Self, RunError> {
         let mut whole: Option<Self> = None;
         let mut fingers = BTreeMap::new();
@@ -215,7 +215,7 @@ impl Report {
         self.fingers.iter().filter(|ran| ran.inside).count()
     }
 
-    /// Counts beside the envelope, with their numbers of fingers.
+    /// Additional counts, with their numbers of fingers.
     pub fn counted(&self) -> impl Iterator<Item = (&Counted, usize)> {
         self.counted.iter().map(|counted| {
             let above = |ran: &&Ran| ran.metric(&counted.metric) > Some(counted.above);

@@ -1,4 +1,5 @@
-//! Tables and keys of a scene beside those of the effects. Reader, errors and reference page use these descriptions.
+//! Tables and keys of a scene other than those of the effects. Reader, errors and reference page use these
+//! descriptions.
 
 use crate::events::{EVENT, KINDS};
 use fingertip::params::Params;

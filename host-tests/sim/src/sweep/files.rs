@@ -132,7 +132,7 @@ fn refuse_others(file: &Path, id: &str) -> Result<(), RunError> {
 /// Merges shards.
 ///
 /// # Errors
-/// They are not of one sweep, a run is missing or duplicate, or a file cannot be read or written.
+/// The shards are not of one sweep, a run is missing or duplicate, or a file cannot be read or written.
 pub fn merge(files: &[PathBuf], out: &Path) -> Result<Table, RunError> {
     let table = table(files)?;
     make_folder(out)?;

@@ -1,6 +1,4 @@
-//! A goal of 0 releases the object after any other request.
-//!
-//! Torque off and on while the tip moves.
+//! A goal of 0 must release the object after any other request. Also torque off and on while the tip moves.
 
 use crate::{
     CONTACT_ON_N, Case, Finger, LOSSES, fault, finger, interrupt_torque, judge, log_uniform, mode, most_n, object,
@@ -106,7 +104,7 @@ fn goal_zero_releases_soft_objects_after_a_goal_interruption() {
     judge("soft objects, goal interrupted", "N", &cases);
 }
 
-/// The surface of a soft object is where the tip touched it, not where it has yielded to.
+/// The surface of a soft object is the travel of the first touch, not the travel to which the object has yielded.
 #[test]
 fn goal_zero_releases_a_soft_object_after_a_press_that_measures() {
     let cases = cores::map([0.0, 0.3, 0.5, 1.0, 2.0], |yield_mm_per_n| {

@@ -25,7 +25,7 @@ const GOALS_N: [f64; 4] = [0.5, 1.0, 3.0, 7.0];
 /// Compliance of the objects, mm/N: a wall and a soft one.
 const OBJECTS_MM_PER_N: [f64; 2] = [0.0, 1.0];
 
-/// Largest force that a release may leave, N. A touch that just fails to read `contact_on_mn` is no touch to release.
+/// Largest force that a release may leave, N. A touch that reads just below `contact_on_mn` is not released.
 const LEFT_N: f64 = CONTACT_ON_N + 0.005;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,7 +40,7 @@ enum Event {
 impl Event {
     const ALL: [Self; 5] = [Self::TorqueOff, Self::GoalZero, Self::BridgeFault, Self::LostSignal, Self::SilentBus];
 
-    /// Whether the motor takes the tip off the object, so that friction holds no force.
+    /// Returns true if the motor moves the tip off the object, so that friction holds no force.
     fn releases(self) -> bool {
         matches!(self, Self::GoalZero | Self::SilentBus)
     }

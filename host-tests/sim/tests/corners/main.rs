@@ -79,13 +79,13 @@ fn set_goal<E: Set>(finger: &mut Bench<E>, goal_n: f64) {
     finger.command().goal = newtons((goal_n * 1e3).round() as i32);
 }
 
-/// Sets a goal and steps for a time; returns the largest true force on the way, N.
+/// Sets a goal and steps for a time; returns the largest true force meanwhile, N.
 fn press<E: Set>(finger: &mut Bench<E>, goal_n: f64, seconds: f64) -> f64 {
     set_goal(finger, goal_n);
     finger.run(seconds)
 }
 
-/// Turns torque off for a time and on again; returns the largest true force on the way, N.
+/// Turns torque off for a time and on again; returns the largest true force meanwhile, N.
 fn interrupt_torque<E: Set>(finger: &mut Bench<E>, seconds: f64) -> f64 {
     finger.command().torque = false;
     let largest_n = finger.run(seconds);
@@ -93,7 +93,7 @@ fn interrupt_torque<E: Set>(finger: &mut Bench<E>, seconds: f64) -> f64 {
     largest_n
 }
 
-/// Steps for a time while the controller is given other records; returns the largest true force on the way, N.
+/// Steps for a time while the controller is given other records; returns the largest true force meanwhile, N.
 fn run_with<E: Set>(finger: &mut Bench<E>, seconds: f64, change: impl Fn(&mut Record)) -> f64 {
     let until_s = finger.time_s() + seconds;
     let mut largest_n: f64 = 0.0;
@@ -140,7 +140,7 @@ impl Case {
     }
 }
 
-/// Prints the case nearest to its bound or farthest beyond it, and fails where cases are beyond theirs.
+/// Prints the case nearest to its bound or farthest beyond it, and fails if any case is beyond its bound.
 fn judge(name: &str, unit: &str, cases: &[Case]) {
     let worst = cases.iter().max_by(|a, b| (a.is - a.most).total_cmp(&(b.is - b.most))).expect("there are cases");
     let beyond: Vec<String> = cases

@@ -33,7 +33,7 @@ fn a_push_against_a_released_tip_does_not_change_the_next_goal() {
     judge("a push against a released tip, then 1 N: off by", "N", &cases);
 }
 
-/// What the array remembers of a contact does not drive a tip that touches nothing.
+/// A residual reading after a contact does not move a tip that touches nothing.
 #[test]
 fn a_residual_reading_does_not_drive_the_tip_through_the_air() {
     let remembering = "[effects.hysteresis]\nwidth_percent = 2\n[effects.creep]\nrate_percent_per_decade = 2\n";
@@ -84,7 +84,7 @@ fn a_tare_while_something_presses_does_not_change_the_force() {
             finger.command().torque = false;
             finger.run(0.01);
             finger.place_object(-pressed_mm);
-            // The friction of the drive holds the tip where it then comes to rest.
+            // The friction of the drive then holds the tip at its place of rest.
             finger.run(0.3);
             finger.tare();
             let before_n = force_n(&mut finger);

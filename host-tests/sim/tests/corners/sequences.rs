@@ -31,7 +31,7 @@ const AWAY_MM: f64 = 100.0;
 /// Time of a frame, about, s.
 const FRAME_S: f64 = 1e-4;
 
-/// A finger that a sequence happens to, and what is judged of it.
+/// A finger during a sequence of events, and the values that are judged.
 struct Run<'a> {
     finger: Finger,
     sequence: &'a Sequence,
@@ -73,7 +73,7 @@ impl Run<'_> {
             Event::Measure(task) => command.measure_request = task.after(command.measure_request),
             Event::Move { by_mm, mm_per_s } if self.object_mm < AWAY_MM => self.carry(by_mm, mm_per_s),
             Event::Remove => self.place(AWAY_MM),
-            // In front of the tip, wherever that is by then.
+            // In front of the present place of the tip.
             Event::PutBack => {
                 let clear_mm = self.finger.truth().travel_mm + 0.5;
                 self.place(self.sequence.distance_mm.max(clear_mm));
@@ -218,7 +218,7 @@ impl Event {
     }
 }
 
-/// A finger, what happens to it, and how long after what was before.
+/// A finger, and events with the delay of each after the one before.
 #[derive(Clone, Debug)]
 struct Sequence {
     seed: u64,
@@ -361,7 +361,7 @@ impl Forces {
         self.pushed_n
     }
 
-    /// The reason where the force is too large.
+    /// Returns a reason if the force is too large.
     fn broken(&self, force_n: f64) -> Option<String> {
         let goal_n = self.goals.iter().map(|(_, goal_n)| *goal_n).fold(self.goal_n, f64::max);
         let most_n = most_n(goal_n).max(self.left_n + 0.05).max(1.05 * self.pushed_n + 0.05);
@@ -369,12 +369,12 @@ impl Forces {
     }
 }
 
-/// Whether a mode drives the motor for a goal or a measurement, so that torque off ends it.
+/// Returns true if a mode drives the motor for a goal or a measurement, so that torque off ends it.
 fn needs_torque(mode: Mode) -> bool {
     matches!(mode, Mode::Approach | Mode::Force | Mode::Release | Mode::Press)
 }
 
-/// The table of modes in `src/state.rs`: the reason where a change is not in it.
+/// Returns a reason if the table of modes in `src/state.rs` does not allow a change.
 fn check_mode(before: Mode, now: Mode, command: &Command) -> Option<String> {
     let allowed = match (before, now) {
         (before, now) if before == now => true,

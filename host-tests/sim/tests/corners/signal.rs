@@ -12,24 +12,24 @@ use sim::run::run;
 use sim::scene::{Goal, Scene, library, read};
 use sim::{cores, metrics, native};
 
-/// What becomes of the signal.
+/// Defect of the signal.
 #[derive(Clone, Copy, Debug)]
 enum Signal {
-    /// All codes are those of the tare from then on: the connector is unplugged.
+    /// All codes equal those of the tare: the connector is unplugged.
     Blank,
-    /// All codes stand still.
+    /// All codes keep their last values.
     Frozen,
 }
 
-/// The moment.
+/// Time at which the signal is lost.
 #[derive(Clone, Copy, Debug)]
 enum Moment {
     Hold,
-    /// This long before the touch.
+    /// Time before the touch, s.
     Before(f64),
 }
 
-/// The largest true force from the start on, where the signal is lost at this moment.
+/// Largest true force of a run in which the signal is lost at this time.
 fn lost(modulus_kpa: f64, goal_n: f64, signal: Signal, moment: Moment) -> Case {
     let tables = format!("[tip]\nmodulus_kpa = {modulus_kpa:?}\n{}{LOSSES}", object(3.0, 0.0));
     let mut finger = finger(&tables);
@@ -73,7 +73,7 @@ fn a_signal_that_stands_still_before_the_touch_stops_the_motor_in_time() {
     judge("signal frozen before the touch", "N", &all(Signal::Frozen, &[Moment::Before(0.002), Moment::Before(0.03)]));
 }
 
-/// Halves what the codes show above the level of an undriven column.
+/// Halves all codes relative to the level of an undriven column.
 fn halve(record: &mut Record) {
     for column in 0..COLUMNS {
         let undriven = record.frame.code(ROWS, column);

@@ -50,9 +50,9 @@ struct Job {
     /// Grows while the command runs; its last size in an undisturbed run.
     growing: PathBuf,
     bytes: u64,
-    /// What it leaves: each file by its name, without times.
+    /// Expected output files by name, without times.
     expected: BTreeMap<String, Vec<u8>>,
-    /// The lines that it may keep so far.
+    /// Complete lines that an interrupted run may leave.
     lines: Vec<String>,
 }
 
@@ -106,7 +106,7 @@ impl Job {
         Self { name, program, words, out, growing, bytes: 0, expected, lines: Vec::new() }
     }
 
-    /// Notes what an undisturbed run leaves, and clears the folder.
+    /// Records the output of an undisturbed run, and clears the folder.
     fn undisturbed(&mut self) {
         let status = self.command().stdout(Stdio::null()).stderr(Stdio::null()).status().unwrap();
         assert!(status.code().is_some_and(|code| code < 2), "{}: {status}", self.name);
@@ -125,7 +125,7 @@ impl Job {
         command
     }
 
-    /// The same, where Ctrl-C ends it also when these tests run in the background of a script, which ignores that.
+    /// Command that Ctrl-C ends also when these tests run in the background of a script, where Ctrl-C is ignored.
     fn in_front(&self) -> Command {
         let mut command = Command::new("env");
         command.arg("--default-signal=INT").arg(self.program).args(&self.words);
@@ -217,7 +217,7 @@ fn timeless(path: &Path) -> Vec<u8> {
     }
 }
 
-/// What happens to a command.
+/// Interruption of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Kind {
     /// The system kills it within a write, to the byte.
@@ -228,11 +228,11 @@ enum Kind {
     Killed,
     /// The same by Ctrl-C.
     CtrlC,
-    /// Who reads its output goes away after some bytes.
+    /// The reader of its output closes the pipe after some bytes.
     ClosedPipe,
     /// Its output goes to a full disk.
     FullOutput,
-    /// A second one is started beside it, and refused.
+    /// A second command is started at the same time, and refused.
     TwoAtOnce,
     /// The first of two is killed, and the second takes over.
     TakenOver,
@@ -305,7 +305,7 @@ fn reached(child: &mut Child, job: &Job, bytes: u64) -> bool {
     }
 }
 
-/// A child that nobody has waited for can be signalled, also when it has ended.
+/// Signals a child. Before `wait` this is valid also after the child has ended.
 fn signal(child: &Child, signal: Signal) {
     kill_process(Pid::from_child(child), signal).unwrap();
 }
@@ -318,7 +318,7 @@ fn signalled(job: &Job, at: u64, kind: Signal) -> bool {
     child.wait().unwrap().signal() == Some(kind.as_raw())
 }
 
-/// Who reads goes away at once, or after some bytes: by then a quick command may have written all.
+/// Closes the reading end at once, or after some bytes; a quick command may have written all of its output before.
 fn closed_pipe(job: &Job, at: u64) -> bool {
     let (pipe, end) = std::io::pipe().unwrap();
     let mut stays = (!at.is_multiple_of(2)).then_some(pipe);
@@ -335,7 +335,7 @@ fn closed_pipe(job: &Job, at: u64) -> bool {
     told.contains("went away")
 }
 
-/// Ends with the test, also where that fails while it is stopped.
+/// Child that ends with the test, also if the test fails while the child is stopped.
 struct Ends(Child);
 
 impl Drop for Ends {
@@ -345,7 +345,7 @@ impl Drop for Ends {
     }
 }
 
-/// The first is stopped while it holds the lock, so that the second comes meanwhile on any machine.
+/// Stops the first command while it holds the lock, so that the second one always meets the lock.
 fn two(job: &Job, kill: bool) -> bool {
     let mut first = Ends(quiet(job.command()).spawn().unwrap());
     let first = &mut first.0;
@@ -376,8 +376,8 @@ fn two(job: &Job, kill: bool) -> bool {
     true
 }
 
-// Interruptions by the hundred: nothing that was whole is lost or changed, and what goes on ends as if nothing had
-// happened.
+// Hundreds of interruptions: no complete file is lost or changed, and a continued run ends with the same result as an
+// undisturbed one.
 
 #[test]
 fn a_short_campaign_loses_nothing() {
@@ -391,7 +391,7 @@ fn the_whole_campaign_loses_nothing() {
     campaign("whole", 24);
 }
 
-/// Interrupts each job a number of times in each way.
+/// Interrupts each job a number of times by each kind.
 fn campaign(name: &str, times: usize) {
     let mut rng = Rng::with_seed(7);
     let mut tally: BTreeMap<(&str, Kind), usize> = BTreeMap::new();
@@ -423,7 +423,7 @@ fn once(job: &Job, kind: Kind, rng: &mut Rng) -> bool {
     let interrupted = strike(job, kind, at);
     let done = job.check_parts(&after);
     if interrupted && kind != Kind::TwoAtOnce && rng.bool() {
-        // Struck again on its way: what was done by then stays.
+        // A second interruption while the command continues: completed results remain.
         strike(job, Kind::CutWrite, rng.u64(1..job.bytes));
         let still = job.check_parts("a second strike");
         assert!(still >= done, "{}: {still} of {done} are left after {after} and a cut", job.name);

@@ -20,7 +20,7 @@ fn merge(file: &Path) -> Command {
     command
 }
 
-/// The exit code, and what was told on the side.
+/// Exit code and standard error of a command.
 fn told(command: &mut Command) -> (Option<i32>, String) {
     let output = command.output().unwrap();
     (output.status.code(), String::from_utf8(output.stderr).unwrap())

@@ -1,10 +1,7 @@
 //! Results of a run: metrics, ledger, recording, report, sweep.
 //!
-//! Metrics and bounds.
-//!
-//! The report as text; how a browser takes it is tested by `cargo xtask test`.
-//!
-//! How the answer to a goal is measured, against forces made by hand, whose figures are known.
+//! The report is tested as text here; `cargo xtask test` shows it in a browser. The metrics of a step response are
+//! tested with synthetic forces, whose figures are known.
 
 mod recorded;
 mod swept;
@@ -67,7 +64,7 @@ fn the_wall_is_measured() {
 
 #[test]
 fn of_two_fingers_faults_the_first_in_time_is_the_scenes() {
-    // Each finger's fault and when it comes, if it does.
+    // Fault of each finger and its time, if there is one.
     let measure = |fingers: [Option<(Fault, f64)>; 2]| {
         let mut meter = Meter::default();
         for (finger, tenth) in (0..10).flat_map(|tenth| [(0, tenth), (1, tenth)]) {
@@ -97,7 +94,7 @@ fn of_two_fingers_faults_the_first_in_time_is_the_scenes() {
     assert_eq!(measure([None, None]), [Some(0.0), None, Some(0.0)]);
 }
 
-/// As where nothing grows with the goal: what one finger lacks, the other does not make up for.
+/// As for a bound that does not grow with the goal: a missing value of one finger is not replaced by that of the other.
 #[test]
 fn of_two_fingers_one_without_a_value_breaks_what_grows_with_the_goal() {
     let mut meter = Meter::default();
@@ -200,7 +197,7 @@ fn a_report_stands_alone_and_has_every_part() {
     for address in ["http:", "https:", "src=", "href=", "url(", "@import"] {
         assert!(!fetched.contains(address), "{address}");
     }
-    // Every picture has words.
+    // Every picture has a description.
     let pictures: Vec<&str> = page.split(" role=\"img\"").skip(1).collect();
     assert!(pictures.len() > 20, "{} pictures", pictures.len());
     assert!(pictures.iter().all(|tag| tag.split('>').next().unwrap().contains(" aria-label=\"")));
@@ -254,7 +251,7 @@ fn a_report_lies_over_another_whatever_the_scenes_are_called() {
     let both = page(Some(&over));
     assert_eq!((both.matches("<script").count(), both.matches("</script>").count()), (4, 4));
     assert!(!both.contains("<!--"));
-    // The other run lies in it as it lay in its own page.
+    // The page holds the data of the other run unchanged.
     let data =
         |page: &str, begin: &str| page.split_once(begin).unwrap().1.split_once("</script>").unwrap().0.to_owned();
     let [own, other] =

@@ -85,7 +85,7 @@ fn runs_are_numbered_point_by_point_and_seed_by_seed() {
         }
     }
     assert_eq!(rows, expected);
-    // And what a row says is what was run.
+    // A row has the values that were run.
     let row = &table.rows[7];
     let set = [&SET[..], &["tip.modulus_kpa=250", "tip.radius_mm=10.5"]].concat();
     let scene = cli::load(SCENE, &set.into_iter().map(String::from).collect::<Vec<_>>(), Some(2)).unwrap();

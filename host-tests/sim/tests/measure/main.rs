@@ -11,7 +11,7 @@ fn population(name: &str, text: &str) -> Population {
     read(name, text).unwrap_or_else(|errors| panic!("{errors}"))
 }
 
-/// What was drawn for a finger under this name.
+/// Value drawn for a finger under this name.
 fn drawn(finger: &Finger, name: &str) -> f64 {
     let found = finger.drawn.iter().find(|(known, _)| known == name);
     let (_, value) = found.unwrap_or_else(|| panic!("no {name}"));

@@ -2,7 +2,7 @@
 
 use crate::{drawn, fingers_or, population, print_worst, rows};
 use fingertip::measure::press::ROWS_MAX;
-use fingertip::measure::{Ended, MeasureStatus, State, Task};
+use fingertip::measure::{Ended, MeasureState, MeasureStatus, Task};
 use fingertip::params::Params;
 use fingertip::shipped::Config;
 use fingertip::state::Fault;
@@ -17,7 +17,7 @@ const TIPS: &str = include_str!("tips.toml");
 /// The largest force of a press as a share of the largest goal.
 const FORCE_SHARE: f64 = 1.05;
 
-/// One press, and what was true meanwhile.
+/// One press, with the true states during it.
 struct Made {
     standing: MeasureStatus,
     fault: Option<Fault>,
@@ -98,7 +98,7 @@ fn complete(count: usize) {
     let most_n = 1e-3 * f64::from(Params::DEFAULT.force_max_mn) * FORCE_SHARE;
     assert!(force_n < most_n && rows <= ROWS_MAX as f64, "{force_n} N, {rows} rows");
     for (number, made) in made.iter().enumerate() {
-        assert!(made.standing.state == State::Done && made.fault.is_none(), "tip {number}");
+        assert!(made.standing.state == MeasureState::Done && made.fault.is_none(), "tip {number}");
     }
     solve_all(&fingers, &made);
 }
@@ -122,7 +122,7 @@ fn solve_all(fingers: &[Finger], made: &[Made]) {
     assert!((0.1..4.0).contains(&median) && worst < 10.0 && 10 * within >= 9 * made.len());
 }
 
-/// What happens to a press, and which endings of it are valid.
+/// Disturbance of a press, and the ends that are valid with it.
 struct Trouble {
     name: &'static str,
     changes: &'static [(&'static str, &'static str)],

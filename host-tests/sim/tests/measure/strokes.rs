@@ -1,7 +1,7 @@
 //! Jog and strokes on drawn drives, in free air and with an object in their way.
 
 use crate::{drawn, fingers_or, population, print_worst, rows};
-use fingertip::measure::{Ended, MeasureStatus, State, Task};
+use fingertip::measure::{Ended, MeasureState, MeasureStatus, Task};
 use fingertip::params::Params;
 use fingertip::shipped::Config;
 use sim::cores;
@@ -74,7 +74,7 @@ fn judge(name: &str, made: &[(Finger, Made)]) -> usize {
     let force_mn = print_worst("  force, mN", all(|made| 1e3 * made.force_n));
     print_worst("  time, s", all(|made| made.took_s));
     print_worst("  rows", all(|made| made.rows.into()));
-    let done = made.iter().filter(|(_, made)| made.standing.state == State::Done).count();
+    let done = made.iter().filter(|(_, made)| made.standing.state == MeasureState::Done).count();
     println!("  {done} of {} complete", made.len());
     assert!(travel_mm < TRAVEL_MM && force_mn < 1e3 * FORCE_N, "{name}: {travel_mm} mm, {force_mn} mN");
     done

@@ -1,8 +1,8 @@
 //! Force limits where the array measures too little: contacts off the middle, saturated taxels, unequal gains.
 //!
-//! The fit takes hold of every contact that reaches over the array's edge, however quickly its force rises from frame
-//! to frame: with a scan that settles slowly, and with stiff tips. Until it does, the force is the sum of what the
-//! array sees, and the tip presses harder.
+//! The fit must start for every contact partly off the array, however quickly its force rises from frame to frame: with
+//! a slow scan, and with stiff tips. Until it starts, the force is the sum over the array: that is too low, and the
+//! tip presses too hard.
 
 use crate::{Ran, asks, holds};
 use fingertip::contact::CONFIDENCE_LEAST;
@@ -31,7 +31,7 @@ fn the_fit_begins_on_every_contact_off_the_middle() {
     }
 }
 
-/// A frame of a slow scan is so long that the touch was over before the fit began.
+/// With the long frames of a slow scan the force once reached its goal before the fit began.
 #[test]
 fn the_fit_begins_with_a_slow_scan() {
     for settle_ns in [40_000, 100_000] {
@@ -76,7 +76,8 @@ fn a_small_tip_presses_no_more_than_its_taxels_show() {
     }
 }
 
-/// Without confidence the plain sum was gone by, which is the dangerous way: 2.44 N at goal 1, 4.73 N at goal 2.
+/// With low confidence the loop once used the plain sum, which is too low and so dangerous: 2.44 N at a goal of 1 N,
+/// 4.73 N at 2 N.
 #[test]
 fn a_doubtful_fit_does_not_press_harder() {
     for spread_percent in [0.0, 4.0, 5.0, 6.0, 12.0] {
@@ -84,7 +85,7 @@ fn a_doubtful_fit_does_not_press_harder() {
             [([8.0, 0.0], 1.0), ([8.0, 0.0], 2.0), ([0.0, -8.0], 1.0), ([0.0, -8.0], 4.0), ([-6.0, 6.0], 1.0)]
         {
             let finger = format!("{centre_mm:?} mm, {spread_percent} %, {goal_n} N");
-            // How much is beside the array nobody can say to 15 %, where taxels differ by that.
+            // With taxels that differ by 15 % the share of the force off the array is uncertain by as much.
             let ran = holds(goal_n, &off(centre_mm, spread_percent, ""));
             let spared: &[_] = if spread_percent > 6.0 { &["hold_error_mn"] } else { &[] };
             let held = ran.keeps_all_but(spared, &finger).first_hold().mean_n / goal_n;
@@ -93,8 +94,8 @@ fn a_doubtful_fit_does_not_press_harder() {
     }
 }
 
-/// The contact's middle is 1.5 to 2.5 mm beside the array, which sees nothing until it is wide: it touched at full
-/// speed meanwhile.
+/// The contact's middle is 1.5 to 2.5 mm off the array, which shows no contact until it is wide: the tip once touched
+/// at full speed.
 #[test]
 fn a_touch_far_beside_the_array_is_slow_until_it_is_known() {
     for spread_percent in [0.0, 6.0] {
@@ -107,18 +108,19 @@ fn a_touch_far_beside_the_array_is_slow_until_it_is_known() {
     }
 }
 
-/// 2.5 mm beside the array the motor feels the touch before the array sees it: 3.7 N were pressed at goal 1.
+/// With a contact 2.5 mm off the array, the external force estimated from the motor shows the touch first. Without that
+/// estimate a goal of 1 N pressed with 3.7 N.
 #[test]
 fn the_motor_feels_a_touch_that_the_array_sees_late() {
     let friction = "[effects.dry_friction]\ntorque_mnm = 0.12\n";
-    // What the array sees of it is too little to hold it still.
+    // The array sees too little of the force to hold it steady.
     let spared = ["hold_error_mn", "hold_swing_mn", "rest_duty_percent"];
     for (centre_mm, goal_n) in [([10.0, 0.0], 1.0), ([10.0, 0.0], 3.0), ([-10.0, 0.0], 1.0), ([0.0, 10.0], 1.0)] {
         let finger = format!("{centre_mm:?} mm, {goal_n} N");
         let ran = holds(goal_n, &off(centre_mm, 0.0, friction)).keeps_all_but(&spared, &finger);
         let held = ran.first_hold().mean_n / goal_n;
         assert!((0.8..1.45).contains(&held), "{finger}: holds {held} of it");
-        // Where taxels differ, too, how much is hidden is told less well.
+        // With unequal gains the hidden share of the force is less certain.
         let peak_n = holds(goal_n, &off(centre_mm, 6.0, friction)).of("peak_force_n");
         assert!((0.8 * goal_n..goal_n + 1.3).contains(&peak_n), "{finger}, gains that spread by 6 %: {peak_n} N");
     }
@@ -162,7 +164,7 @@ fn a_ball_beside_the_middle_is_not_pressed_harder() {
     }
 }
 
-/// A first touch where the array sees next to nothing, and then another force.
+/// A first touch almost completely off the array, and then another goal.
 #[test]
 fn a_step_beside_the_middle_stays_in_the_envelope() {
     for spread_percent in [0.0, 6.0] {
@@ -172,8 +174,8 @@ fn a_step_beside_the_middle_stays_in_the_envelope() {
     }
 }
 
-/// A doubtful fit once said that a force was a thirteenth of what the taxels carry, and the tip was pressed for the
-/// rest.
+/// An uncertain fit once estimated a thirteenth of the force on the taxels, and the loop pressed until that reached the
+/// goal.
 #[test]
 fn a_doubtful_fit_never_says_less_than_the_taxels() {
     let population = sim::population::load("ordinary").unwrap_or_else(|error| panic!("{error}"));
@@ -203,7 +205,7 @@ fn a_clipped_amplifier_gives_no_over_force() {
     }
 }
 
-/// What a finger ends with.
+/// Values at the end of a run, and number of frames in fault.
 #[derive(Debug, Default)]
 struct Held {
     true_n: f64,
@@ -235,7 +237,7 @@ fn is_held(keys: &str, distance_mm: f64, centre_mm: f64, goal_n: f64) {
     assert!(found && error_n <= 0.01 * goal_n + 0.005, "{keys}, {distance_mm}, {centre_mm} mm, {goal_n} N: {held:?}");
 }
 
-/// The distance decides where within a frame the touch comes.
+/// The distance determines the time of the touch within a frame.
 #[test]
 fn a_slow_scan_finds_the_contact() {
     for distance_mm in [2.0, 3.0, 4.0, 5.0, 5.2, 6.0] {

@@ -13,13 +13,13 @@ use sim::watch::{Step, Truth, Watch};
 use sim::{native, population};
 use std::sync::OnceLock;
 
-/// How a finger went.
+/// Result of a run.
 #[derive(Debug)]
 struct Ran {
     outcome: Outcome,
-    /// What was true at the end.
+    /// State of the world at the end.
     end: Truth,
-    /// Where the tip first touched.
+    /// Travel at which the tip first touched, mm.
     touch_mm: Option<f64>,
 }
 
@@ -123,7 +123,7 @@ fn noise_does_not_walk_a_released_tip_back() {
 }
 
 #[test]
-fn warmth_does_not_drive_a_released_tip_away() {
+fn heat_does_not_drive_a_released_tip_away() {
     for warming_k in [20.0, 40.0, -20.0, -40.0] {
         for time_constant_s in [600.0, 20.0, 1.0] {
             for friction_mnm in [0.12, 0.0] {
@@ -189,8 +189,8 @@ fn what_an_array_remembers_is_learnt_anew_after_each_touch() {
     }
 }
 
-/// The array reads more than a contact in the air, and the same code all the way, but it is not frozen. An offset
-/// beyond `contact_off_mn` once ended in fault 4 or 1.
+/// The array reads more than a contact in the air, with the same codes at every travel, but it is not frozen. An offset
+/// above `contact_off_mn` once ended in fault 4 or 1.
 #[test]
 fn an_offset_in_the_air_is_no_fault() {
     for (zero_kpa_per_k, time_constant_s) in [(0.01, 1.0), (0.01, 0.5), (0.02, 1.0), (0.04, 2.0), (-0.02, 1.0)] {
@@ -198,7 +198,7 @@ fn an_offset_in_the_air_is_no_fault() {
             let finger = format!("{zero_kpa_per_k} kPa/K, {time_constant_s} s, {goal_n} N");
             let zero = format!("zero_kpa_per_k = {zero_kpa_per_k:?}\ngain_percent_per_k = 0");
             let warming = format!("[effects.temperature_drift]\n{zero}\ntime_constant_s = {time_constant_s:?}\n");
-            // Of a force that is a hundred of such readings, the offset is not to be told.
+            // At a force a hundred times as large, the offset is indistinguishable.
             let ran = asks(&[(0.0, goal_n), (0.4, 0.0), (1.2, goal_n), (1.7, 0.0)], 2.4, &warming);
             let ran = ran.keeps_all_but(&["hold_error_mn"], &finger);
             ran.stands_clear(1.0, &finger);
@@ -262,10 +262,10 @@ fn coarse_encoders_do_not_swing() {
                     "[motor]\nencoder_counts_per_turn = {counts}\n[effects.noise]\nrms_codes = 1\n\
                     [effects.dry_friction]\ntorque_mnm = {friction_mnm:?}\n"
                 );
-                // Nobody sees a drift within a count: where that is more than the envelope's 50 um, it is what counts.
+                // A drift within a count is invisible: the bound is a count if that is more than the envelope's 50 um.
                 let count_mm = 2.0 * core::f64::consts::PI / (f64::from(counts) * 43.0 / 12.0);
                 let unseen: &[&str] = if count_mm > 0.05 { &["rest_travel_um"] } else { &[] };
-                // Half a second is what the coarsest take to settle.
+                // The coarsest encoders take half a second to settle.
                 let ran = asks(&[(0.0, goal_n), (1.2, 0.0)], 2.4, &tables).keeps_all_but(unseen, &finger);
                 ran.stands_clear(1.0, &finger);
                 assert!(ran.of("rest_travel_um") < 1e3 * count_mm, "{finger}: {} um", ran.of("rest_travel_um"));

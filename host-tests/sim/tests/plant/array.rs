@@ -51,7 +51,7 @@ fn what_lies_beyond_the_array_is_lost() {
 
 #[test]
 fn means_agree_with_brute_force() {
-    // 300 x 300 midpoints a taxel: right to 1e-5 of the peak where the rim passes.
+    // 300 x 300 midpoints per taxel: right to 1e-5 of the peak under the rim.
     let mut worst = 0.0_f64;
     for (d, row, column) in [(1.0, 5, 5), (1.0, 2, 4), (1.0, 2, 3), (2.5, 1, 3), (2.5, 4, 4), (0.2, 5, 6), (0.01, 4, 5)]
     {

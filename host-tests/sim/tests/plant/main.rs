@@ -1,6 +1,6 @@
 //! The simulated board against the paper, the data sheet and closed forms.
 //!
-//! The plant is the finger of a scene that names what the plant holds.
+//! The plant must equal the finger of a scene with the same parameters.
 
 mod array;
 mod drive;
@@ -39,7 +39,7 @@ fn run(world: &mut Plant, seconds: f64, bridge: Bridge) {
     }
 }
 
-/// So many cases of a property, the same on every run.
+/// Configuration for a number of cases of a property, the same cases on every run.
 fn cases(cases: u32) -> Config {
     Config { cases, rng_seed: RngSeed::Fixed(2003), failure_persistence: None, ..Config::default() }
 }

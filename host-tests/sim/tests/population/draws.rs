@@ -1,6 +1,6 @@
 //! Draws: range, distribution, and unchanged values.
 //!
-//! What a mistake in a population looks like to the person who made it.
+//! Also the error messages for mistakes in a population.
 
 use crate::population;
 use sim::native;
@@ -253,7 +253,7 @@ fn what_makes_the_force_wrong_is_larger_than_what_is_left() {
     let budget = Budget::of(1, &native::board, &native::calibrated::board).unwrap();
     for goal in 0..3 {
         let largest = budget.changes.iter().map(|changes| changes[goal]).fold(0.0, f64::max);
-        // A finger is off by what parts vary, and all of that is in the causes.
+        // The error of a finger comes from the variation of its parts, and the causes explain all of it.
         assert!((0.02..0.25).contains(&(budget.all[goal] / [0.5, 1.0, 5.0][goal])), "{budget:?}");
         assert!(largest > 10.0 * budget.none[goal] && budget.none[goal] > 0.0, "{budget:?}");
     }

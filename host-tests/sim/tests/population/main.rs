@@ -1,6 +1,6 @@
 //! Populations: draws, refused texts, the envelope, and shards.
 //!
-//! Fingers that are run: shards and the whole, and the worst ones again.
+//! Some fingers are run: shards must equal the whole, and the scenes of the worst fingers must repeat their results.
 
 mod draws;
 mod promises;
@@ -12,7 +12,7 @@ use sim::sweep::Shard;
 use std::fs;
 use std::path::PathBuf;
 
-/// A population of this text, with what every scene needs before it.
+/// Population of this text, preceded by the keys that every scene needs.
 fn population(lines: &str) -> Population {
     let text = format!("about = \"a test\"\nduration_s = 0.06\n{lines}");
     population::read("test.toml", &text).unwrap_or_else(|errors| panic!("{errors}"))

@@ -13,17 +13,17 @@ use sim::population::load;
 use sim::watch::{Step, Truth, Watch};
 use std::collections::BTreeSet;
 
-/// Where the finger touches, and how deep it goes for a force.
+/// Travel at the touch, mm, and indentation per force.
 const TOUCH_MM: f64 = 5.0;
 const MM_PER_N: f64 = 0.5;
 /// Times, s, and goals, N: three forces, a release, and a second touch and release.
 const SCRIPT: [(f64, f64); 6] = [(0.0, 1.0), (0.9, 4.0), (1.5, 2.0), (2.1, 0.0), (3.1, 1.0), (3.8, 0.0)];
 
-/// What is true at a time.
+/// State of the world at a time.
 #[derive(Clone, Copy, Debug, Default)]
 struct Made {
     time_s: f64,
-    /// Since the goal changed, and how many steps.
+    /// Time since the goal changed, s, and number of steps since the start.
     since_s: f64,
     steps: usize,
     goal_n: f64,
@@ -38,7 +38,7 @@ struct Made {
     disturbed: bool,
 }
 
-/// What a perfect finger does, and what is changed in it; the promises that this breaks.
+/// Returns the promises that a perfect finger breaks after a change of its states.
 fn broken(change: impl Fn(&mut Made)) -> BTreeSet<String> {
     let bounds = load("handled").unwrap().finger(1, 0).unwrap().scene.bounds;
     let mut meter = Meter::default();
@@ -185,13 +185,13 @@ fn a_stop_that_leaves_a_force() {
         }
     };
     two_sided(remains, 0.0399, 0.0401, &["stop_force_mn"]);
-    // What friction holds while torque is off is no fault of the controller.
+    // A force that friction holds while torque is off does not count against the controller.
     let held = |made: &mut Made, friction_n: f64| {
         made.torque_off = made.time_s > 0.3;
         (made.disturbed, made.friction_n, made.force_n) = (true, friction_n, made.force_n.min(1.0));
     };
     two_sided(held, 0.961, 0.959, &["stop_force_mn"]);
-    // An object that comes nearer ends the stop; a fault is a reason.
+    // An object that moves nearer ends the stop; a fault is a reason.
     let pushed = |made: &mut Made, by_mm: f64| {
         (made.disturbed, made.object_mm) = (made.time_s > 2.2, if made.time_s > 2.4 { by_mm } else { 0.0 });
         remains(made, if (2.5..3.0).contains(&made.time_s) { 0.1 } else { 0.0 });

@@ -252,7 +252,7 @@ fn all_mistakes_come_at_once_in_the_order_of_the_text() {
         "about = 3\nseeds = 4\n[tip]\nradius_mm = 100\n[effects.noise]\nrms = 1\n[[expect]]\nmetric = \"x\"\nmin = 1\n";
     let errors = read_it(text).expect_err("six mistakes").0;
     let places: Vec<_> = errors.iter().map(|error| (error.line, error.column)).collect();
-    // `duration_s` is missing: told at the beginning.
+    // `duration_s` is missing: reported at the beginning.
     assert_eq!(places, [(1, 1), (1, 9), (2, 1), (4, 13), (6, 1), (8, 10)]);
 }
 

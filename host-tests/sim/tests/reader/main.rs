@@ -1,8 +1,6 @@
-//! Reader of scenes: accepted texts, messages about others, and no panic on any text.
+//! Reader of scenes: any text gives a scene, or errors with places inside the text; none causes a panic.
 //!
-//! Whatever the text, the reader answers: with a scene, or with errors that lie in it.
-//!
-//! What the keys of the tables and of the effects keep to.
+//! Also the rules for the keys of the tables and of the effects.
 
 mod errors;
 
@@ -70,7 +68,7 @@ fn the_controller_knows_the_finger_unless_told_otherwise() {
             read_it(&format!("about = \"\"\nduration_s = 1\n{tables}")).unwrap_or_else(|errors| panic!("{errors}"));
         scene.params()
     };
-    // The reference finger, but for what only effects bring, and with its direction confirmed.
+    // The reference finger without effects, and with its direction confirmed.
     assert_eq!(
         params(""),
         Params { row_sag_ppb_per_code: 0, friction_unm: 0, direction_confirmed: 1, ..Params::DEFAULT }

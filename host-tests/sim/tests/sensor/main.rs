@@ -1,8 +1,7 @@
 //! Each sensor effect against its closed form, and all of them against any input.
 //!
-//! What holds of every sensor effect, alone and together, over any input.
-//!
-//! Hysteresis, creep, spread and temperature.
+//! Properties of every sensor effect, alone and together, over any input. Also hysteresis, creep, spread and
+//! temperature.
 
 mod network;
 
@@ -137,14 +136,14 @@ fn calls_grow_with_the_number_of_effects_and_not_faster() {
 
 #[test]
 fn an_effects_numbers_are_its_own() {
-    // Naming another effect without magnitude does not change what noise draws.
+    // Naming another effect without magnitude does not change the draws of the noise.
     let noise = "[effects.noise]\nrms_codes = 3\n";
     let more = format!("{noise}[effects.gain_spread]\nrms_percent = 0\n[effects.burst]\namplitude_codes = 0\n");
     assert_eq!(scan(&mut stages(noise, 1), 100, 1), scan(&mut stages(&more, 1), 100, 1));
     assert_ne!(scan(&mut stages(noise, 1), 100, 1), scan(&mut stages(noise, 2), 100, 1));
 }
 
-/// What a taxel reads under a pressure.
+/// Reading of a taxel under a pressure.
 fn reads(effect: &mut dyn Pressure, time_s: f64, kpa: f64) -> f64 {
     let mut row = all(kpa);
     effect.apply(3, time_s, &mut row);

@@ -14,7 +14,7 @@ const DAY_S: f64 = 86_400.0;
 const SLOT_TICKS: f64 = 1523.0;
 const TIMER_HZ: f64 = 168e6;
 
-/// Where a number of equal steps of the clock ends.
+/// Clock after a number of equal steps.
 fn after(steps: u32, step_s: f64) -> Clock {
     let mut clock = Clock::default();
     (0..steps).for_each(|_| clock.go_on(step_s));
@@ -58,7 +58,7 @@ fn a_run_is_the_same_at_any_hour() {
     assert_eq!(run(0.0).digest, run(DAY_S).digest);
 }
 
-/// What is true at each step: N, mm, degrees.
+/// Forces (N), places of the object (mm) and winding temperature (degC) at each step.
 #[derive(Default)]
 struct Truths(Vec<[f64; 5]>);
 
@@ -128,7 +128,7 @@ fn what_lies_between_two_steps_is_what_shorter_steps_come_to() {
         run(&mut fine, 10e-6, short_steps, DRIVE);
         let (row, there) = (coarse.row_off_kpa(0, off_s, ROW), fine.row_kpa(0, f64::INFINITY, ROW));
         for (here, there) in row.into_iter().zip(there) {
-            // 10 us of the way change it by 0.05 %.
+            // 10 us of motion change the pressure by 0.05 %.
             assert!((here - there).abs() < 5e-5 * there.max(1.0), "{here} and {there} kPa at {off_s} s");
         }
         if off_s >= 0.0 {

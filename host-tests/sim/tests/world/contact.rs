@@ -11,7 +11,7 @@ use sim::mechanics::pressures::{Cell, Pressures};
 use sim::setup::Tip;
 use sim::watch::{Step, Watch};
 
-/// Friction that lets nothing move: what is placed stays.
+/// Friction that stops all motion, so that the tip stays where it is placed.
 const HELD: &str = "[effects.dry_friction]\ntorque_mnm = 20.0\n";
 
 fn pressed(text: &str, d_mm: f64) -> sim::world::World<sim::effects::Named> {
@@ -43,7 +43,7 @@ fn a_tip_pulled_back_quickly_leaves_the_object_before_its_shape_returns() {
         world.fingers_mut()[0].place(5.0 + d_mm);
         assert_eq!(world.force_n(0) > 0.0, touches, "{d_mm} mm");
     }
-    // Away from the object it comes back more slowly: dq/dt = -(1 - share) q / tau.
+    // Off the object the tip recovers more slowly: dq/dt = -(1 - share) q / tau.
     world.fingers_mut()[0].place(4.0);
     run(&mut world, 1e-4, 1_000, Bridge::Coast);
     let remembered = (-0.5 * 0.1 / 0.05_f64).exp();
@@ -168,7 +168,7 @@ fn an_object_breaks_once_and_for_all() {
 
 const PITCH_MM: f64 = 1.5;
 
-/// Midpoints along a side; their own error is 1e-5 of the peak where the rim passes.
+/// Number of midpoints along a side of a taxel; their own error is 1e-5 of the peak under the rim.
 const FINE: usize = 200;
 
 fn fine(d_mm: f64, centre_mm: [f64; 2], row: usize, column: usize) -> f64 {

@@ -99,7 +99,7 @@ fn the_gear_lets_its_share_through_and_holds_on_the_way_back() {
     run(&mut world, 20e-6, 100_000, Bridge::Driven { duty: 0.1 });
     let torque_nm = 5.35e-3 * 0.6 / 3.53;
     close(world.force_n(0), 0.7 * torque_nm / (12e-3 / 43.0), 1e-4);
-    // From there the motor may go down to T (2 - 1/eta) = 0.571 T before it gives way.
+    // From there the motor torque may fall to T (2 - 1/eta) = 0.571 T before the gear moves back.
     let held = world.force_n(0);
     for (share, holds) in [(0.41, true), (0.39, false)] {
         let mut duty = 0.1 * share;

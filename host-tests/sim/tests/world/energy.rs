@@ -17,9 +17,9 @@ const HENRY: f64 = 70e-6;
 const COPPER_PER_K: f64 = 0.0039;
 const MAGNET_PER_K: f64 = -0.001;
 
-/// Random lengths of step, kicks now and then, the bridge open, braking or driven. Between kicks the energy of finger,
-/// contact and body never rises by more than the source gives less what the circuit's resistance takes. `share` is that
-/// of the relaxation named.
+/// Steps of random length, occasional kicks, and an open, braking or driven bridge. Between kicks the energy of finger,
+/// contact and body never rises by more than the source supplies, less the loss in the circuit's resistance. `share` is
+/// the share of the relaxation in `text`.
 fn never_rises(text: &str, share: f64) {
     let scene = format!("[object]\ndistance_mm = {WALL_MM:?}\n{text}");
     let mut moving = world(&scene);
@@ -71,7 +71,7 @@ fn never_rises(text: &str, share: f64) {
     assert!(given_mj > 100.0 && taken_mj > 100.0, "{text}: {given_mj} mJ given, {taken_mj} mJ taken");
 }
 
-/// What feeds the motor through a step, from its start.
+/// Electrical state of the motor at the start of a step.
 struct Fed {
     volts: f64,
     ohms: f64,

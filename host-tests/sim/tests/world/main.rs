@@ -1,12 +1,7 @@
-//! The moving world and the effects on it, against closed forms.
+//! The moving world and the effects on it, against closed forms and with extreme numbers.
 //!
-//! A world moved by hand.
-//!
-//! Numbers that are hard to handle.
-//!
-//! What a scene does not name costs nothing, and what has no magnitude changes nothing.
-//!
-//! What the tests of the world share.
+//! Effects that a scene does not name must cost nothing, and effects without magnitude must change nothing. This file
+//! also has the functions that the tests share.
 
 mod clock;
 mod contact;
@@ -185,7 +180,7 @@ fn compiled_in_but_not_named_changes_no_bit_and_is_never_called() {
     let unnamed = run_script::<Named>("");
     assert_eq!(unnamed.digest, run_script::<()>("").digest);
     assert_eq!(unnamed.ledger, []);
-    // The digest sees what changes.
+    // The digest detects a change.
     assert_ne!(unnamed.digest, run_script::<Named>("[effects.noise]\n").digest);
 }
 

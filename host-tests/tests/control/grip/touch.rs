@@ -2,7 +2,8 @@
 
 use super::*;
 
-/// No object leaves at metres in a second: the loop keeps the force of before the step, and does not press harder.
+/// A force that vanishes in one frame is implausible, as no object moves at metres per second: the loop keeps the
+/// earlier force and does not press harder.
 #[test]
 fn a_force_that_falls_by_a_quarter_in_a_frame_is_withheld() {
     let config = config();
@@ -17,7 +18,7 @@ fn a_force_that_falls_by_a_quarter_in_a_frame_is_withheld() {
         assert_eq!(hand.touch.withheld(), Newtons(expected), "{left_mn} mN");
         let presses = reference.speed > MillimetresPerSecond::from_bits(1 << 12);
         assert_eq!(presses, !withheld, "{left_mn} mN: {reference:?}");
-        // The signal returns: what it shows counts again.
+        // The signal returns: the reading counts again.
         hand.frame(1_000, &held, motion, &config);
         assert_eq!(hand.touch.withheld(), Newtons::ZERO, "{left_mn} mN");
     }
@@ -33,7 +34,7 @@ fn a_frame_that_reads_too_much_is_no_reference() {
         (&[1_300, 1_000], 0),
         (&[5_000, 1_000, 5_000, 1_000, 1_000], 0),
         (&[5_000, 5_000, 1_000], 4_000),
-        // Beside it, what falls counts.
+        // A real fall of the force still counts.
         (&[5_000, 1_000, 1_000, 0], 1_000),
         (&[5_000, 1_000, 700], 300),
         (&[5_000, 1_000, 720], 0),
@@ -194,9 +195,9 @@ fn a_force_that_stays_away_is_released_and_sought_again() {
     assert_eq!((hand.touch.stage(), hand.grip.mode(&hand.touch)), (Stage::None, Mode::Approach));
 }
 
-// A release: where it rests, and what moves that place.
+// A release: its place of rest, and changes of that place.
 
-/// To the clearance behind the surface; fast until the force is a quarter of the largest one, and never again then.
+/// Moves to the clearance behind the surface: fast until the force is a quarter of the largest one, then slow for good.
 #[test]
 fn a_release_goes_to_the_clearance_behind_the_surface() {
     let config = config();
@@ -310,7 +311,7 @@ fn a_surface_without_a_place_moves_back_only_where_the_force_falls() {
     }
 }
 
-/// What the array reads while the tip moves back from `from_mm`, as a function of the distance moved; the place of rest.
+/// Releases from `from_mm` with an array force given by the distance moved; returns the travel at rest, mm.
 fn released_mm(mut hand: Hand, from_mm: f64, force_mn: impl Fn(f64) -> f64, config: &Config) -> f64 {
     let mut travel_mm = from_mm;
     // 30 mm/s, a frame of 0.1 ms.
@@ -333,7 +334,7 @@ fn a_release_moves_back_while_the_force_falls() {
     let at_once = |back_mm: f64| 1_000.0 * (1.0 - back_mm / depth_mm).max(0.0).powi(2);
     let rest_mm = released_mm(hand, from_mm, at_once, &config);
     assert!((rest_mm - 4.0).abs() < 0.02, "{rest_mm} mm");
-    // It yields 5 mm: the tip goes on to where the force ends.
+    // The object yields by 5 mm: the tip moves on until the force ends.
     let rest_mm = released_mm(hand, from_mm, |back_mm| 1_000.0 * (1.0 - back_mm / 5.0).max(0.0), &config);
     assert!((from_mm - 6.0 - depth_mm..from_mm - 5.5).contains(&rest_mm), "{rest_mm} mm");
     // A residue stays: it may hide by how much it indents the tip, and no more.
@@ -359,7 +360,7 @@ fn a_residue_from_before_torque_does_not_move_the_place_of_rest_for_ever() {
     }
 }
 
-/// Behind half of the clearance what the array reads is a residue, which the baseline may learn; never while it presses.
+/// Behind half of the clearance the reading is a residue, which the baseline may learn; never while the tip presses.
 #[test]
 fn only_behind_the_surface_the_baseline_learns_a_residue() {
     let config = config();
@@ -379,7 +380,7 @@ fn only_behind_the_surface_the_baseline_learns_a_residue() {
         hand.frame(0, &contact(30, &config), at(mm(from_mm)), &config);
     }
     assert_eq!(hand.touch.stage(), Stage::Clear);
-    // Up to a quarter of what was held.
+    // Up to a quarter of the held force.
     assert!(learns(&hand, 30) && learns(&hand, 250) && !learns(&hand, 251));
     // 40 mN more than that are another touch.
     hand.frame(0, &contact(69, &config), at(mm(4.4)), &config);

@@ -6,13 +6,13 @@ use std::io;
 use std::path::PathBuf;
 use virtual_board::{Error, Options, bringup};
 
-/// What to run and where to put its figures.
+/// Image to run, and file for the figures.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// The image, an ELF.
     #[arg(long, value_name = "ELF")]
     image: PathBuf,
-    /// How many frames the rows are read back for.
+    /// Number of frames for which the rows are read back.
     #[arg(long, default_value_t = 1_000)]
     frames: u32,
     /// Estimated cycles, a line `CYCLES KERNEL` each.

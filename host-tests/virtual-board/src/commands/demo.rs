@@ -5,7 +5,7 @@ use sim::demo::figures;
 use std::path::PathBuf;
 use virtual_board::demo::{self, DemoError, Plan};
 
-/// What to show and where to put it.
+/// Image to demonstrate, and folder for the results.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// The flash image, an ELF for the STM32F446RE.
@@ -25,7 +25,7 @@ pub struct Arguments {
 /// Runs it, prints the table, writes figures and pictures.
 pub fn run(arguments: &Arguments) -> Result<(), DemoError> {
     let (figures, run) = demo::run(&Plan { image: arguments.image.clone(), quick: arguments.quick })?;
-    // The files first: who reads the output may go away.
+    // The files first: the reader of the output may close the pipe.
     let drawn = figures::draw(&run, &figures.forces, &arguments.out);
     if let Some(path) = &arguments.json {
         let written = serde_json::to_string_pretty(&figures).map_err(std::io::Error::from);

@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use std::time::Instant;
 use virtual_board::{Error, Options, Rig};
 
-/// Of what comes often, only so many are listed.
+/// Maximum number of edges and resets that are listed.
 const LISTED: usize = 10;
 
-/// What to run and for how long.
+/// Image to run, and duration.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// The flash image, an ELF for the STM32F446RE.

@@ -9,10 +9,10 @@ use std::time::Duration;
 use virtual_board::serve::Board;
 use virtual_board::{Error, Options, Rig};
 
-/// After which time an answer is told as late: the shortest time-out of the clients that are known.
+/// Time after which an answer is reported as late: the shortest time-out of the known clients.
 const LATE: Duration = Duration::from_millis(10);
 
-/// What to serve and where.
+/// Image to serve, and its port.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// The flash image, an ELF for the STM32F446RE.

@@ -14,7 +14,7 @@ const WAIT_NS: u64 = 20_000_000;
 /// The line is quiet this long after the last request.
 const QUIET_MS: u64 = 2;
 
-/// What the board has done by an instant.
+/// Counts of the board at an instant.
 #[derive(Clone, Copy, Debug)]
 pub struct Counts {
     at_ns: u64,
@@ -37,13 +37,13 @@ impl Counts {
 /// All figures; the keys end with the unit.
 #[derive(Clone, Debug, Serialize)]
 pub struct Figures {
-    /// SHA-256 of the bytes that the flash gets.
+    /// SHA-256 of the image in flash.
     pub image_sha256: String,
-    /// How many these are.
+    /// Size of the image in flash, bytes.
     pub image_bytes: usize,
     /// Virtual time with torque enabled.
     pub virtual_time_s: f64,
-    /// Time that it took here.
+    /// Time that the run took on this machine.
     pub wall_time_s: f64,
     /// Frames in that virtual time.
     pub frames: u64,
@@ -51,18 +51,18 @@ pub struct Figures {
     pub frame_rate_hz: f64,
     /// Frames that the control missed.
     pub missed_frames: u32,
-    /// From a frame's last conversion to its duty.
+    /// Latency from a frame's last conversion to its duty.
     pub latency_us: Range,
-    /// The longest, by the board's own measure.
+    /// Longest latency that the board itself measured.
     pub loop_time_max_us: u16,
     /// Instructions of the whole firmware for a frame: interrupts, executor, step, bus, log. Sleep counts none.
     pub instructions_a_frame: f64,
-    /// What the true force did.
+    /// Figures of the true force.
     #[serde(flatten)]
     pub forces: Forces,
     /// Digest of every duty and every byte on the bus, with their times.
     pub trace_sha256: String,
-    /// The same of the second run; none where it was left out.
+    /// The same digest of the second run; `None` without a second run.
     pub repeated_trace_sha256: Option<String>,
     /// Every figure that has a bound.
     pub checks: Vec<Check>,
@@ -84,15 +84,15 @@ pub struct Range {
 }
 
 impl Figures {
-    /// Takes the figures of a run between two instants; what is not the run's is left to be filled in, and checked then.
+    /// Computes the figures of a run between two instants; all other figures must be filled in later.
     ///
     /// # Errors
-    /// The run was not what the script asked for: nothing was touched, or a force never reached; or the board does not answer.
+    /// The run did not follow the script (no touch, or a force that was not reached), or the board does not answer.
     pub fn of(run: &Run, [from, to]: [&Counts; 2], rig: &mut Rig) -> Result<Self, DemoError> {
         let forces = Forces::of(run)?;
         let frames = to.scans.frames - from.scans.frames;
         let latency = rig.latency()?;
-        // What the scene's host asked for last is answered by then.
+        // The last request of the scene's host is answered after this time.
         rig.run_ms(QUIET_MS)?;
         rig.take_received()?;
         let answer = rig.client(WAIT_NS, |bus: &mut Client| bus.read_u16(ID, address::LOOP_TIME_MAX_US))?;

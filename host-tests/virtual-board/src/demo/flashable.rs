@@ -1,4 +1,4 @@
-//! The bytes that the flash gets: what the emulated board runs, and what a probe would write.
+//! Bytes of the flash: those that the emulated board runs, and that a probe would write.
 
 use crate::image::Firmware;
 use crate::{Error, Rig};
@@ -7,9 +7,9 @@ use object::elf::{FileHeader32, PT_LOAD};
 use object::read::elf::{ElfFile, ProgramHeader};
 use rigless::soc::Width;
 
-/// What an erased byte of flash reads.
+/// Value of an erased byte of flash.
 const ERASED: u8 = 0xff;
-/// More than the largest part has.
+/// Upper bound of the flash size, bytes: more than the largest part has.
 const SPAN_MAX: usize = 2 << 20;
 
 /// The flash's content.
@@ -17,7 +17,7 @@ const SPAN_MAX: usize = 2 << 20;
 pub struct Flashable {
     /// Address of the first byte.
     pub base: u32,
-    /// From there on; gaps between segments read as erased.
+    /// Bytes from the base address on; gaps between segments read as erased.
     pub bytes: Vec<u8>,
 }
 
@@ -56,7 +56,7 @@ impl Flashable {
         rigless::snapshot::digest(&self.bytes).iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
-    /// That these bytes are in the emulated flash, each of them.
+    /// Checks that the emulated flash holds exactly these bytes.
     ///
     /// # Errors
     /// Some byte differs.

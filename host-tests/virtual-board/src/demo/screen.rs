@@ -14,14 +14,14 @@ const FULL_KPA: f64 = 70.0;
 /// The array is drawn this often, in the scene's time.
 const DRAWN_MS: u64 = 50;
 
-/// The terminal, or what stands in for it.
+/// Display of the run: a progress bar on a terminal, plain lines otherwise.
 pub struct Screen {
     scene: Scene,
     array: Taxels,
-    /// Goals that were told.
+    /// Number of goals reported.
     told: usize,
     drawn_ms: u64,
-    /// None where there is no terminal.
+    /// Progress bar; `None` without a terminal.
     bar: Option<ProgressBar>,
 }
 
@@ -38,7 +38,7 @@ impl Screen {
         Self { scene: scene.clone(), array: Taxels::of(scene), told: 0, drawn_ms: 0, bar }
     }
 
-    /// Says what is waited for.
+    /// Reports the reason of a wait.
     pub fn waiting(&self, for_what: &str) {
         self.say(format!("waiting for {for_what}"));
     }
@@ -72,7 +72,7 @@ impl Watch for Screen {
     }
 }
 
-/// The heat map with the figures beside it.
+/// Heat map with the figures next to it.
 fn picture(scene: &Scene, array: &Taxels, step: &Step, told: usize) -> String {
     let Status { mode, contact, .. } = step.status;
     let goal_n = told.checked_sub(1).map_or(0.0, |last| scene.script[last].goal_n);

@@ -23,7 +23,7 @@ pub const READ_BYTES: u64 = 14;
 const FROM: u16 = address::PRESENT_MODE;
 const BYTES: u16 = address::SUPPLY_MV - FROM;
 
-/// What a packet writes into the board.
+/// Value that a packet writes into the board.
 #[derive(Clone, Copy, Debug)]
 pub enum Write {
     /// A goal, mN.
@@ -53,7 +53,7 @@ impl Write {
     }
 }
 
-/// A packet that asks for the status registers.
+/// Packet that requests the status registers.
 pub fn read() -> Vec<u8> {
     let ([a, b], [c, d]) = (FROM.to_le_bytes(), BYTES.to_le_bytes());
     packet(instruction::READ, &[a, b, c, d])

@@ -1,4 +1,4 @@
-//! The board's end of a scene: the world behind the pins, and what only it knows, frame by frame.
+//! The board's side of a scene: the world behind the pins, and the true state at each frame.
 
 use super::joint::Joint;
 use crate::inside::ROOM_C;
@@ -19,21 +19,21 @@ use std::collections::VecDeque;
 /// A frame as the converters made it, and the world at its end.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen {
-    /// How many frames the converters had made by then, this one included.
+    /// Number of frames converted so far, including this one.
     pub number: u64,
-    /// When its last conversion ended, on the board.
+    /// Board time at which its last conversion ended, ns.
     pub end_ns: u64,
-    /// The instant of the world, in the scene's time.
+    /// Scene time at which its last conversion ended, s.
     pub time_s: f64,
     /// The codes.
     pub frame: Frame,
     /// Encoder and supply.
     pub sense: Sense,
-    /// What is true.
+    /// State of the world at this time.
     pub truth: Truth,
 }
 
-/// The scene's time by the board's: a second of the board's lasts `second_s` from an instant on.
+/// Conversion from board time to scene time: from `from_ns` on a second of the board lasts `second_s` in the scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Clock {
     from_ns: u64,
@@ -42,7 +42,7 @@ pub struct Clock {
 }
 
 impl Clock {
-    /// The scene begins so long after power-on.
+    /// Clock of a scene that begins at a time after power-on.
     pub fn new(start_ns: u64) -> Self {
         Self { from_ns: start_ns, from_s: 0.0, second_s: 1.0 }
     }
@@ -57,7 +57,7 @@ impl Clock {
         (self.from_ns as f64 + (time_s - self.from_s) / self.second_s * 1e9).max(0.0) as u64
     }
 
-    /// From an instant on a second of the board lasts so long.
+    /// Sets the duration of a board second from a board time on.
     pub fn run_at(&mut self, at_ns: u64, second_s: f64) {
         if second_s != self.second_s {
             *self = Self { from_ns: at_ns, from_s: self.time_s(at_ns), second_s };
@@ -69,10 +69,10 @@ impl Clock {
 pub struct Finger {
     /// The scene's time.
     pub clock: Clock,
-    /// Whether frames to come bring their true pressures.
+    /// True if the next frames need their true pressures.
     pub wants_pressures: bool,
     bridge: Bridge,
-    /// The world stands still until then.
+    /// Scene time until which the world is frozen, s.
     from_s: f64,
     joint: Joint,
     sensor: sensor::Named,
@@ -92,7 +92,7 @@ impl std::fmt::Debug for Finger {
 }
 
 impl Finger {
-    /// All fingers of a scene, in a world that stands still until a time of the scene's.
+    /// All fingers of a scene, in a world that is frozen until a scene time, s.
     ///
     /// # Errors
     /// The world cannot be simulated.
@@ -161,7 +161,7 @@ impl Finger {
         self.sensor.chip_c(self.clock.time_s(at_ns)).unwrap_or(ROOM_C)
     }
 
-    /// What the encoder has counted by an instant of the board.
+    /// Counts of the encoder at a board time.
     pub fn encoder_counts(&self, at_ns: u64) -> i32 {
         self.joint.encoder_counts(self.clock.time_s(at_ns))
     }
@@ -217,7 +217,7 @@ impl Finger {
         std::mem::take(&mut self.seen)
     }
 
-    /// What the effects on sensor, contact and drive have cost.
+    /// Costs of the effects on sensor, contact and drive.
     pub fn costs(&self) -> Vec<Cost> {
         self.joint.costs(|contact, drive| Named::costs(&self.sensor, contact, drive, &link::Named::default()))
     }

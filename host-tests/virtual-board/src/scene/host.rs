@@ -1,9 +1,8 @@
 //! The scene's host on the bus of one board: it writes goals when the link lets them through, and reads the status.
 //!
-//! It takes a turn at each step of the world's grid. Goals go out in time, whatever else is on the line. A read goes
-//! out where the line is free for it and for its answer, and where the one before was answered: once in ten frames or
-//! more to see what the board does, and when the grip of `[host]` asks for a reading. Each answer is shown, beside the
-//! frame that it was made from.
+//! The host acts at each step of the world's grid. Goals are sent in time, whatever else is on the line. A read is sent
+//! when the line is free for it and its answer, and the read before was answered: every ten frames or more for the
+//! status, and when the grip of `[host]` requests a reading. Each answer is shown with the frame that it was made from.
 
 use super::MS;
 use super::bus::{self, BYTE_NS, GOAL_BYTES, Listener, READ_BYTES, Write};
@@ -18,30 +17,29 @@ use sim::scene::Scene;
 use sim::watch::{Cost, Step};
 use std::collections::VecDeque;
 
-/// The line is busy with a read and its answer for at most so long.
+/// Longest time for which a read and its answer occupy the line, ns.
 const READ_NS: u64 = 450_000;
-/// What was not answered by then never is.
+/// Time after which a read counts as lost, ns.
 const LOST_NS: u64 = 10 * MS;
-/// Packets on the line.
+/// Transmission times of a goal and of a read request, ns.
 const GOAL_NS: u64 = GOAL_BYTES * BYTE_NS;
 const REQUEST_NS: u64 = READ_BYTES * BYTE_NS;
-/// The line rests so long between two packets, for the board to take them for two: a packet begins where the emulated
-/// part next has something to do, which may be a slot of the scan later.
+/// Pause between two packets, so that the board separates them, ns. A packet begins at the next event of the emulated
+/// part, which may be a slot of the scan later.
 const GAP_NS: u64 = 10 * BYTE_NS;
-/// A look at what the board does comes once in so many frames: an answer takes the core's time as well as the
-/// emulator's.
+/// Frames between two reads of the board's status: each answer takes time of the emulated core and of the emulator.
 const LOOK_FRAMES: u64 = 10;
-/// Where every frame is shown anyway.
+/// Shortest time between two reads if every frame is shown anyway, ns.
 const SELDOM_NS: u64 = 10 * MS;
-/// In a long scene there are about so many looks, and more frames between them.
+/// Number of reads in a long scene, about: more frames then pass between two of them.
 const LOOKS: f64 = 4_000.0;
-/// Frames that are kept until an answer speaks of them.
+/// Number of frames kept until an answer refers to them.
 const FRAMES: usize = 128;
 
-/// A goal or a request on its way.
+/// A goal or a request in transmission.
 #[derive(Clone, Copy, Debug)]
 struct Sent {
-    /// Its last byte arrives then.
+    /// Time at which its last byte arrives, ns.
     arrives_ns: u64,
     write: Write,
 }
@@ -53,7 +51,7 @@ struct Asked {
     for_grip: bool,
 }
 
-/// What there is to show of a step.
+/// A step to show.
 #[derive(Clone, Copy, Debug)]
 pub struct Shown {
     finger: usize,
@@ -63,7 +61,7 @@ pub struct Shown {
 }
 
 impl Shown {
-    /// For the watchers.
+    /// Step for the watchers.
     pub fn step(&self) -> Step<'_> {
         Step {
             finger: self.finger,
@@ -85,29 +83,29 @@ pub struct Host {
     clock: Clock,
     start_ns: u64,
     watchdog_ns: u64,
-    /// On their way or not yet taken by a step, in order.
+    /// Packets in transmission or not yet taken by a step, in order.
     sent: VecDeque<Sent>,
-    /// When the last of them is through.
+    /// Time at which the last of them has arrived, ns.
     line_free_ns: u64,
-    /// When requests of the grip are to arrive.
+    /// Times at which requests of the grip must arrive, ns.
     asks_ns: VecDeque<u64>,
     asked: Option<Asked>,
-    /// When to read next, to see what the board does, and how often: in whole milliseconds.
+    /// Time of the next status read, and time between two, ns: whole milliseconds.
     look_ns: u64,
     look_every_ns: u64,
     command: Command,
     listener: Listener,
     status: Status,
-    /// Whether the tare before the start was seen to end: a scene may ask for another one.
+    /// True once the tare before the start has ended: a scene may request another one.
     ready: bool,
-    /// From the converters' number of a frame to the board's own.
+    /// Offset from the converters' frame number to the board's own.
     offset: u32,
     frames: VecDeque<Seen>,
     shown: Vec<Shown>,
-    /// The number of the frame that was shown last, and when that was.
+    /// Number of the frame that was shown last, and its time, ns.
     newest: u64,
     shown_ns: u64,
-    /// When the last goal arrived.
+    /// Time at which the last goal arrived, ns.
     heard_ns: u64,
     every_frame: bool,
 }
@@ -119,8 +117,8 @@ impl std::fmt::Debug for Host {
 }
 
 impl Host {
-    /// Before the start, with the time of a frame, what lies between it and the board, and between the converters'
-    /// numbers of frames and the board's.
+    /// Host before the start, with its link to the board, the frame time, and the offset from the converters' frame
+    /// numbers to the board's.
     pub fn new(scene: &Scene, finger: usize, link: Named, start_ns: u64, frame_ns: u64, offset: u32) -> Self {
         let watchdog_ms = scene.table("host").whole("watchdog_ms") as u64;
         let least_ns = (scene.duration_s * 1e9 / LOOKS) as u64;
@@ -151,22 +149,22 @@ impl Host {
         }
     }
 
-    /// From now on every frame is shown, those too that no answer speaks of; so few looks do.
+    /// Shows every frame from now on, also frames without an answer; fewer reads are then enough.
     pub fn show_every_frame(&mut self) {
         (self.every_frame, self.look_every_ns) = (true, self.look_every_ns.max(SELDOM_NS));
     }
 
-    /// From an instant on a second of the board lasts so long.
+    /// Sets the duration of a board second from a board time on.
     pub fn run_at(&mut self, at_ns: u64, second_s: f64) {
         self.clock.run_at(at_ns, second_s);
     }
 
-    /// What the link's effects have cost.
+    /// Costs of the link's effects.
     pub fn costs(&self) -> impl Iterator<Item = Cost> {
         self.link.costs()
     }
 
-    /// What there is to show since the last time.
+    /// Steps to show since the last call.
     pub fn take_shown(&mut self) -> Vec<Shown> {
         std::mem::take(&mut self.shown)
     }
@@ -184,8 +182,8 @@ impl Host {
         }
     }
 
-    /// A turn: takes in what came from the board and the frames made since the last one, and puts on the line what is
-    /// to go out until the next one.
+    /// Acts once: processes bytes of the board and frames since the last time, and sends the packets that are due
+    /// before the next time.
     pub fn turn(&mut self, now_ns: u64, next_ns: u64, received: Vec<TimedByte>, seen: Vec<Seen>, wire: &mut Wire) {
         self.frames.extend(seen);
         while self.frames.len() > FRAMES {
@@ -196,13 +194,13 @@ impl Host {
                 self.answered(status, timed.at_ns);
             }
         }
-        // Where reads are rare the frames between are shown beside what was read last.
+        // If reads are rare, the frames in between are shown with the status that was read last.
         if self.watchdog_ns > 0 && now_ns >= self.shown_ns + self.look_every_ns {
             let newest = self.frames.back().copied();
             newest.into_iter().for_each(|seen| self.show(seen, now_ns));
         }
         if self.every_frame {
-            // From when the world moves on.
+            // The world moves from this time on.
             let begins_ns = self.start_ns - MS;
             let unseen = self.frames.iter().filter(|seen| seen.number > self.newest && seen.end_ns >= begins_ns);
             unseen.copied().collect::<Vec<_>>().into_iter().for_each(|seen| self.show(seen, now_ns));
@@ -282,7 +280,7 @@ impl Host {
         Some(Asked { at_ns, for_grip })
     }
 
-    /// From when the line is free of goals for as long as a read takes.
+    /// Earliest time from which the line is free of goals for the duration of a read, ns.
     fn free_from_ns(&self, mut at_ns: u64) -> u64 {
         for Sent { arrives_ns, .. } in &self.sent {
             if at_ns < arrives_ns + GAP_NS && arrives_ns - GOAL_NS < at_ns + READ_NS {
@@ -292,7 +290,7 @@ impl Host {
         at_ns
     }
 
-    /// When to look at the board next.
+    /// Time of the next status read.
     ///
     /// The board's bus watchdog counts a read as a sign of life. Where a scene sets it, a read therefore comes only
     /// right behind a goal, and once more when the watchdog must have tripped.

@@ -1,8 +1,9 @@
 //! The world of a scene, which the fingers' boards share.
 //!
-//! Each board runs on a thread of its own. One board alone moves the world on whenever it must. Two meet at every step
-//! of the world's grid: the last to come moves the world on, and none goes on before. What a board sees between two
-//! meetings is the same whichever comes first, so a run repeats exactly. Its duty acts on the whole step, as its mean.
+//! Each board runs on a separate thread. A single board advances the world whenever it must. Two boards meet at every
+//! step of the world's grid: the last to arrive advances the world, and none continues before. The world between two
+//! meetings does not depend on which board arrives first, so a run repeats exactly. The mean duty acts on the whole
+//! step.
 
 use super::finger::Clock;
 use crate::bench::STEP_NS;
@@ -16,26 +17,26 @@ use sim::watch::{Cost, Truth};
 use sim::world::World;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-/// The world and how far each board has come.
-struct State {
+/// The world, and the progress of each board.
+struct SharedWorld {
     world: World<Named>,
     bridges: Vec<Bridge>,
     reached_ns: Vec<u64>,
     moved_to_ns: u64,
     now_s: f64,
-    /// A board is gone: nobody waits for it.
+    /// True once a board has ended: the others no longer wait for it.
     closed: bool,
 }
 
 struct Meeting {
-    state: Mutex<State>,
+    state: Mutex<SharedWorld>,
     moved: Condvar,
     longest_s: f64,
     grid_ns: u64,
 }
 
 impl Meeting {
-    fn lock(&self) -> MutexGuard<'_, State> {
+    fn lock(&self) -> MutexGuard<'_, SharedWorld> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -48,7 +49,7 @@ pub struct Joint {
     held: Held,
 }
 
-/// What the bridge did since the last meeting.
+/// Bridge states since the last meeting.
 struct Held {
     from_ns: u64,
     until_ns: u64,
@@ -64,7 +65,7 @@ impl Held {
         (self.until_ns, self.last) = (self.until_ns.max(to_ns), bridge);
     }
 
-    /// One that does as much, on the average; it coasts where it did at the end.
+    /// Bridge state with the mean duty since the last meeting; it coasts if it coasted at the end.
     fn mean(&mut self) -> Bridge {
         let duty = std::mem::take(&mut self.duty_ns) / (self.until_ns - self.from_ns) as f64;
         self.from_ns = self.until_ns;
@@ -86,7 +87,7 @@ impl Drop for Joint {
 }
 
 impl Joint {
-    /// A hold for each finger of a world that stands at a time of the scene.
+    /// A hold for each finger of a world at scene time `now_s`.
     ///
     /// # Errors
     /// The world's step is too long.
@@ -94,7 +95,7 @@ impl Joint {
         let longest_s = scene.table("world").number("step_us") * 1e-6;
         world.check_step(longest_s)?;
         let fingers = world.fingers().len();
-        let state = State {
+        let state = SharedWorld {
             world,
             bridges: vec![Bridge::Coast; fingers],
             reached_ns: vec![0; fingers],
@@ -129,7 +130,7 @@ impl Joint {
             return state.advance(to_s, self.meeting.longest_s);
         }
         if to_s <= self.now_s() {
-            // It stands still, and nobody waits for anybody.
+            // The world is frozen: no finger waits for another.
             self.held = Held { from_ns: to_ns, until_ns: to_ns, duty_ns: 0.0, last: bridge };
             return;
         }
@@ -158,13 +159,13 @@ impl Joint {
         }
     }
 
-    /// Where the world stands, in the scene's time.
+    /// Present scene time of the world, s.
     pub fn now_s(&self) -> f64 {
         self.meeting.lock().now_s
     }
 
-    /// How far the world is behind a time of the scene.
-    fn behind_s(state: &State, time_s: f64) -> f64 {
+    /// Time by which the world lags behind a scene time, s; at least 0.
+    fn behind_s(state: &SharedWorld, time_s: f64) -> f64 {
         (time_s - state.now_s).max(0.0)
     }
 
@@ -173,7 +174,7 @@ impl Joint {
         self.meeting.lock().world.fingers()[self.finger].supply_v()
     }
 
-    /// What the encoder has counted by a time.
+    /// Counts of the encoder at a scene time.
     pub fn encoder_counts(&self, time_s: f64) -> i32 {
         let mut state = self.meeting.lock();
         let ahead_s = Self::behind_s(&state, time_s);
@@ -187,13 +188,13 @@ impl Joint {
         state.world.row_off_kpa(self.finger, off_s, row)
     }
 
-    /// Encoder and supply, and what is true.
+    /// Encoder and supply, and the true state.
     pub fn look(&self, pressures: bool) -> (Sense, Truth) {
         let world = &mut self.meeting.lock().world;
         (world.sense(self.finger, 0), world.truth(self.finger, pressures))
     }
 
-    /// Lets see what the effects on contact and drive have cost.
+    /// Costs of the effects on contact and drive.
     pub fn costs(&self, of: impl Fn(&ContactEffects, &DriveEffects) -> Vec<Cost>) -> Vec<Cost> {
         let state = self.meeting.lock();
         let finger = &state.world.fingers()[self.finger];
@@ -204,7 +205,7 @@ impl Joint {
 type ContactEffects = sim::effects::contact::Named;
 type DriveEffects = sim::effects::drive::Named;
 
-impl State {
+impl SharedWorld {
     fn advance(&mut self, to_s: f64, longest_s: f64) {
         let (from_s, dt_s) = (self.now_s, to_s - self.now_s);
         if dt_s <= 0.0 {

@@ -12,10 +12,10 @@ pub const FIRST_ROW: usize = 4;
 pub const TRANSFER_ERROR: u64 = 1 << 3;
 pub const HALF: u64 = 1 << 4;
 pub const COMPLETE: u64 = 1 << 5;
-/// Where each stream's flags begin, RM0390 9.5.1.
+/// First bit of each stream's flags, RM0390 9.5.1.
 const FLAG_SHIFT: [u32; 4] = [0, 6, 16, 22];
 
-/// Who asks.
+/// Source of a DMA request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// A converter: its words wait.
@@ -50,12 +50,12 @@ pub fn register(stream: usize, row: Row) -> Register {
     Register::from_index(FIRST_ROW + STREAM_ROWS * stream + row as usize).expect("eight streams of six registers")
 }
 
-/// What a stream's register holds.
+/// Value of a stream's register.
 pub fn get(registers: &RegisterFile, stream: usize, row: Row) -> u64 {
     registers.get(register(stream, row))
 }
 
-/// Where a stream's flags are: their register and their place in it.
+/// Register of a stream's flags, and their first bit in it.
 pub fn status(stream: usize) -> (Register, u32) {
     (if stream < 4 { Register::Lisr } else { Register::Hisr }, FLAG_SHIFT[stream % 4])
 }
@@ -72,7 +72,7 @@ pub fn source(registers: &RegisterFile, stream: usize) -> Option<Source> {
     REQUESTS.iter().find(|(at, on, _)| *at == stream && *on == channel).map(|(_, _, source)| *source)
 }
 
-/// Whether a stream is set up in a way that is modelled.
+/// Returns true if the setup of a stream is modelled.
 pub fn fits(registers: &RegisterFile, stream: usize) -> bool {
     let control = get(registers, stream, Row::Control);
     let plain = s0cr::MINC.is_set(control)

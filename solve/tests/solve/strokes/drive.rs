@@ -18,7 +18,7 @@ pub enum Falls {
 }
 
 #[derive(Clone, Debug)]
-pub struct Drive {
+pub struct SimulatedDrive {
     pub k: f64,
     pub winding_ohm: f64,
     pub bridge_ohm: f64,
@@ -35,7 +35,7 @@ pub struct Drive {
     pub rad_per_mm: f64,
     pub source_v: f64,
     pub source_ohm: f64,
-    /// Friction changes along the way by this share of it, with this period of the motor's angle.
+    /// Share by which friction changes along the travel, and the period of that in the motor's angle.
     pub ripple: f64,
     pub period_rad: f64,
     /// Friction of each motion differs by up to this share of it.
@@ -60,7 +60,7 @@ fn uniform(rng: &mut fastrand::Rng, from: f64, to: f64) -> f64 {
     from + rng.f64() * (to - from)
 }
 
-impl Drive {
+impl SimulatedDrive {
     /// As `host-tests/sim/tests/commission/drives.toml` draws them.
     pub fn ordinary(rng: &mut fastrand::Rng) -> Self {
         let winding_ohm = uniform(rng, 2.4, 3.3);
@@ -120,7 +120,7 @@ impl Drive {
 
 /// Inputs of the controller in a frame.
 #[derive(Clone, Copy, Debug)]
-pub struct View {
+pub struct RigReading {
     pub count: i32,
     pub force_n: f64,
     pub supply_v: f64,
@@ -128,7 +128,7 @@ pub struct View {
 
 /// The drive in motion.
 pub struct Rig {
-    pub drive: Drive,
+    pub drive: SimulatedDrive,
     rng: fastrand::Rng,
     angle: f64,
     speed: f64,
@@ -146,7 +146,7 @@ pub struct Rig {
 }
 
 impl Rig {
-    pub fn new(drive: Drive, seed: u64) -> Self {
+    pub fn new(drive: SimulatedDrive, seed: u64) -> Self {
         let mut rng = fastrand::Rng::with_seed(seed);
         // The encoder starts anywhere within a count.
         let angle = rng.f64() * TAU / drive.counts_per_turn;
@@ -180,12 +180,12 @@ impl Rig {
         self.time_s += FRAME_S;
     }
 
-    pub fn view(&mut self) -> View {
+    pub fn view(&mut self) -> RigReading {
         let count = (self.angle * self.drive.counts_per_turn / TAU).floor() as i32;
         let force_n = if self.drive.blind { 0.0 } else { self.drive.force_n(self.tip_mm) };
         // A converter's noise and steps.
         let supply_v = ((self.supply_v + uniform(&mut self.rng, -4e-3, 4e-3)) * 1e3).round() * 1e-3;
-        View { count: count * self.drive.counts, force_n, supply_v }
+        RigReading { count: count * self.drive.counts, force_n, supply_v }
     }
 
     fn step(&mut self, duty: f64) {

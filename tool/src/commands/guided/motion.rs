@@ -4,10 +4,10 @@ use super::result::{Found, GainRows};
 use super::{Presses, Run, Session};
 use crate::commands::moving::Moving;
 use crate::commands::{TOUCHED, capture, no_fault, tare};
-use crate::state::ANEW;
+use crate::state::RESTARTED;
 use crate::{Client, Error, table};
-use fingertip::capture::State as Kept;
-use fingertip::measure::{Ended, State, Task};
+use fingertip::capture::CaptureState;
+use fingertip::measure::{Ended, MeasureState, Task};
 use fingertip::pressure::{GAIN_MAX, GAIN_ONE};
 use fingertip::shipped::address;
 use serde_json::json;
@@ -52,7 +52,7 @@ pub fn ready(client: &mut Client) -> Result<(), Error> {
 
 /// Fails while a measuring motion runs, which a tare would end.
 pub fn alone(client: &mut Client) -> Result<(), Error> {
-    if client.number(address::MEASURE_STATE)? == State::Running as i64 {
+    if client.number(address::MEASURE_STATE)? == MeasureState::Running as i64 {
         return Err("another motion that measures is under way: wait for its end, or `fingertip stop`".into());
     }
     Ok(())
@@ -89,10 +89,11 @@ pub fn motion(task: Task, run: &Run<'_>, client: &mut Client) -> Result<Vec<u8>,
     }
     let kept = client.block(address::CAPTURE_STATE, address::CAPTURE_COUNT)?;
     let now = kept.number(address::CAPTURE_COUNT);
-    if kept.number(address::CAPTURE_STATE) != Kept::Done as i64 || now == count {
-        return Err(
-            format!("the controller has no record of the motion: {ANEW}, or another host began a capture").into()
-        );
+    if kept.number(address::CAPTURE_STATE) != CaptureState::Done as i64 || now == count {
+        return Err(format!(
+            "the controller has no record of the motion: {RESTARTED}, or another host began a capture"
+        )
+        .into());
     }
     capture::fetch(client, now, &|text| run.report(text))
 }
@@ -112,12 +113,12 @@ fn carry_out(task: Task, run: &Run<'_>, client: &mut Client) -> Result<(), Error
             [address::MEASURE_STATE, address::MEASURE_ENDED, address::MEASURE_VALUE, address::MEASURE_TASK]
                 .map(|register| block.number(register));
         run.interrupt.check()?;
-        if state != State::Running as i64 {
+        if state != MeasureState::Running as i64 {
             no_fault(client)?;
             let full = task == Task::Press && ended == Ended::Full as i64;
-            return if state == State::None as i64 || of != task as i64 {
-                Err(format!("the motion came to no end: {ANEW}").into())
-            } else if state == State::Done as i64 || full {
+            return if state == MeasureState::None as i64 || of != task as i64 {
+                Err(format!("the motion came to no end: {RESTARTED}").into())
+            } else if state == MeasureState::Done as i64 || full {
                 Ok(())
             } else {
                 Err(ended_early(task, ended, value))

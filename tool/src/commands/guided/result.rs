@@ -85,7 +85,7 @@ fn set_names() -> impl Iterator<Item = &'static str> {
     fingertip::params::Params::RANGES.into_iter().map(|(name, ..)| name)
 }
 
-/// Shows what was found, writes it where that is wanted, and prints the JSON object.
+/// Shows the results, writes them if confirmed, and prints the JSON object.
 ///
 /// # Errors
 /// A part has no result, or the controller refused: then nothing was changed.

@@ -18,7 +18,7 @@ const COUNT: &str = "entries";
 
 /// Content of a backup.
 pub(super) struct Kept {
-    /// Of registers with a name.
+    /// Values of registers with a name.
     pub values: Vec<Value>,
     /// The taxels' gains, in rows; `None` if the file has none.
     pub gains: Option<Vec<Vec<u16>>>,

@@ -100,7 +100,7 @@ fn without_the_factory_s_codes_there_is_no_temperature_and_no_term() {
 }
 
 #[test]
-fn a_low_analogue_supply_is_told_and_makes_no_warmth() {
+fn a_low_analogue_supply_is_reported_and_does_not_change_the_temperature() {
     let mut setup = Setup::default();
     setup.array.reference_v = 3.1;
     let mut rig = Rig::new(&image(), Plant::new(&setup), &Options::default()).expect("the image starts");
@@ -142,7 +142,7 @@ fn codes_that_stay_away_are_no_temperature_and_the_finger_holds_on() {
     poke(&mut rig, ADC1_CR1, SCAN | INJECTED_FOLLOWS);
     rig.run_ms(80).expect("it runs");
     assert!(chip_mc(&mut rig) > 25_000);
-    // The emulated converter tells where they are sampled too shortly.
+    // The emulated converter reports inputs that are sampled for too short a time.
     rig.check_gaps().expect("nothing is missing");
     poke(&mut rig, ADC1_SMPR1, 0);
     rig.run_ms(1).expect("it runs");

@@ -1,4 +1,4 @@
-//! The array's drift with the microcontroller's temperature: what is made of it, its bounds, and that it is off at 0.
+//! Compensation of the array's drift with the microcontroller's temperature: result, bounds, and off at 0.
 
 use fingertip::chip::{Chip, FRAMES, Factory};
 use fingertip::command::Command;
@@ -25,12 +25,12 @@ fn celsius(degrees: i32) -> Option<Celsius> {
 
 /// From a tare at one temperature to another, long after.
 fn warmed(from: i32, to: i32, config: &Config) -> TemperatureDrift {
-    let mut warmth = TemperatureDrift::default();
+    let mut drift = TemperatureDrift::default();
     // What it was before the tare is forgotten.
-    (0..30_000).for_each(|frame| warmth.observe(celsius(if frame == 0 { from + 7 } else { from }), config));
-    warmth.zero(1 << 16);
-    (0..30_000).for_each(|_| warmth.observe(celsius(to), config));
-    warmth
+    (0..30_000).for_each(|frame| drift.observe(celsius(if frame == 0 { from + 7 } else { from }), config));
+    drift.zero(1 << 16);
+    (0..30_000).for_each(|_| drift.observe(celsius(to), config));
+    drift
 }
 
 #[test]
@@ -49,36 +49,36 @@ fn at_coefficients_of_zero_and_before_a_reading_there_is_none() {
     let off = config(0, 0);
     assert_eq!(warmed(0, 100, &off), TemperatureDrift::default());
     let on = config(3_600, 10);
-    let mut warmth = TemperatureDrift::default();
-    warmth.observe(None, &on);
-    assert_eq!(warmth.force(newtons(3_000), &on), Newtons::ZERO);
-    let mut warmth = warmed(25, 45, &on);
-    warmth.observe(celsius(45), &off);
-    assert_eq!(warmth.force(newtons(3_000), &on), Newtons::ZERO);
+    let mut drift = TemperatureDrift::default();
+    drift.observe(None, &on);
+    assert_eq!(drift.force(newtons(3_000), &on), Newtons::ZERO);
+    let mut drift = warmed(25, 45, &on);
+    drift.observe(celsius(45), &off);
+    assert_eq!(drift.force(newtons(3_000), &on), Newtons::ZERO);
 }
 
 #[test]
 fn a_reading_that_stays_away_and_comes_back_moves_nothing() {
     let config = config(3_600, 10);
-    let mut warmth = warmed(25, 45, &config);
-    let before = warmth.force(newtons(3_000), &config);
+    let mut drift = warmed(25, 45, &config);
+    let before = drift.force(newtons(3_000), &config);
     assert!(before > newtons(200));
     for chip in [None, celsius(45), None, None, celsius(45)] {
-        warmth.observe(chip, &config);
-        assert_eq!(warmth.force(newtons(3_000), &config), before);
+        drift.observe(chip, &config);
+        assert_eq!(drift.force(newtons(3_000), &config), before);
     }
 }
 
 #[test]
 fn the_zero_s_temperature_moves_as_the_baseline_does() {
     let config = config(0, 10);
-    let mut warmth = warmed(45, 25, &config);
-    let at = |warmth: &TemperatureDrift| warmth.force(newtons(3_000), &config).0.to_num::<f64>();
-    assert!((at(&warmth) + 0.045).abs() < 1e-3);
+    let mut drift = warmed(45, 25, &config);
+    let at = |drift: &TemperatureDrift| drift.force(newtons(3_000), &config).0.to_num::<f64>();
+    assert!((at(&drift) + 0.045).abs() < 1e-3);
     // Nothing of the baseline, a hundredth, a half, all of it.
     for (share, left) in [(0, 1.0), (655, 0.99), (1 << 15, 0.495), (1 << 16, 0.0)] {
-        warmth.zero(share);
-        assert!((at(&warmth) + 0.045 * left).abs() < 1e-4, "{share}: {}", at(&warmth));
+        drift.zero(share);
+        assert!((at(&drift) + 0.045 * left).abs() < 1e-4, "{share}: {}", at(&drift));
     }
 }
 
@@ -126,11 +126,11 @@ fn the_reading_exceeds_the_goal_by_its_drift() {
 #[test]
 fn it_follows_slowly() {
     let config = config(3_600, 0);
-    let mut warmth = TemperatureDrift::default();
-    warmth.observe(celsius(25), &config);
+    let mut drift = TemperatureDrift::default();
+    drift.observe(celsius(25), &config);
     // A reading that is wrong for a frame moves it by a thousandth of that.
-    warmth.observe(celsius(125), &config);
-    let found: f64 = warmth.force(newtons(5_000), &config).0.to_num();
+    drift.observe(celsius(125), &config);
+    let found: f64 = drift.force(newtons(5_000), &config).0.to_num();
     assert!(found > 0.0 && found < 5.0 * 0.0036 * 0.11, "{found}");
 }
 
@@ -147,15 +147,15 @@ proptest! {
             ..images::CONFIRMED
         };
         let config = Config::shipped(&params).unwrap();
-        let mut warmth = TemperatureDrift::default();
+        let mut drift = TemperatureDrift::default();
         for (chip, frames, zeroes) in chips {
             for _ in 0..frames {
-                warmth.observe(chip.map(Celsius::from_bits), &config);
+                drift.observe(chip.map(Celsius::from_bits), &config);
             }
             if zeroes {
-                warmth.zero(1 << 16);
+                drift.zero(1 << 16);
             }
-            let found = warmth.force(Newtons::from_bits(held), &config).to_bits();
+            let found = drift.force(Newtons::from_bits(held), &config).to_bits();
             prop_assert!(i64::from(found).abs() <= i64::from(held.max(0)) / 2);
         }
     }
@@ -208,7 +208,7 @@ proptest! {
     }
 }
 
-// Creep that is taken off a held force: what is found of it, its bounds, and what never hears of it.
+// Compensation of the creep of a held force: result, bounds, and parts that must not depend on it.
 
 fn creeping(creep_permille: i32, creep_time_ms: i32) -> Config {
     Config::shipped(&Params { creep_permille, creep_time_ms, ..images::CONFIRMED }).unwrap()
@@ -230,7 +230,7 @@ fn a_reading_that_creeps_as_described_gives_the_force_that_is_held() {
             creep.observe(true, Newtons::from_bits((reading * 65_536.0) as i32), &config);
             worst = worst.max((reading - creep.force().0.to_num::<f64>() - 2.0).abs());
         }
-        // Units of 15 uN, the share of a frame's way, and the rate of the filter to 2^-10 of itself.
+        // Units of 15 uN, the change in a frame, and the filter rate, which is exact to 2^-10 of itself.
         assert!(worst < 2.0 * rate * 2e-3 + 1e-4, "{permille} {time_ms}: {worst} N");
         assert!(creep.force().0.to_num::<f64>() > 1.8 * rate, "there was something to take off");
     }

@@ -130,7 +130,7 @@ pub fn example(choice: Choice, console: &mut Console) -> Result<()> {
 }
 
 /// The lines of the page's table.
-pub fn table(page: &str) -> String {
+fn table(page: &str) -> String {
     let lines = page.lines().skip_while(|line| !line.starts_with("<!-- cores"));
     lines.skip(1).take_while(|line| line.starts_with('|')).collect::<Vec<_>>().join("\n")
 }

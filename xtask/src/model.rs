@@ -24,6 +24,11 @@ pub struct FitArgs {
     check: bool,
 }
 
+impl FitArgs {
+    /// Checks the tables.
+    pub const CHECK: Self = Self { cases: None, quick: false, write: false, check: true };
+}
+
 /// Prints the tables, writes or checks them.
 pub fn fit(args: &FitArgs, console: &mut Console) -> Result<()> {
     let mut command = Program::tool("fit").build(console)?;
@@ -70,6 +75,11 @@ pub struct ProveArgs {
     /// Fail where the figures in docs/model.md are stale
     #[arg(long, conflicts_with_all = ["quick", "write"])]
     check: bool,
+}
+
+impl ProveArgs {
+    /// Checks the figures.
+    pub const CHECK: Self = Self { quick: false, write: false, check: true };
 }
 
 /// Answers rows of CSV on standard input.

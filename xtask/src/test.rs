@@ -1,6 +1,7 @@
 //! Tests and checks, one stage each.
 
 use crate::console::{self, Console, clear_line, cpu_s};
+use crate::model::{self, FitArgs, ProveArgs};
 use crate::size::{self, Sizes};
 use crate::toolchain::{self, Choice, TARGET, Toolchain};
 use crate::{apt, bringup, cores, docs, host, image, python, timing};
@@ -10,15 +11,25 @@ use std::time::Instant;
 
 /// Flags of `cargo xtask test`.
 #[derive(clap::Args)]
-#[command(after_help = "Examples:\n  cargo xtask test\n  cargo test    (core and host only, needs nothing but Rust)")]
-pub struct Args {}
+#[command(
+    after_help = "Examples:\n  cargo xtask test\n  cargo xtask test --long    (the cases that the usual size leaves out)\n  \
+    cargo test    (core and host only, needs nothing but Rust)"
+)]
+pub struct Args {
+    /// Run the cases that the usual size leaves out, and the campaigns of proofs and fits, instead
+    #[arg(long)]
+    long: bool,
+}
 
-/// Runs all tests.
+/// Runs every test at its usual size, or what that leaves out.
 ///
 /// # Errors
 /// Names the stages that failed.
-pub fn run(_args: &Args, choice: Choice) -> Result<()> {
+pub fn run(args: &Args, choice: Choice) -> Result<()> {
     let mut stages = Stages::default();
+    if args.long {
+        return long(stages);
+    }
     stages.stage("core and host tests", |console| host::test(console::cargo("test").arg("--no-fail-fast"), console));
     stages.stage("fit of a sensor to recordings", |console| {
         let mut command = python::script("test_fit.py", console)?;
@@ -37,9 +48,6 @@ pub fn run(_args: &Args, choice: Choice) -> Result<()> {
     });
     stages.stage("panic-free proof", |console| size::prove_panic_free(choice, console));
     stages.stage("emulated Cortex-M4F against this machine", |console| cores::test_m4(choice, console));
-    stages.stage("emulated cores of other boards against this machine", |console| {
-        cores::page(choice, console).map(|page| console.print(&cores::table(&page)))
-    });
     stages.stage("example for another board", |console| cores::example(choice, console));
     stages.stage("timing model against published measurements", |console| timing::check(choice, console));
     stages.stage("virtual board", |console| {
@@ -64,6 +72,17 @@ pub fn run(_args: &Args, choice: Choice) -> Result<()> {
         host::test(on_a_board(&["--test", "report"]).env("FINGERTIP_CHROMIUM", &program), console)
     });
     stages.finish("test")
+}
+
+/// Runs the remaining cases of the tests with two sizes (their names begin with `long_`), and checks the tables of proofs
+/// and fits.
+fn long(mut stages: Stages) -> Result<()> {
+    stages.stage("long core and host tests", |console| {
+        host::test(console::cargo("test").args(["--no-fail-fast", "--", "--ignored", "long_"]), console)
+    });
+    stages.stage("proofs of the model's error bounds", |console| model::prove(&ProveArgs::CHECK, console));
+    stages.stage("fit of thousands of tactile images", |console| model::fit(&FitArgs::CHECK, console));
+    stages.finish("test --long")
 }
 
 /// Tests of the packages that stand around an image or a served finger. All of them are selected each time, so that they

@@ -82,11 +82,29 @@ fn the_examples_stream_show_set_and_recover() {
     assert!(recovered.ends_with("times\n"), "{recovered}");
 }
 
-#[test]
-#[ignore = "needs a Python with dynamixel-sdk: `cargo xtask test` runs it"]
-fn the_package_passes_its_tests() {
-    let tests = Path::new(env!("FINGERTIP_ROOT")).join("python/tests");
-    let mut command = python();
-    command.env("FINGERTIP_SERVE", env!("CARGO_BIN_EXE_serve"));
-    said(command.args(["-m", "unittest", "discover"]).arg(tests));
+/// Tests of the package, a function for each file: they run side by side.
+macro_rules! files {
+    ($($file:ident)*) => {
+        $(#[test]
+        #[ignore = "needs a Python with dynamixel-sdk: `cargo xtask test` runs it"]
+        fn $file() {
+            let tests = Path::new(env!("FINGERTIP_ROOT")).join("python/tests");
+            let mut command = python();
+            command.env("FINGERTIP_SERVE", env!("CARGO_BIN_EXE_serve"));
+            let pattern = concat!(stringify!($file), ".py");
+            said(command.args(["-m", "unittest", "discover", "--pattern", pattern]).arg(tests));
+        })*
+
+        #[test]
+        fn every_file_of_tests_is_listed() {
+            let tests = Path::new(env!("FINGERTIP_ROOT")).join("python/tests");
+            let files = std::fs::read_dir(tests).expect("the folder is there").map(|file| file.expect("a file").file_name());
+            let mut names: Vec<_> = files.filter_map(|name| name.into_string().ok()).collect();
+            names.retain(|name| name.starts_with("test_") && name.ends_with(".py"));
+            names.sort();
+            assert_eq!(names, [$(concat!(stringify!($file), ".py")),*]);
+        }
+    };
 }
+
+files! { test_bus test_finger test_interrupted test_line test_package }

@@ -39,4 +39,5 @@ pub mod study {
     pub mod page;
     pub mod scan;
     pub mod simulation;
+    pub mod whole_loop;
 }

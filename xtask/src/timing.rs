@@ -205,6 +205,8 @@ fn table(run: &Run) -> String {
 const STUDY: &str = "study";
 /// The profile of everything but the firmware's own code.
 const STUDY_PROFILE: &str = "study";
+/// Number of fingers of the whole loop.
+const FINGERS: &str = "12";
 
 /// Flags of `cargo xtask study`.
 #[derive(clap::Args)]
@@ -233,8 +235,12 @@ pub fn study(args: &StudyArgs, choice: Choice, console: &mut Console) -> Result<
     let shipped = image::build(toolchain, STUDY, STUDY, console)?;
     let shipped = measured(&shipped, &inputs, &folder.join("shipped.txt"), console)?;
     let quick = measured(&build_quick(toolchain, console)?, &inputs, &folder.join("quick.txt"), console)?;
+    let mut fingers = Program::sim("budget").build(console)?;
+    let held = console::output(fingers.args(["--whole-loop", "--fingers", FINGERS]))?;
+    let whole_loop = folder.join("whole-loop.txt");
+    fs::write(&whole_loop, held).with_context(|| format!("cannot write {}", paths::shown(&whole_loop)))?;
     let mut command = judge.build(console)?;
-    command.arg("report").arg(&shipped).arg(&quick).args(args.check.then_some("--check"));
+    command.arg("report").arg(&shipped).arg(&quick).arg(&whole_loop).args(args.check.then_some("--check"));
     for (flag, path) in [("--json", &args.json), ("--out", &args.out)] {
         if let Some(path) = path {
             command.arg(flag).arg(std::path::absolute(path).with_context(|| paths::shown(path))?);

@@ -8,6 +8,8 @@ pub mod cli;
 mod draw;
 mod read;
 pub mod report;
+#[cfg(feature = "calibrated")]
+pub mod whole_loop;
 
 pub use draw::Drawn;
 pub use read::{folder, load, read};

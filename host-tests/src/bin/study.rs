@@ -2,27 +2,28 @@
 //!
 //! `study inputs FILE` writes the inputs for the image. `study few KEPT FULL` writes the few that the image of `cargo
 //! xtask bringup` keeps, and the same with the records that it makes itself.
-//! `study report SHIPPED QUICK [--check] [--json FILE] [--out DIR]` judges two runs, of the image built as the firmware
-//! is and built for speed: it renews or checks `docs/study.md`, the README's table and the pictures.
+//! `study report SHIPPED QUICK LOOP [--check] [--json FILE] [--out DIR]` judges two runs, of the image built as the firmware
+//! is and built for speed, and the lines of `budget --whole-loop`: it renews or checks `docs/study.md`, the README's table
+//! and the pictures.
 
 use host_tests::program::ended;
 use host_tests::study::inputs::Inputs;
 use host_tests::study::kernels::KERNELS;
 use host_tests::study::page::Studied;
+use host_tests::study::whole_loop::{self, WholeLoop};
 use host_tests::study::{front, kernels, output, page};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-const USAGE: &str =
-    "usage: study inputs FILE | study few KEPT FULL | study report SHIPPED QUICK [--check] [--json FILE] [--out DIR]";
+const USAGE: &str = "usage: study inputs FILE | study few KEPT FULL | study report SHIPPED QUICK LOOP [--check] [--json FILE] [--out DIR]";
 
 fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();
     ended(match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["inputs", file] => fs::write(file, Inputs::new().to_bytes()).map_err(|error| format!("{file}: {error}")),
         ["few", kept, full] => few(kept, full),
-        ["report", shipped, quick, ref flags @ ..] => report([shipped, quick], flags),
+        ["report", shipped, quick, whole, ref flags @ ..] => report([shipped, quick], whole, flags),
         _ => Err(USAGE.into()),
     })
 }
@@ -35,7 +36,7 @@ fn few(kept: &str, full: &str) -> Result<(), String> {
     Ok(())
 }
 
-fn report(runs: [&str; 2], flags: &[&str]) -> Result<(), String> {
+fn report(runs: [&str; 2], whole: &str, flags: &[&str]) -> Result<(), String> {
     let (mut check, mut json, mut out) = (false, None, None);
     let mut flags = flags.iter();
     while let Some(flag) = flags.next() {
@@ -58,9 +59,12 @@ fn report(runs: [&str; 2], flags: &[&str]) -> Result<(), String> {
     }
     let root = Path::new(env!("FINGERTIP_ROOT"));
     let mut files = Vec::new();
-    for (page, tables) in [(page::PAGE, page::markdown(&studied)), (page::README, page::readme(&studied))] {
+    let whole = WholeLoop::read(&fs::read_to_string(whole).map_err(|error| format!("{whole}: {error}"))?)?;
+    let tables = page::markdown(&studied, whole.markdown(&studied)?);
+    for (page, tables) in [(page::PAGE, tables), (page::README, whole.readme(&studied)?)] {
         files.push((page.name.to_owned(), page.renewed(&tables)?.1));
     }
+    files.push((whole_loop::PICTURE.to_owned(), whole.draw(&studied)?));
     for (kernel, points) in studied.iter().filter(|(kernel, _)| kernel.has_error()) {
         let picture = front::draw(kernel, points).map_err(|error| error.to_string())?;
         files.push((format!("docs/pictures/study-{}.svg", kernel.name), picture));

@@ -15,9 +15,9 @@ pub const README: Page = Page { name: "README.md", ..PAGE };
 /// A kernel with its variants, cheapest first.
 pub type Studied<'a> = (&'a Kernel, Vec<Point>);
 
-/// All tables.
-pub fn markdown(studied: &[Studied]) -> String {
-    let mut page = String::new();
+/// All tables; the whole loop comes first.
+pub fn markdown(studied: &[Studied], whole_loop: String) -> String {
+    let mut page = whole_loop;
     for (kernel, points) in studied {
         section(&mut page, kernel, points);
     }
@@ -114,45 +114,6 @@ pub fn figure(value: f64) -> String {
         }
         _ => format!("{value:.1e}"),
     }
-}
-
-/// The firmware's variants, a line each; of the contact's pictures only those with noise.
-pub fn readme(studied: &[Studied]) -> String {
-    let mut table = String::from(
-        "| kernel | the firmware's way | instructions | estimated cycles | with flash | error, max | |\n\
-        | --- | --- | --- | --- | --- | --- | --- |\n",
-    );
-    for (kernel, points) in studied {
-        let beaten = beaten_by(points);
-        for (point, by) in points.iter().zip(beaten).filter(|(point, _)| point.firmware) {
-            let Cost { instructions, estimate, flash, .. } = point.cost;
-            let error = match kernel.has_error() {
-                true => format!("{} ({})", figure(point.error_max), kernel.error),
-                false => String::new(),
-            };
-            let left_out = if kernel.has_error() { !point.competes() } else { point.name != "Pipeline::step" };
-            if left_out || kernel.name == "fit-clean" {
-                continue;
-            }
-            let place = if !kernel.has_error() {
-                ""
-            } else if by.is_none() {
-                "front"
-            } else {
-                "beaten: [why](docs/study.md)"
-            };
-            let _ = writeln!(
-                table,
-                "| {} | {} | {} | {} | {} | {error} | {place} |",
-                kernel.title.to_lowercase(),
-                point.name,
-                instructions.median,
-                estimate.median,
-                flash.median,
-            );
-        }
-    }
-    table
 }
 
 /// An object for each variant, a line each.

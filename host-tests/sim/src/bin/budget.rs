@@ -4,6 +4,7 @@ use clap::Parser;
 use output::say;
 use sim::native;
 use sim::population::budget::Budget;
+use sim::population::whole_loop;
 use std::process::ExitCode;
 
 /// Says how much of the force's error each of the sensor's weaknesses makes at 0.5, 1 and 5 N.
@@ -13,12 +14,20 @@ struct Args {
     /// Number of fingers, each run 14 times
     #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u32).range(1..))]
     fingers: u32,
+    /// Says instead how far the force is off at each fit level, and what other frame rates change, as words for a program
+    #[arg(long)]
+    whole_loop: bool,
 }
 
 fn main() -> ExitCode {
-    match Budget::of(Args::parse().fingers as usize, &native::board, &native::calibrated::board) {
-        Ok(budget) => {
-            say::text(budget.page());
+    let Args { fingers, whole_loop: whole } = Args::parse();
+    let text = match whole {
+        true => whole_loop::lines(fingers as usize),
+        false => Budget::of(fingers as usize, &native::board, &native::calibrated::board).map(|budget| budget.page()),
+    };
+    match text {
+        Ok(text) => {
+            say::text(text);
             ExitCode::SUCCESS
         }
         Err(why) => {

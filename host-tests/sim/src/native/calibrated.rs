@@ -174,8 +174,8 @@ pub fn plate(scene: &Scene, place: Place) -> Result<Scene, RunError> {
     )
 }
 
-/// Returns a scene with other values.
-fn changed(scene: &Scene, changes: &[(&str, String)]) -> Result<Scene, RunError> {
+/// Returns a scene with other values, each by its path.
+pub fn changed(scene: &Scene, changes: &[(&str, String)]) -> Result<Scene, RunError> {
     let bare = Scene { bounds: Vec::new(), ..scene.clone() };
     let text = changes.iter().try_fold(write(&bare), |text, (path, value)| set(&text, path, value))?;
     Ok(Scene { bounds: scene.bounds.clone(), ..read("finger.toml", &text, &[])? })

@@ -1,0 +1,190 @@
+//! The whole loop: what cycles, frame rate and bits buy in the true force of a population of fingers.
+
+use super::front::Point;
+use super::page::{Studied, figure};
+use fingertip::params::Params;
+use fingertip::shipped::{CLOCKS, Config, SLOTS};
+use output::plot::{Dot, Front, PlotError, front};
+use sim::setup::Tip;
+use std::fmt::Write as _;
+
+/// Number of goals that the fingers hold.
+const GOALS: usize = 4;
+/// Picture of the section.
+pub const PICTURE: &str = "docs/pictures/study-whole-loop.svg";
+/// Word lengths that are tried, bits.
+const BITS: [u32; 8] = [12, 14, 16, 18, 20, 24, 28, 32];
+/// Indentations and distances at which the pressure is taken.
+const PLACES: usize = 200;
+
+/// Errors of the true force, root mean squares over the fingers, mN.
+type Errors = [f64; GOALS];
+
+/// Results of `budget --whole-loop`.
+#[derive(Clone, Debug, Default)]
+pub struct WholeLoop {
+    /// By fit level: of fingers as they come, and calibrated.
+    levels: Vec<[Errors; 2]>,
+    /// By frame rate: settle time of a row in ns, longest settling in ms, duty at rest in %, and errors.
+    rates: Vec<(f64, f64, f64, Errors)>,
+    fingers: f64,
+}
+
+impl WholeLoop {
+    /// Reads the lines of the program.
+    ///
+    /// # Errors
+    /// A line is not one of the program's.
+    pub fn read(text: &str) -> Result<Self, String> {
+        let mut all = Self::default();
+        for line in text.lines() {
+            let mut words = line.split(' ');
+            let name = words.next().unwrap_or_default();
+            let numbers: Result<Vec<f64>, _> = words.map(str::parse).collect();
+            let numbers = numbers.map_err(|error| format!("{line}: {error}"))?;
+            match (name, &numbers[..]) {
+                ("level", [_, a, b, c, d, e, f, g, h]) => all.levels.push([[*a, *b, *c, *d], [*e, *f, *g, *h]]),
+                ("rate", [ns, ms, percent, a, b, c, d]) => all.rates.push((*ns, *ms, *percent, [*a, *b, *c, *d])),
+                ("fingers", [fingers]) => all.fingers = *fingers,
+                ("goals", [0.5, 1.0, 2.0, 5.0]) => {}
+                _ => return Err(format!("`{line}` is not a line of `budget --whole-loop`")),
+            }
+        }
+        Ok(all)
+    }
+
+    /// Returns the section that opens the page.
+    ///
+    /// # Errors
+    /// The step was not studied at a fit level.
+    pub fn markdown(&self, studied: &[Studied]) -> Result<String, String> {
+        let mut page = format!(
+            "\n## The whole loop\n\nError of the **true force** that {} [usual fingers](budget.md) hold, root mean square over the fingers, \
+             against the cycles of `Pipeline::step`. *Calibrated* fingers were pressed onto a plate and held on a scale first \
+             ([commissioning](commissioning.md)). Simulated; cycles estimated.\n\n\
+             ![The whole loop: error at 5 N over cycles](pictures/study-whole-loop.svg)\n\n",
+            self.fingers
+        );
+        page += &self.levels_table(studied)?;
+        page += "\nFit level 2 is the default: beyond it, cycles buy nothing on these fingers, because the taxels' errors, not the number of rows in a \
+                 refinement, limit the force. Levels 3 to 5 follow a contact that moves faster: a refinement takes 6, 3 and 1 frames instead of 11.\n\n\
+                 Frame rate: the demonstration's longest settling and its duty at rest, and the same fingers at fit level 2 as they come. The array is \
+                 slowed by its settle time; the cycles a second fall in proportion.\n\n\
+                 | settle, ns | frames a second | settling, ms | duty at rest, % | at 0.5 N, mN | 1 N | 2 N | 5 N |\n\
+                 | --- | --- | --- | --- | --- | --- | --- | --- |\n";
+        for (ns, ms, percent, errors) in &self.rates {
+            let params = Params { settle_ns: *ns as i32, ..Params::DEFAULT };
+            let slot = Config::shipped(&params).map_err(|error| error.to_string())?.timing.slot;
+            let hz = f64::from(CLOCKS.timer_hz) / (f64::from(slot.0) * SLOTS as f64);
+            let _ = writeln!(page, "| {ns} | {hz:.0} | {ms:.1} | {percent:.2} | {} |", cells(errors));
+        }
+        Ok(page + &formats(studied))
+    }
+
+    fn levels_table(&self, studied: &[Studied]) -> Result<String, String> {
+        let mut table = String::from(
+            "| fit level | cycles, median | with flash | max | as they come: at 0.5 N, mN | 1 N | 2 N | 5 N | calibrated: at 0.5 N, mN | 1 N | 2 N | 5 N |\n\
+             | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
+        );
+        for (level, [plain, calibrated]) in self.levels.iter().enumerate() {
+            let flash = step(studied, level)?.cost.flash;
+            let bold = if level == 2 { "**" } else { "" };
+            let _ = writeln!(
+                table,
+                "| {bold}{level}{bold} | {} | {} | {} | {} | {} |",
+                step(studied, level)?.cycles(),
+                flash.median,
+                flash.max,
+                cells(plain),
+                cells(calibrated)
+            );
+        }
+        Ok(table)
+    }
+
+    /// Returns the table of the README.
+    ///
+    /// # Errors
+    /// The step was not studied at a fit level.
+    pub fn readme(&self, studied: &[Studied]) -> Result<String, String> {
+        self.levels_table(studied)
+    }
+
+    /// Draws error over cycles.
+    ///
+    /// # Errors
+    /// A fit level was not studied, or there is no room for a label.
+    pub fn draw(&self, studied: &[Studied]) -> Result<String, String> {
+        let mut dots = Vec::new();
+        for (level, errors) in self.levels.iter().enumerate().skip(1) {
+            for ([.., mn], name) in errors.iter().zip(["", ", calibrated"]) {
+                let label = format!("level {level}{name}");
+                let x = step(studied, level)?.cycles() as f64;
+                dots.push(Dot { x, y: *mn, label, best: level <= 2, own: level == 2 });
+            }
+        }
+        let picture = front(&Front {
+            title: "The whole loop: the square is the default fit level",
+            x: "estimated cycles of a frame on a Cortex-M4F, median, without wait states",
+            y: "error of the true force at 5 N, mN rms",
+            dots,
+        });
+        picture.map_err(|error: PlotError| error.to_string())
+    }
+}
+
+/// The step at a fit level.
+fn step<'a>(studied: &'a [Studied], level: usize) -> Result<&'a Point, String> {
+    let name = if level == 2 { "Pipeline::step".into() } else { format!("Pipeline::step, fit level {level}") };
+    let points = studied.iter().filter(|(kernel, _)| kernel.name == "step").flat_map(|(_, points)| points);
+    points.into_iter().find(|point| point.name == name).ok_or_else(|| format!("`{name}` was not studied"))
+}
+
+fn cells(errors: &Errors) -> String {
+    errors.map(|mn| format!("{mn:.0}")).join(" | ")
+}
+
+/// The pressure in words of some lengths, against the smallest pressure that the sensor shows.
+fn formats(studied: &[Studied]) -> String {
+    let code_kpa = 1e3 / f64::from(Params::DEFAULT.codes_per_kpa_milli);
+    let mut page = format!(
+        "\nNumber formats, for the pressure at a distance from the centre (eq. 13): *n bits* rounds every intermediate result to n bits of its range. \
+         The sensor's line is one code, {code_kpa:.3} kPa: an error far below it buys nothing. The firmware's pressure is used by the fit and by \
+         calibrations on the host, not for every taxel of a frame.\n\n\
+         | format | cycles, median | error, kPa, max | error, codes |\n| --- | --- | --- | --- |\n"
+    );
+    let mut line = |name: &str, cycles: String, kpa: f64| {
+        let _ = writeln!(page, "| {name} | {cycles} | {} | {} |", figure(kpa), figure(kpa / code_kpa));
+    };
+    for bits in BITS {
+        line(&format!("{bits} bits"), String::new(), rounded_error_kpa(bits));
+    }
+    for (_, points) in studied.iter().filter(|(kernel, _)| kernel.name == "pressure") {
+        for Point { name, firmware, error_max, .. } in points.iter().filter(|point| point.competes()) {
+            let bold = if *firmware { "**" } else { "" };
+            let cycles = points.iter().find(|point| point.name == *name).map_or(0, Point::cycles);
+            line(&format!("{bold}{name}{bold}"), cycles.to_string(), *error_max);
+        }
+    }
+    page
+}
+
+/// Largest error of the pressure with words of this length, over indentations to 8 mm and all distances inside.
+fn rounded_error_kpa(bits: u32) -> f64 {
+    let tip = Tip::default();
+    let round = |value: f64, range: f64| {
+        let unit = range / 2_f64.powi(bits as i32);
+        (value / unit).round() * unit
+    };
+    let mut worst = 0.0_f64;
+    for (i, j) in (1..=PLACES).flat_map(|i| (0..PLACES).map(move |j| (i, j))) {
+        let d_mm = 8.0 * i as f64 / PLACES as f64;
+        let flattened = tip.flattened(d_mm);
+        let r2 = flattened.contact_radius2_mm2() * j as f64 / PLACES as f64;
+        let length = round((tip.radius_mm * tip.radius_mm - r2).sqrt(), 16.0);
+        let shorter = round(length - round(tip.radius_mm - d_mm, 16.0), 16.0);
+        let kpa = round(tip.modulus_kpa * round(shorter / length, 1.0), 256.0);
+        worst = worst.max((kpa - flattened.pressure_kpa(r2)).abs());
+    }
+    worst
+}

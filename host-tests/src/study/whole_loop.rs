@@ -66,8 +66,8 @@ impl WholeLoop {
             self.fingers
         );
         page += &self.levels_table(studied)?;
-        page += "\nFit level 2 is the default: beyond it, cycles buy nothing on these fingers, because the taxels' errors, not the number of rows in a \
-                 refinement, limit the force. Levels 3 to 5 follow a contact that moves faster: a refinement takes 6, 3 and 1 frames instead of 11.\n\n\
+        page += "\nFit level 2 is the default. Levels 3 to 5 refine the contact in 6, 3 and 1 frames instead of 11, and nothing measured here gains by it: \
+                 the errors of the taxels limit the force.\n\n\
                  Frame rate: the demonstration's longest settling and its duty at rest, and the same fingers at fit level 2 as they come. The array is \
                  slowed by its settle time; the cycles a second fall in proportion.\n\n\
                  | settle, ns | frames a second | settling, ms | duty at rest, % | at 0.5 N, mN | 1 N | 2 N | 5 N |\n\
@@ -149,8 +149,8 @@ fn formats(studied: &[Studied]) -> String {
     let code_kpa = 1e3 / f64::from(Params::DEFAULT.codes_per_kpa_milli);
     let mut page = format!(
         "\nNumber formats, for the pressure at a distance from the centre (eq. 13): *n bits* rounds every intermediate result to n bits of its range. \
-         The sensor's line is one code, {code_kpa:.3} kPa: an error far below it buys nothing. The firmware's pressure is used by the fit and by \
-         calibrations on the host, not for every taxel of a frame.\n\n\
+         The sensor's line is one code, {code_kpa:.3} kPa: an error far below it buys nothing. No frame computes `Tip::pressure`: \
+         the loop uses the force alone, so its cycles cost nothing there.\n\n\
          | format | cycles, median | error, kPa, max | error, codes |\n| --- | --- | --- | --- |\n"
     );
     let mut line = |name: &str, cycles: String, kpa: f64| {

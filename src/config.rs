@@ -10,10 +10,11 @@ mod motor;
 #[cfg(test)]
 mod tests;
 
-pub use array::{ArrayDrift, Curve, Geometry};
+pub use array::{ArrayDrift, Geometry};
 pub(crate) use bounds::SPAN_PARTS;
 pub use bounds::{Bounds, Motions};
 pub use diagnostics::{ConfigError, Warning};
+pub use lanes::Curve;
 pub(crate) use motor::ALLOWANCE_BITS;
 pub use motor::{GAIN_SETS, Gains, Heat, Lag};
 

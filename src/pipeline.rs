@@ -357,7 +357,6 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     /// again, as does the contact's fit.
     pub fn configure(&mut self, config: &Shaped<ROWS, COLUMNS>) {
         self.config = config.clone();
-        self.array.forget_line();
         self.restart();
     }
 

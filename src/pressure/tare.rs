@@ -28,12 +28,6 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         self.tare_lines = [[0; 2]; ROWS];
         self.tare_sums = [0; 3];
         self.tare_frames = 0;
-        self.baseline_line = None;
-    }
-
-    /// Takes note that another characteristic may apply from now on.
-    pub fn forget_line(&mut self) {
-        self.baseline_line = None;
     }
 
     /// Adds the last image to the tare's running means. Returns true when the tare is complete.
@@ -73,9 +67,13 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
     fn learn(&mut self, row: usize, weight: i32) {
         let row = row.min(ROWS - 1);
         let (mut sum, mut moment) = (0, 0);
-        let values = self.baseline_line.as_ref().unwrap_or(&self.picture.taxels[row]);
+        let mut values = self.picture.taxels[row];
+        if self.loads {
+            let (own, bad) = (&self.rows[row], self.picture.bad[row]);
+            values = core::array::from_fn(|column| if bad >> column & 1 == 0 { own.reading(column) } else { 0 });
+        }
         for (column, (tare, value)) in self.rows[row].tare.iter_mut().zip(values).enumerate() {
-            *tare = tare.wrapping_add(((i64::from(*value) * i64::from(weight)) >> CODE_BITS) as i32);
+            *tare = tare.wrapping_add(((i64::from(value) * i64::from(weight)) >> CODE_BITS) as i32);
             let tare = *tare >> (TARE_BITS - CODE_BITS);
             sum += tare;
             moment += tare * super::weight(column, COLUMNS);

@@ -67,13 +67,17 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
     fn learn(&mut self, row: usize, weight: i32) {
         let row = row.min(ROWS - 1);
         let (mut sum, mut moment) = (0, 0);
-        let mut values = self.picture.taxels[row];
-        if self.loads {
-            let (own, bad) = (&self.rows[row], self.picture.bad[row]);
-            values = core::array::from_fn(|column| if bad >> column & 1 == 0 { own.reading(column) } else { 0 });
-        }
+        let mut readings = [0; COLUMNS];
+        let values = if self.loads {
+            for (column, reading) in readings.iter_mut().enumerate() {
+                *reading = if self.picture.bad[row] >> column & 1 == 0 { self.rows[row].reading(column) } else { 0 };
+            }
+            &readings
+        } else {
+            &self.picture.taxels[row]
+        };
         for (column, (tare, value)) in self.rows[row].tare.iter_mut().zip(values).enumerate() {
-            *tare = tare.wrapping_add(((i64::from(value) * i64::from(weight)) >> CODE_BITS) as i32);
+            *tare = tare.wrapping_add(((i64::from(*value) * i64::from(weight)) >> CODE_BITS) as i32);
             let tare = *tare >> (TARE_BITS - CODE_BITS);
             sum += tare;
             moment += tare * super::weight(column, COLUMNS);

@@ -108,15 +108,16 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         if self.asked(command) {
             self.serve(command, sense, &contact);
         }
-        if let Some(fault) = self.judge(&contact, sound, sense, command) {
+        let summed = self.array.picture().force(&self.config);
+        if let Some(fault) = self.judge(&contact, sound.then_some(summed), sense, command) {
             self.stop(fault);
         }
 
         // The duty of the activity, and the guard's limit of it.
         if sound && self.tared {
             let presses = !self.activity.releases(&self.touch);
-            let Self { touch, guard, config, array, motion, .. } = self;
-            let (summed, travel) = (array.picture().force(config), motion.observer.travel);
+            let Self { touch, guard, config, motion, .. } = self;
+            let travel = motion.observer.travel;
             let felt = Felt { contact: &contact, summed, travel, presses };
             touch.observe(&felt, || guard.depth_felt(config), config);
             self.learn_baseline(contact.force);
@@ -177,12 +178,12 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
 
     /// Returns the first reason to stop, the most direct evidence first. While the motor is not driven, only a tare
     /// has reasons: a broken array, a silent bus and the bridge end it.
-    fn judge(&mut self, contact: &Contact, sound: bool, sense: &Sense, command: &Command) -> Option<Fault> {
+    fn judge(&mut self, contact: &Contact, summed: Option<Newtons>, sense: &Sense, command: &Command) -> Option<Fault> {
         let drives = self.activity.drives();
         let picture = self.array.picture();
         let seen = Seen {
             encoder: sense.encoder,
-            force: if sound { contact.force.max(picture.force(&self.config)) } else { contact.force },
+            force: summed.map_or(contact.force, |summed| summed.max(contact.force)),
             pressing: !self.activity.releases(&self.touch),
             goal: command.goal,
             voltage: self.motion.drive.voltage(),

@@ -65,8 +65,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         let [gains, moments] = Calibration::<ROWS, COLUMNS>::NONE.weights[0];
         Self {
             picture: Picture::EMPTY,
-            rows: [Row { gains, moments, tare: [0; COLUMNS], nets: [0; COLUMNS], boost: 1 << BOOST_BITS, largest: 0 };
-                ROWS],
+            rows: [Row::new(gains, moments); ROWS],
             mask: [0; ROWS],
             tare_lines: [[0; 2]; ROWS],
             tare_sums: [0; 3],
@@ -103,9 +102,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
             (self.picture.bad, self.picture.bad_count, self.picture.bad_again) = (self.mask, 0, 0);
         }
         // A tare learns what the taxels read, not their loads.
-        let curve = config.curve.filter(|_| self.tare_frames >= Self::TARE_FRAMES);
-        self.loads = curve.is_some();
-        let curve = curve.unwrap_or(Curve::LINE);
+        let curve = if self.tare_frames >= Self::TARE_FRAMES { config.curve } else { Curve::LINE };
+        self.loads = curve.growth != 0;
         let common = Common { dead: both(config.dead_codes), sag: both(config.sag_q32), curve };
         let total = lanes::pass(&frame.codes, &mut self.rows, &common, &mut self.picture.taxels);
         let sound = Sound::new(&frame.codes.undriven, config);

@@ -141,6 +141,11 @@ pub struct Row<const COLUMNS: usize> {
 }
 
 impl<const COLUMNS: usize> Row<COLUMNS> {
+    /// Row without a tare, before the first pass.
+    pub const fn new(gains: [i16; COLUMNS], moments: [i16; COLUMNS]) -> Self {
+        Self { gains, moments, tare: [0; COLUMNS], nets: [0; COLUMNS], boost: 1 << BOOST_BITS, largest: 0 }
+    }
+
     /// Reading of a column above its tare, after a pass with a curve, whose taxels are loads.
     #[inline(always)]
     pub fn reading(&self, column: usize) -> i32 {
@@ -167,7 +172,7 @@ pub struct Curve {
 
 impl Curve {
     /// The line: every load is its reading.
-    pub const LINE: Self = Self { least: 1 << Self::FACTOR_BITS, growth: 0 };
+    pub const LINE: Self = Self::new(0);
     /// Fractional bits of q.
     const FACTOR_BITS: u32 = 26;
     /// Fractional bits of a reading that becomes a load. With [`Curve::FACTOR_BITS`] a load has [`CODE_BITS`].
@@ -175,13 +180,11 @@ impl Curve {
     /// Bits of the largest load: four times the full range of 12 bits. A line reads at most three times the full range.
     const LARGEST_BITS: u32 = 12 + CODE_BITS + 2;
 
-    /// Constants for p in permille, at most 8,000; none for p = 0, which is a line.
-    pub fn new(permille: i32) -> Option<Self> {
-        let permille = permille.clamp(0, 8_000);
-        let whole = i64::from(1_000 + permille);
+    /// Constants for p in permille, 0 to 8,000.
+    pub const fn new(permille: u32) -> Self {
+        let (part, whole) = (permille as u64, 1_000 + permille as u64);
         let least = ((1_000 << Self::FACTOR_BITS) + whole / 2) / whole;
-        let growth = ((i64::from(permille) << 30) + whole / 2) / whole;
-        (permille > 0).then_some(Self { least: least as i32, growth: growth as i32 })
+        Self { least: least as i32, growth: (((part << 30) + whole / 2) / whole) as i32 }
     }
 
     /// Load of a reading with [`Curve::FINE_BITS`] above a tare, in sixteenths of a code of the full range. Within one

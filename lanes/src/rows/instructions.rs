@@ -23,8 +23,7 @@ pub fn pass<const ROWS: usize, const COLUMNS: usize>(
     if COLUMNS != WRITTEN_OUT || const { sum_drop(ROWS, COLUMNS) } != 0 {
         return portable_pass(codes, rows, common, taxels);
     }
-    let (first, mut second, running, largest, peak);
-    let right: i32;
+    let (first, second, running, largest, peak);
     // SAFETY: the rows have as many columns as the offsets suppose, and the codes begin on a word's border. Reads the
     // codes, the rows and what is common, writes each row's boost and the taxels; the types hold their lengths and
     // places, and the codes' end ends the loop. The stack is as it was at the end, and so are r6 and r7, which an
@@ -67,35 +66,21 @@ pub fn pass<const ROWS: usize, const COLUMNS: usize>(
             ".macro load reading, tare",
             "sub \\reading, \\reading, \\tare, asr #{fine_drop}",
             "add r4, \\tare, \\reading, lsl #{fine_drop}",
-            "usat r4, #31, r4",
-            "usat \\tare, #31, \\tare",
-            "add r4, r4, \\tare",
-            "smmlar r4, r4, r9, r8",
-            "smmulr \\reading, \\reading, r4",
+            "usat r4, #31, r4; usat \\tare, #31, \\tare; add r4, r4, \\tare",
+            "smmlar r4, r4, r9, r8; smmulr \\reading, \\reading, r4",
             "ssat \\reading, #{largest_bits} + 1, \\reading",
-            "cmp \\reading, r12",
-            "it gt",
-            "movgt r12, \\reading",
+            "cmp \\reading, r12; it gt; movgt r12, \\reading",
             ".endm",
             // The same with a curve. Sums of the left and the right half in lr, of these sums in r11, of the right
             // half in r10.
             ".macro loads place",
-            "ldr r3, [r1, #4 * \\place + {nets}]",
-            "ldr r4, [r1, #4 * \\place]",
-            "ldr r5, [r1, #4 * \\place + {tare}]",
-            "ldr r6, [r1, #4 * \\place + {tare} + {pairs}]",
-            "smultt r7, r3, r4",
-            "smulbb r3, r3, r4",
-            "smmulr r7, r7, r0",
-            "smmulr r3, r3, r0",
+            "ldr r3, [r1, #4 * \\place + {nets}]; ldr r4, [r1, #4 * \\place]",
+            "ldr r5, [r1, #4 * \\place + {tare}]; ldr r6, [r1, #4 * \\place + {tare} + {pairs}]",
+            "smultt r7, r3, r4; smulbb r3, r3, r4; smmulr r7, r7, r0; smmulr r3, r3, r0",
             "load r3, r5",
             "load r7, r6",
-            "str r3, [r2, #4 * \\place]",
-            "str r7, [r2, #4 * \\place + {pairs}]",
-            "add r3, r3, r7",
-            "add lr, lr, r3",
-            "add r10, r10, r7",
-            "add r11, r11, lr",
+            "str r3, [r2, #4 * \\place]; str r7, [r2, #4 * \\place + {pairs}]",
+            "add r3, r3, r7; add lr, lr, r3; add r10, r10, r7; add r11, r11, lr",
             ".endm",
             // On the stack: what is common, the place among the codes, the totals, r6 and r7, the codes' end.
             "push {{r6, r7, r9}}",
@@ -172,36 +157,21 @@ pub fn pass<const ROWS: usize, const COLUMNS: usize>(
             "bne 2b",
             "b 4f",
             "3:",
-            "str r3, [r1, #{nets}]",
-            "str r4, [r1, #{nets} + 4]",
-            "str r5, [r1, #{nets} + 8]",
-            "str r6, [r1, #{nets} + 12]",
-            "str r7, [r1, #{nets} + 16]",
-            "mov r9, lr",
-            "ldr r8, [sp, #28]",
-            "ldr r10, [sp, #56]",
-            "ldr r11, [sp, #44]",
-            "ldr lr, [sp, #40]",
-            "loads 0",
-            "loads 1",
-            "loads 2",
-            "loads 3",
-            "loads 4",
-            "ldr r5, [sp, #48]",
-            "ldr r0, [sp, #36]",
-            "ldr r7, [sp, #68]",
-            "str lr, [sp, #40]",
-            "str r11, [sp, #44]",
-            "add r5, r5, lr",
-            "str r5, [sp, #48]",
-            "str r10, [sp, #56]",
-            "adds r1, #{row}",
-            "adds r2, #2 * {pairs}",
-            "cmp r0, r7",
+            "str r3, [r1, #{nets}]; str r4, [r1, #{nets} + 4]; str r5, [r1, #{nets} + 8]",
+            "str r6, [r1, #{nets} + 12]; str r7, [r1, #{nets} + 16]",
+            "mov r9, lr; ldr r8, [sp, #28]", // the curve
+            "ldr r10, [sp, #56]; ldr r11, [sp, #44]; ldr lr, [sp, #40]",
+            ".irp place, 0, 1, 2, 3, 4",
+            "loads \\place",
+            ".endr",
+            "ldr r5, [sp, #48]; ldr r0, [sp, #36]; ldr r7, [sp, #68]; add r5, r5, lr",
+            "str lr, [sp, #40]; str r11, [sp, #44]; str r5, [sp, #48]; str r10, [sp, #56]",
+            "adds r1, #{row}; adds r2, #2 * {pairs}; cmp r0, r7",
             "bne 2b",
-            "mov r3, lr",
-            "mov r4, r11",
-            "mov r8, r10",
+            // Pair n of five was in a row's sums 5 - n times, and the rows before in all five of them. Twice its
+            // distance from the middle is 2 n - 9 at the left, and 10 more at the right.
+            "mov r3, lr; sub r6, r5, r3; add r6, r6, r10; movs r7, #10",
+            "mla r6, r6, r7, r3; sub r4, r6, r11, lsl #1",
             "4:",
             ".purgem columns",
             ".purgem load",
@@ -225,16 +195,9 @@ pub fn pass<const ROWS: usize, const COLUMNS: usize>(
             inout("r2") taxels.as_mut_ptr() => _,
             inout("r3") common => first,
             out("r4") second, out("r5") running,
-            out("r8") right, in("r9") codes.rows.as_ptr_range().end,
+            out("r8") _, in("r9") codes.rows.as_ptr_range().end,
             out("r10") _, out("r11") _, out("r12") peak, out("lr") _,
         );
-    }
-    if common.curve.growth != 0 {
-        // Pair n of five was in the sums of a row's sums 5 - n times, and the rows before were in all five of them. Twice
-        // its distance from the middle is 2 n - 9 at the left, 10 more at the right.
-        let before = i32::wrapping_sub(running, first).wrapping_mul(WRITTEN_OUT as i32);
-        second = i32::wrapping_add(first, before).wrapping_sub(i32::wrapping_mul(second, 2));
-        second = second.wrapping_add(right.wrapping_mul(WRITTEN_OUT as i32));
     }
     Total { first, second, running, largest, peak }
 }

@@ -124,14 +124,7 @@ pub const STEPS: [Step; 20] = [
         let codes = Codes { rows: [pairs, moments], undriven: gains };
         let signed = |row: [u16; COLUMNS]| row.map(u16::cast_signed);
         for curve in [Curve::LINE, Curve { least: s.words[1], growth: s.words[2] | 1 }] {
-            let mut rows = [Row {
-                gains: signed(gains),
-                moments: signed(moments),
-                tare,
-                nets: [0; COLUMNS],
-                boost: 0,
-                largest: 0,
-            }; 2];
+            let mut rows = [Row { tare, ..Row::new(signed(gains), signed(moments)) }; 2];
             let common = Common { dead: fourth, sag: second & 0x7fff_7fff, curve };
             let mut taxels = [[0; COLUMNS]; 2];
             let total = lanes::pass(&codes, &mut rows, &common, &mut taxels);

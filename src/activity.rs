@@ -53,6 +53,11 @@ impl Activity {
         }
     }
 
+    /// Returns true in the mode release.
+    pub fn releases(&self, touch: &Touch) -> bool {
+        matches!(self, Self::Grip(grip) if grip.mode(touch) == Mode::Release)
+    }
+
     /// Returns true if the motor is driven: then guard and monitor judge the motion.
     pub fn drives(&self) -> bool {
         matches!(self, Self::Grip(_) | Self::Press(_) | Self::Strokes(_))

@@ -10,10 +10,11 @@ mod motor;
 #[cfg(test)]
 mod tests;
 
-pub use array::{ArrayDrift, Curve, Geometry};
+pub use array::{ArrayDrift, Geometry};
 pub(crate) use bounds::SPAN_PARTS;
 pub use bounds::{Bounds, Motions};
 pub use diagnostics::{ConfigError, Warning};
+pub use lanes::Curve;
 pub(crate) use motor::ALLOWANCE_BITS;
 pub use motor::{GAIN_SETS, Gains, Heat, Lag};
 
@@ -67,8 +68,8 @@ pub struct Config {
     pub dead_codes: u16,
     /// Smallest code of a saturated taxel, see [`Params::headroom_codes`].
     pub saturated_codes: u16,
-    /// Characteristic of the array, if it is not a line.
-    pub curve: Option<Curve>,
+    /// Characteristic of the array.
+    pub curve: Curve,
     /// Force for a sixteenth of a corrected code on one taxel, Q48 of the force's bit.
     pub newtons_per_sum_q48: i64,
     /// Pressure in Pa for a sixteenth of a corrected code, Q32.
@@ -233,7 +234,7 @@ impl Config {
             sag_q32,
             dead_codes: p.dead_codes as u16,
             saturated_codes: saturated_codes(p),
-            curve: Curve::new(p.curve_permille),
+            curve: Curve::new(p.curve_permille.max(0).min(8_000).cast_unsigned()),
             newtons_per_sum_q48: wide(newtons_per_sum * exp2(48)),
             pascals_per_sum_q32: wide(1e3 / (16.0 * codes_per_kpa) * exp2(32)),
             geometry: Geometry::new(p, codes_milli, rows, columns),

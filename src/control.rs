@@ -174,7 +174,11 @@ impl SpeedLoop {
     #[inline(always)]
     pub fn brake(&self, distance: Millimetres, config: &Config) -> MillimetresPerSecond2 {
         let disturbance = product(self.observer.disturbance.to_bits(), BRAKE_SHARE_Q8, 8);
-        let [least, usual, most] = config.brake.map(|brake| product(brake, self.winding.share(), SHARE_BITS));
+        // At most all of it, so it fits. Without `map`, of which the compiler makes a function.
+        let share = i64::from(self.winding.share());
+        let allowed = |brake: i32| ((i64::from(brake) * share) >> SHARE_BITS) as i32;
+        let [least, usual, most] = config.brake;
+        let [least, usual, most] = [allowed(least), allowed(usual), allowed(most)];
         let pressing = distance >= Millimetres::ZERO;
         let whole = if pressing { usual.saturating_sub(disturbance) } else { usual.saturating_add(disturbance) };
         MillimetresPerSecond2::from_bits(whole.max(least).min(most))

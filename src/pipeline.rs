@@ -17,7 +17,7 @@ use crate::measure::{Row, press};
 use crate::pressure::{Array, Calibration};
 use crate::safety::guard::{Guard, Seen};
 use crate::safety::monitor::{self, Monitor, MonitorInputs};
-use crate::state::{Fault, Limits, Mode};
+use crate::state::{Fault, Limits};
 use crate::touch::{Felt, Touch};
 use crate::units::{Duty, Newtons};
 use budget::Budget;
@@ -108,15 +108,16 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         if self.asked(command) {
             self.serve(command, sense, &contact);
         }
-        if let Some(fault) = self.judge(&contact, sound, sense, command) {
+        let summed = self.array.picture().force(&self.config);
+        if let Some(fault) = self.judge(&contact, sound.then_some(summed), sense, command) {
             self.stop(fault);
         }
 
         // The duty of the activity, and the guard's limit of it.
         if sound && self.tared {
-            let presses = self.activity.mode(&self.touch) != Mode::Release;
-            let Self { touch, guard, config, array, motion, .. } = self;
-            let (summed, travel) = (array.picture().force(config), motion.observer.travel);
+            let presses = !self.activity.releases(&self.touch);
+            let Self { touch, guard, config, motion, .. } = self;
+            let travel = motion.observer.travel;
             let felt = Felt { contact: &contact, summed, travel, presses };
             touch.observe(&felt, || guard.depth_felt(config), config);
             self.learn_baseline(contact.force);
@@ -177,13 +178,13 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
 
     /// Returns the first reason to stop, the most direct evidence first. While the motor is not driven, only a tare
     /// has reasons: a broken array, a silent bus and the bridge end it.
-    fn judge(&mut self, contact: &Contact, sound: bool, sense: &Sense, command: &Command) -> Option<Fault> {
+    fn judge(&mut self, contact: &Contact, summed: Option<Newtons>, sense: &Sense, command: &Command) -> Option<Fault> {
         let drives = self.activity.drives();
         let picture = self.array.picture();
         let seen = Seen {
             encoder: sense.encoder,
-            force: if sound { contact.force.max(picture.force(&self.config)) } else { contact.force },
-            pressing: self.activity.mode(&self.touch) != Mode::Release,
+            force: summed.map_or(contact.force, |summed| summed.max(contact.force)),
+            pressing: !self.activity.releases(&self.touch),
             goal: command.goal,
             voltage: self.motion.drive.voltage(),
         };
@@ -313,15 +314,13 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
 
     #[inline(always)]
     fn report(&mut self, duty: Duty, contact: &Contact, sense: &Sense, command: &Command, mut limits: Limits) {
-        for (held, flag) in [
-            (self.array.picture().bad_count > 0, Limits::TAXELS),
-            (!self.tared, Limits::NOT_TARED),
-            (self.array.tared_touching(), Limits::TARED_TOUCHING),
-            (self.config.params.direction_confirmed == 0, Limits::DIRECTION),
-            (command.torque && !self.armed, Limits::TORQUE_HELD),
-        ] {
-            limits.set(if held { flag } else { 0 });
-        }
+        // One after the other: the compiler would make a table and a loop.
+        let mut note = |held: bool, flag: u16| limits.set(if held { flag } else { 0 });
+        note(self.array.picture().bad_count > 0, Limits::TAXELS);
+        note(!self.tared, Limits::NOT_TARED);
+        note(self.array.tared_touching(), Limits::TARED_TOUCHING);
+        note(self.config.params.direction_confirmed == 0, Limits::DIRECTION);
+        note(command.torque && !self.armed, Limits::TORQUE_HELD);
         self.report_activity();
         self.status.creep = if let Activity::Grip(grip) = &self.activity { grip.creep.force() } else { Newtons::ZERO };
         self.status.limits = limits;
@@ -358,7 +357,6 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     /// again, as does the contact's fit.
     pub fn configure(&mut self, config: &Shaped<ROWS, COLUMNS>) {
         self.config = config.clone();
-        self.array.forget_line();
         self.restart();
     }
 

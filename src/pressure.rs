@@ -19,7 +19,8 @@ use crate::config::Config;
 use crate::frame::{Frame, Shape};
 use calibration::all;
 use lanes::{
-    BOOST_BITS, Codes, Common, GAIN_BITS, Row, SIGNS, Total, codes_at, each_pair, filled, moment_bits, pairs, sum_drop,
+    BOOST_BITS, Codes, Common, Curve, GAIN_BITS, Row, SIGNS, Total, codes_at, each_pair, filled, moment_bits, pairs,
+    sum_drop,
 };
 use tare::Touched;
 
@@ -47,8 +48,8 @@ pub struct Array<const ROWS: usize, const COLUMNS: usize> {
     tare_frames: u32,
     touched: Touched<ROWS>,
     baseline_row: usize,
-    /// Readings of that row above its tare, if its image holds what they carry instead.
-    baseline_line: Option<[i32; COLUMNS]>,
+    /// True if the image holds loads by a characteristic, not readings.
+    loads: bool,
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Default for Array<ROWS, COLUMNS> {
@@ -64,14 +65,14 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         let [gains, moments] = Calibration::<ROWS, COLUMNS>::NONE.weights[0];
         Self {
             picture: TactileImage::EMPTY,
-            rows: [Row { gains, moments, tare: [0; COLUMNS], boost: 1 << BOOST_BITS, largest: 0 }; ROWS],
+            rows: [Row::new(gains, moments); ROWS],
             mask: [0; ROWS],
             tare_lines: [[0; 2]; ROWS],
             tare_sums: [0; 3],
             tare_frames: 0,
             touched: Touched::NONE,
             baseline_row: 0,
-            baseline_line: None,
+            loads: false,
         }
     }
 
@@ -100,22 +101,24 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
             before = Some(self.picture.bad);
             (self.picture.bad, self.picture.bad_count, self.picture.bad_again) = (self.mask, 0, 0);
         }
+        // A tare learns what the taxels read, not their loads.
+        let curve = if self.tare_frames >= Self::TARE_FRAMES { config.curve } else { Curve::LINE };
+        self.loads = curve.growth != 0;
+        let common = Common { dead: both(config.dead_codes), sag: both(config.sag_q32), curve };
+        let total = lanes::pass(&frame.codes, &mut self.rows, &common, &mut self.picture.taxels);
         let sound = Sound::new(&frame.codes.undriven, config);
-        let total = lanes::pass(&frame.codes, &mut self.rows, &sound.common, &mut self.picture.taxels);
         let largest = larger_lane(total.largest);
         self.picture.peak = total.peak;
         self.picture.undriven_max = sound.undriven_max;
         self.picture.peak_codes = largest.wrapping_add(config.dead_codes);
-        let [sum, moment_x, moment_y] = self.tare_sums;
-        let [total_sum, total_x, total_y] = sixteenths::<ROWS, COLUMNS>(&total);
-        self.picture.sum = total_sum.wrapping_sub(sum);
-        self.picture.moment_x = total_x.wrapping_sub(moment_x);
-        self.picture.moment_y = total_y.wrapping_sub(moment_y);
-        // A tare learns what the taxels read, not what they carry.
-        if let Some(curve) = config.curve.filter(|_| self.tare_frames >= Self::TARE_FRAMES) {
-            self.baseline_line = self.picture.taxels.get(self.baseline_row).copied();
-            picture::bend(curve, &mut self.picture, &self.rows);
-        }
+        let [sum, moment_x, moment_y] = if self.loads {
+            [total.first, total.second, moment_y::<ROWS>(total.first, total.running)]
+        } else {
+            let [sum, moment_x, moment_y] = sixteenths::<ROWS, COLUMNS>(&total);
+            let [tare, tare_x, tare_y] = self.tare_sums;
+            [sum.wrapping_sub(tare), moment_x.wrapping_sub(tare_x), moment_y.wrapping_sub(tare_y)]
+        };
+        (self.picture.sum, self.picture.moment_x, self.picture.moment_y) = (sum, moment_x, moment_y);
         if sound.suspects(largest) {
             self.leave_out(frame, &sound, &before, config);
         }
@@ -129,7 +132,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
     fn leave_out(
         &mut self,
         frame: &Frame<ROWS, COLUMNS>,
-        sound: &Sound<COLUMNS>,
+        sound: &Sound,
         before: &Option<[u32; ROWS]>,
         config: &Config,
     ) {
@@ -150,12 +153,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
             highest = self.picture.leave_out(number, bad, config).max(highest);
         }
         let broken = i32::from(self.picture.bad_count) > config.params.bad_taxels_max;
-        if let (Some(line), Some(bad)) = (&mut self.baseline_line, self.picture.bad.get(self.baseline_row)) {
-            for (column, value) in line.iter_mut().enumerate() {
-                *value = if broken || bad >> column & 1 != 0 { 0 } else { *value };
-            }
-        }
         if broken {
+            self.loads = false;
             self.picture.taxels.as_flattened_mut().fill(0);
             self.picture.peak = 0;
         } else if highest > 0 && highest == self.picture.peak {
@@ -170,7 +169,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         let sound = Sound::new(undriven, config);
         let mut count = 0;
         for (codes, mask) in rows.iter().zip(&self.mask) {
-            if sound.suspects(sound.largest(codes)) {
+            if sound.suspects(sound.largest([codes, undriven])) {
                 count += (bad_columns([codes, undriven], config) & !mask).count_ones();
             }
         }
@@ -204,27 +203,22 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
 const COARSER: u32 = 32 - BOOST_BITS;
 
 /// Limits of sound codes of a frame, between dead and saturated.
-struct Sound<const COLUMNS: usize> {
-    /// Input of the pass.
-    pub common: Common<COLUMNS>,
+struct Sound {
+    /// Least sound code above the undriven level, in both lanes.
+    dead: u32,
     /// The highest undriven level.
-    pub undriven_max: u16,
+    undriven_max: u16,
     /// The smallest sum of [`Sound::largest`] and the highest undriven level that may belong to a bad taxel.
     suspect: u32,
 }
 
-impl<const COLUMNS: usize> Sound<COLUMNS> {
+impl Sound {
     /// Computes the limits from the slot with no row driven.
     #[inline(always)]
-    pub fn new(undriven: &[u16; COLUMNS], config: &Config) -> Self {
-        let Config { dead_codes, saturated_codes, sag_q32, .. } = *config;
-        let common = Common {
-            undriven: *undriven,
-            dead: lanes::pair(dead_codes as i16, dead_codes as i16),
-            sag: lanes::pair(sag_q32 as i16, sag_q32 as i16),
-        };
+    pub fn new<const COLUMNS: usize>(undriven: &[u16; COLUMNS], config: &Config) -> Self {
+        let Config { dead_codes, saturated_codes, .. } = *config;
         let suspect = u32::from(saturated_codes) - u32::from(dead_codes);
-        Self { common, undriven_max: highest::<COLUMNS>(|at| codes_at(undriven, at)), suspect }
+        Self { dead: both(dead_codes), undriven_max: highest::<COLUMNS>(|at| codes_at(undriven, at)), suspect }
     }
 
     /// Returns true if a taxel may be dead or saturated, from the largest of the codes less the code of a dead taxel.
@@ -236,9 +230,8 @@ impl<const COLUMNS: usize> Sound<COLUMNS> {
 
     /// Returns this largest number of a row.
     #[inline(always)]
-    pub fn largest(&self, codes: &[u16; COLUMNS]) -> u16 {
-        let Common { undriven, dead, .. } = &self.common;
-        highest::<COLUMNS>(|at| lanes::sub(lanes::sub(codes_at(codes, at), codes_at(undriven, at)), *dead))
+    pub fn largest<const COLUMNS: usize>(&self, [codes, undriven]: [&[u16; COLUMNS]; 2]) -> u16 {
+        highest::<COLUMNS>(|at| lanes::sub(lanes::sub(codes_at(codes, at), codes_at(undriven, at)), self.dead))
     }
 }
 
@@ -265,13 +258,24 @@ const fn larger_lane(pair: u32) -> u16 {
 fn sixteenths<const ROWS: usize, const COLUMNS: usize>(total: &Total) -> [i32; 3] {
     let sum_bits = const { GAIN_BITS - COARSER - sum_drop(ROWS, COLUMNS) };
     let rounded = |value: i32, bits: u32| (value >> (bits - CODE_BITS - 1)).wrapping_add(1) >> 1;
-    // Row n of ten was added 10 - n times; its weight is 11 less twice that. Sums may wrap; the final result fits.
-    let moment_y = (total.first >> 2).wrapping_mul(ROWS as i32 + 1).wrapping_sub(total.running.wrapping_mul(2));
     [
         rounded(total.first, sum_bits),
         rounded(total.second, const { moment_bits(COLUMNS) - COARSER }),
-        rounded(moment_y, sum_bits - 2),
+        rounded(moment_y::<ROWS>(total.first >> 2, total.running), sum_bits - 2),
     ]
+}
+
+/// Returns the moment along the rows, from the sum and the sums after each row, added up: row n of ten is in them
+/// 10 - n times, and 11 less twice that is its weight. It may wrap, what is made of it fits.
+#[inline(always)]
+const fn moment_y<const ROWS: usize>(sum: i32, running: i32) -> i32 {
+    sum.wrapping_mul(ROWS as i32 + 1).wrapping_sub(running.wrapping_mul(2))
+}
+
+/// The same code in both lanes.
+#[inline(always)]
+const fn both(code: u16) -> u32 {
+    lanes::pair(code as i16, code as i16)
 }
 
 /// Returns twice the distance of a place from the middle of `of` places, in pitches.
@@ -284,7 +288,6 @@ const fn weight(place: usize, of: usize) -> i32 {
 #[cold]
 #[inline(never)]
 fn bad_columns<const COLUMNS: usize>([codes, undriven]: [&[u16; COLUMNS]; 2], config: &Config) -> u32 {
-    let both = |codes: u16| lanes::pair(codes as i16, codes as i16);
     let (dead, sound) = (both(config.dead_codes), both(config.saturated_codes - 1));
     let mut bad = 0;
     each_pair::<COLUMNS>(|at| {

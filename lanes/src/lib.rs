@@ -19,8 +19,8 @@ extern crate std;
 mod rows;
 
 pub use rows::{
-    BOOST_BITS, CODE_BITS, Codes, Common, GAIN_BITS, Row, TARE_BITS, Total, codes_at, each_pair, filled, moment_bits,
-    pairs, pass, place, portable_pass, sum_drop,
+    BOOST_BITS, CODE_BITS, Codes, Common, Curve, GAIN_BITS, Row, TARE_BITS, Total, codes_at, each_pair, filled,
+    moment_bits, pairs, pass, place, portable_pass, sum_drop,
 };
 
 /// True if this build uses the DSP instructions.

@@ -132,25 +132,94 @@ pub struct Row<const COLUMNS: usize> {
     pub moments: [i16; COLUMNS],
     /// Codes of each column without contact, in the columns' order.
     pub tare: [i32; COLUMNS],
+    /// Found with a curve: net codes, in the order of the codes.
+    pub nets: [i16; COLUMNS],
     /// Found: 1 / (1 - x) in Q28, where x is the row's sag.
     pub boost: i32,
     /// Found: the largest code less what a dead one shows, in each lane, unsigned: that of a dead one is huge.
     pub largest: u32,
 }
 
+impl<const COLUMNS: usize> Row<COLUMNS> {
+    /// Row without a tare, before the first pass.
+    pub const fn new(gains: [i16; COLUMNS], moments: [i16; COLUMNS]) -> Self {
+        Self { gains, moments, tare: [0; COLUMNS], nets: [0; COLUMNS], boost: 1 << BOOST_BITS, largest: 0 }
+    }
+
+    /// Reading of a column above its tare, after a pass with a curve, whose taxels are loads.
+    #[inline(always)]
+    pub fn reading(&self, column: usize) -> i32 {
+        let at = place(column, COLUMNS);
+        let [net, gain] = [&self.nets, &self.gains].map(|row| row.get(at).copied().unwrap_or(0));
+        taxel(net, gain, self.boost, self.tare.get(column).copied().unwrap_or(0))
+    }
+}
+
+/// Characteristic f(u) = u (1 + p u / 4096) / (1 + p): load of a taxel that shows u codes behind its gain, in the codes
+/// of the full range. f(4096) = 4096.
+///
+/// Above its tare B a taxel reads T, so its load is f(T + B) - f(B) = T (q + q p (T + 2 B) / 4096) with q = 1 / (1 + p).
+/// In the factor T + B and B count as 0 where they are below: a taxel cannot show that, and the parabola would turn. So
+/// a reading keeps its sign, and a larger one is never a smaller force.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Curve {
+    /// q, Q26.
+    pub least: i32,
+    /// q p, Q30; 0 is a line.
+    pub growth: i32,
+}
+
+impl Curve {
+    /// The line: every load is its reading.
+    pub const LINE: Self = Self::new(0);
+    /// Fractional bits of q.
+    const FACTOR_BITS: u32 = 26;
+    /// Fractional bits of a reading that becomes a load. With [`Curve::FACTOR_BITS`] a load has [`CODE_BITS`].
+    const FINE_BITS: u32 = 32 + CODE_BITS - Self::FACTOR_BITS;
+    /// Bits of the largest load: four times the full range of 12 bits. A line reads at most three times the full range.
+    const LARGEST_BITS: u32 = 12 + CODE_BITS + 2;
+
+    /// Constants for p in permille, 0 to 8,000.
+    pub const fn new(permille: u32) -> Self {
+        let (part, whole) = (permille as u64, 1_000 + permille as u64);
+        let least = ((1_000 << Self::FACTOR_BITS) + whole / 2) / whole;
+        Self { least: least as i32, growth: (((part << 30) + whole / 2) / whole) as i32 }
+    }
+
+    /// Load of a reading with [`Curve::FINE_BITS`] above a tare, in sixteenths of a code of the full range. Within one
+    /// unit of the formula.
+    ///
+    /// A reading and its tare of codes of 12 bits, gains below 2 and a boost below 1.5 stay below 2^14.6 codes.
+    #[inline(always)]
+    fn load(self, reading: i32, tare: i32) -> i32 {
+        // T + B and B, Q16.
+        let both = (reading << (TARE_BITS - Self::FINE_BITS)).wrapping_add(tare).max(0).wrapping_add(tare.max(0));
+        let load = upper(reading, self.least.wrapping_add(upper(both, self.growth)));
+        load.clamp(-1 << Self::LARGEST_BITS, (1 << Self::LARGEST_BITS) - 1)
+    }
+}
+
+/// Upper half of a product, rounded.
+#[inline(always)]
+const fn upper(a: i32, b: i32) -> i32 {
+    ((a as i64 * b as i64 + (1 << 31)) >> 32) as i32
+}
+
 /// Data common to the rows of a pass.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
-pub struct Common<const COLUMNS: usize> {
-    /// Offset of each column's codes, in the order of the codes.
-    pub undriven: [u16; COLUMNS],
+pub struct Common {
     /// A column that shows less is dead; in both lanes.
     pub dead: u32,
     /// The sag for each code, Q32; in both lanes.
     pub sag: u32,
+    /// The characteristic of all taxels.
+    pub curve: Curve,
 }
 
-/// Sums over the rows.
+/// Sums over the rows. With a curve the first two are those of the taxels, `second` with twice each column's distance
+/// from the middle for its weight, and `running` is `first` after each row, added up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Total {
     /// Sum of the rows' sums, each less [`sum_drop`] bits times its boost; upper half of the product.
@@ -177,12 +246,11 @@ fn boost(x: i32) -> i32 {
     portable::add_high(boost, boost, portable::add_high(x4, x4, x4))
 }
 
-/// A column's net code, gain and shortened boost to its taxel above the tare, rounded once.
+/// A column's net code, gain and boost to its taxel above the tare, rounded once.
 #[inline(always)]
 fn taxel(net: i16, gain: i16, boost: i32, tare: i32) -> i32 {
-    let gained = i64::from(net) * i64::from(gain);
-    let boosted = (gained * i64::from(boost) + (1 << 31)) >> 32;
-    (boosted as i32).wrapping_sub(tare >> (TARE_BITS - CODE_BITS))
+    let gained = i32::from(net) * i32::from(gain);
+    upper(gained, boost >> BOOST_DROP).wrapping_sub(tare >> (TARE_BITS - CODE_BITS))
 }
 
 /// Converts codes to `taxels`, row by row: net codes times column gain and row boost, less the tare; the row's sag, by
@@ -191,11 +259,11 @@ fn taxel(net: i16, gain: i16, boost: i32, tare: i32) -> i32 {
 pub fn portable_pass<const ROWS: usize, const COLUMNS: usize>(
     codes: &Codes<ROWS, COLUMNS>,
     rows: &mut [Row<COLUMNS>; ROWS],
-    common: &Common<COLUMNS>,
+    common: &Common,
     taxels: &mut [[i32; COLUMNS]; ROWS],
 ) -> Total {
     let (pairs, drop) = (const { pairs(COLUMNS) }, const { sum_drop(ROWS, COLUMNS) });
-    let mut total = Total::default();
+    let (mut total, undriven) = (Total::default(), &codes.undriven);
     for ((codes, row), taxels) in codes.rows.iter().zip(rows).zip(taxels) {
         // One for each pair; the rest is not used.
         let mut nets = [0; COLUMNS];
@@ -204,7 +272,7 @@ pub fn portable_pass<const ROWS: usize, const COLUMNS: usize>(
         for (number, block) in nets[..pairs].chunks_mut(BLOCK).enumerate() {
             let (mut block_sum, mut block_moment) = (0, 0);
             for (at, net) in (BLOCK * number..).zip(block) {
-                *net = portable::sub(codes_at(codes, at), codes_at(&common.undriven, at));
+                *net = portable::sub(codes_at(codes, at), codes_at(undriven, at));
                 let above = filled::<COLUMNS>(portable::sub(*net, common.dead), at);
                 row.largest = super::larger(row.largest, above);
                 sag = portable::dot(*net, common.sag, sag);
@@ -216,16 +284,34 @@ pub fn portable_pass<const ROWS: usize, const COLUMNS: usize>(
         }
         total.largest = super::larger(total.largest, row.largest);
         row.boost = boost(sag);
-        let short = row.boost >> BOOST_DROP;
+        let curve = common.curve;
+        let mut take = |place: usize, net: i16, gain: i16| {
+            let tare = row.tare[place];
+            taxels[place] = if curve.growth == 0 {
+                taxel(net, gain, row.boost, tare)
+            } else {
+                let gained = i32::from(net) * i32::from(gain);
+                curve.load(upper(gained, row.boost).wrapping_sub(tare >> (TARE_BITS - Curve::FINE_BITS)), tare)
+            };
+            total.peak = total.peak.max(taxels[place]);
+        };
         for (at, net) in nets.into_iter().enumerate().take(pairs) {
             let gains = weights_at(&row.gains, at);
-            let (left, right) = (at, at + pairs);
-            taxels[left] = taxel(low(net), low(gains), short, row.tare[left]);
-            total.peak = total.peak.max(taxels[left]);
-            if right < COLUMNS {
-                taxels[right] = taxel(high(net), high(gains), short, row.tare[right]);
-                total.peak = total.peak.max(taxels[right]);
+            take(at, low(net), low(gains));
+            if at + pairs < COLUMNS {
+                take(at + pairs, high(net), high(gains));
             }
+        }
+        if curve.growth != 0 {
+            for (at, net) in row.nets.iter_mut().enumerate() {
+                *net = if at % 2 == 0 { low(nets[at / 2]) } else { high(nets[at / 2]) };
+            }
+            for (weight, taxel) in (1 - COLUMNS as i32..).step_by(2).zip(taxels) {
+                total.first = total.first.wrapping_add(*taxel);
+                total.second = total.second.wrapping_add(taxel.wrapping_mul(weight));
+            }
+            total.running = total.running.wrapping_add(total.first);
+            continue;
         }
         total.first = portable::add_high(total.first, sum, row.boost);
         total.second = portable::add_high(total.second, moment, row.boost);

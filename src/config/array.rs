@@ -128,29 +128,6 @@ fn root(x: i64) -> i32 {
     floor_sqrt(x.max(0).unsigned_abs() << SQUARE_BITS) as i32
 }
 
-/// Constants of f(u) = u (1 + p u / 4096) / (1 + p): see [`crate::params::Params::curve_permille`], which is p.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Curve {
-    /// q = 1 / (1 + p), Q26.
-    pub least: i32,
-    /// q p, Q30.
-    pub growth: i32,
-}
-
-impl Curve {
-    /// Fractional bits of q.
-    pub(crate) const FACTOR_BITS: u32 = 26;
-
-    /// Constants for p in permille, at most 8,000; none for p = 0, which is a line.
-    pub(crate) fn new(permille: i32) -> Option<Self> {
-        let permille = permille.max(0).min(8_000);
-        let whole = i64::from(1_000 + permille);
-        let least = ((1_000 << Self::FACTOR_BITS) + whole / 2) / whole;
-        let growth = ((i64::from(permille) << 30) + whole / 2) / whole;
-        (permille > 0).then_some(Self { least: least as i32, growth: growth as i32 })
-    }
-}
-
 /// Share of the converter's range up to saturation that a peak may use.
 const SEEN: f32 = 0.95;
 /// Largest undriven level that is subtracted from the range. The level is known only while the scan runs, so the
@@ -184,7 +161,7 @@ pub(super) const fn saturated_codes(p: &Params) -> u16 {
 pub(super) fn force_seen(p: &Params, codes_milli: i32, tip: &Tip) -> Newtons {
     let codes = SEEN * f32::from(saturated_codes(p)) - p.undriven_max_codes.min(LEVEL_MAX) as f32;
     let grown = p.curve_permille as f32 * 1e-3;
-    // Load of these codes by [`Curve`], in codes of the full range.
+    // Load of these codes by [`lanes::Curve`], in codes of the full range.
     let codes = codes * (1.0 + grown * codes / 4_096.0) / (1.0 + grown);
     let peak_kpa = codes / (codes_milli as f32 * 1e-3);
     tip.force(tip.indentation_from_peak(Kilopascals::from_bits(narrow(peak_kpa * exp2(16)))))

@@ -236,7 +236,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
     /// Distance between the plane and the hemisphere's centre after a change of the sum's force: d is proportional to
     /// the root of the force.
     fn followed(&self, guess: &Guess, force: Newtons) -> i32 {
-        let more = i64::from(force.to_bits()) - i64::from(self.force.to_bits());
+        // No force is negative, so the difference fits.
+        let more = i64::from(force.to_bits().wrapping_sub(self.force.to_bits()));
         guess.height.saturating_sub(clamp_to((more * i64::from(self.follows)) >> FOLLOWS_BITS, FOLLOWS_MAX))
     }
 

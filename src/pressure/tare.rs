@@ -28,12 +28,6 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         self.tare_lines = [[0; 2]; ROWS];
         self.tare_sums = [0; 3];
         self.tare_frames = 0;
-        self.baseline_line = None;
-    }
-
-    /// Takes note that another characteristic may apply from now on.
-    pub fn forget_line(&mut self) {
-        self.baseline_line = None;
     }
 
     /// Adds the last image to the tare's running means. Returns true when the tare is complete.
@@ -73,7 +67,15 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
     fn learn(&mut self, row: usize, weight: i32) {
         let row = row.min(ROWS - 1);
         let (mut sum, mut moment) = (0, 0);
-        let values = self.baseline_line.as_ref().unwrap_or(&self.picture.taxels[row]);
+        let mut readings = [0; COLUMNS];
+        let values = if self.loads {
+            for (column, reading) in readings.iter_mut().enumerate() {
+                *reading = if self.picture.bad[row] >> column & 1 == 0 { self.rows[row].reading(column) } else { 0 };
+            }
+            &readings
+        } else {
+            &self.picture.taxels[row]
+        };
         for (column, (tare, value)) in self.rows[row].tare.iter_mut().zip(values).enumerate() {
             *tare = tare.wrapping_add(((i64::from(*value) * i64::from(weight)) >> CODE_BITS) as i32);
             let tare = *tare >> (TARE_BITS - CODE_BITS);

@@ -196,6 +196,7 @@ impl Guard {
         Millimetres::from_bits(self.travel)
     }
 
+    #[inline(always)]
     fn pressed(&self, deeper: i32) -> bool {
         self.touching
             && self.surface.is_some_and(|surface| {

@@ -176,11 +176,14 @@ impl Monitor {
         if moved < BLIND_TRAVEL.0 >> FORWARD_BITS {
             self.disturbance = disturbance;
         }
+        if moved <= BLIND_TRAVEL.0 {
+            return None;
+        }
         let load = self.disturbance.0.saturating_sub(disturbance.0).to_bits();
         // A gear that loses torque changes its load by a part of the force where the motion turns.
         let lost = (i64::from(config.bounds.acceleration_per_n) * i64::from(force.to_bits() >> LOST_BITS)) >> 16;
         let pushes = i64::from(load) > i64::from(config.bounds.acceleration_per_n >> LOAD_BITS) + lost;
-        (moved > BLIND_TRAVEL.0 && pushes || moved > BLIND_TRAVEL_MAX.0).then_some(Fault::ArrayFrozen)
+        (pushes || moved > BLIND_TRAVEL_MAX.0).then_some(Fault::ArrayFrozen)
     }
 }
 

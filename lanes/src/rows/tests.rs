@@ -1,7 +1,10 @@
 //! The pass against plain arithmetic.
 
 use super::super::pair;
-use super::{BOOST_BITS, Codes, Common, Row, boost, moment_bits, pairs, pass, place, portable_pass, sum_drop};
+use super::{
+    BOOST_BITS, CODE_BITS, Codes, Common, Curve, Row, TARE_BITS, boost, moment_bits, pairs, pass, place, portable_pass,
+    sum_drop,
+};
 
 const ONE: f64 = (1_u64 << 32) as f64;
 
@@ -35,9 +38,9 @@ impl Mix {
 fn bench<const ROWS: usize, const COLUMNS: usize>(
     mix: &mut Mix,
     top: bool,
-) -> (Codes<ROWS, COLUMNS>, [Row<COLUMNS>; ROWS], Common<COLUMNS>) {
+) -> (Codes<ROWS, COLUMNS>, [Row<COLUMNS>; ROWS], Common) {
     let mut codes = Codes { rows: [[4_095; COLUMNS]; ROWS], undriven: [0; COLUMNS] };
-    let mut row = Row { gains: [32_767; COLUMNS], moments: [0; COLUMNS], tare: [0; COLUMNS], boost: 0, largest: 7 };
+    let mut row = Row { largest: 7, ..Row::new([32_767; COLUMNS], [0; COLUMNS]) };
     for column in 0..COLUMNS {
         let weight = (2 * column as i32 + 1 - COLUMNS as i32) * 32_767;
         row.moments[place(column, COLUMNS)] = (weight >> (14 - moment_bits(COLUMNS))) as i16;
@@ -53,7 +56,7 @@ fn bench<const ROWS: usize, const COLUMNS: usize>(
             row.tare.iter_mut().for_each(|tare| *tare = mix.below(1 << 24) as i32 - (1 << 23));
         }
     }
-    (codes, rows, Common { undriven: codes.undriven, dead: 12 | 12 << 16, sag: sag | sag << 16 })
+    (codes, rows, Common { dead: 12 | 12 << 16, sag: sag | sag << 16, curve: Curve::LINE })
 }
 
 /// A pass against the same in wide integers, and against the portable one.
@@ -64,10 +67,10 @@ fn is_what_its_parts_say<const ROWS: usize, const COLUMNS: usize>(mix: &mut Mix,
     let total = pass(&codes, &mut rows, &common, &mut taxels);
     assert_eq!(portable_pass(&codes, &mut again.0, &common, &mut again.1), total);
     assert_eq!(again, (rows, taxels));
-    let drop = sum_drop(ROWS, COLUMNS);
+    let (drop, undriven) = (sum_drop(ROWS, COLUMNS), &codes.undriven);
     let (mut first, mut second, mut running, mut peak, mut all) = (0, 0, 0, 0, [0; 2]);
     for ((codes, row), taxels) in codes.rows.iter().zip(&rows).zip(taxels) {
-        let net = |at: usize| i64::from(codes[at]) - i64::from(common.undriven[at]);
+        let net = |at: usize| i64::from(codes[at]) - i64::from(undriven[at]);
         let sag = i64::from(common.sag & 0xffff) * (0..COLUMNS).map(net).sum::<i64>();
         assert_eq!(row.boost, boost(i32::try_from(sag).expect("the sag fits")));
         let (mut largest, mut peak_of) = ([0; 2], 0);
@@ -143,4 +146,54 @@ fn a_half_of_the_array_at_the_top_fits() {
     upper::<16, 16>();
     upper::<16, 32>();
     upper::<15, 31>();
+}
+
+/// In codes.
+fn exact(permille: u32, taxel: f64, tare: f64) -> f64 {
+    let p = f64::from(permille) / 1_000.0;
+    let least = 1.0 / (1.0 + p);
+    taxel * (least + least * p * ((taxel + tare).max(0.0) + tare) / 4_096.0)
+}
+
+#[test]
+fn what_a_reading_carries_is_within_a_unit_of_the_formula() {
+    let mut worst = 0.0_f64;
+    for permille in [1, 300, 3_300, 8_000] {
+        let curve = Curve::new(permille);
+        for tare in (0..=4_096 << TARE_BITS).step_by(19_531_249) {
+            for taxel in (-4_096 << CODE_BITS..=8_192 << CODE_BITS).step_by(37) {
+                let carried = f64::from(curve.load(taxel << 6, tare));
+                let formula = 16.0 * exact(permille, f64::from(taxel) / 16.0, f64::from(tare) / 65_536.0);
+                let largest = f64::from((1 << Curve::LARGEST_BITS) - 1);
+                if formula < largest {
+                    worst = worst.max((carried - formula).abs());
+                } else {
+                    assert_eq!(carried, largest);
+                }
+            }
+        }
+    }
+    assert!((0.5..0.52).contains(&worst), "{worst}");
+}
+
+#[test]
+fn a_larger_reading_never_carries_less() {
+    for permille in [1, 1_000, 8_000] {
+        let curve = Curve::new(permille);
+        // The most that codes of 12 bits, gains below 2 and a boost below 1.5 can show.
+        let most = 196_560;
+        for tare in [-most, 0, 3_000, 65_536, most] {
+            let all = (-most - tare..=most - tare).step_by(5).map(|taxel| curve.load(taxel << 6, tare << 12));
+            assert!(all.clone().is_sorted(), "{permille} {tare}");
+            assert!(all.clone().all(|carried| (-1 << 18..1 << 18).contains(&carried)));
+            assert_eq!(curve.load(0, tare << 12), 0);
+        }
+    }
+}
+
+#[test]
+fn the_full_range_stays() {
+    for permille in [0, 1, 500, 8_000] {
+        assert_eq!(Curve::new(permille).load(4_096 << 10, 0), 4_096 << 4, "{permille}");
+    }
 }

@@ -17,7 +17,7 @@ use fingertip::shipped::{Array, Budget, COLUMNS, Config, Fit, Frame};
 use fingertip::state::Limits;
 use fingertip::touch::{Felt, Touch};
 use fingertip::units::{Celsius, CoreCycles, Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons};
-use lanes::{Codes, Common, Row, Total};
+use lanes::{Codes, Common, Curve, Row, Total};
 use paper::{Relaxation, RelaxationState};
 
 /// Name of a machine, and function that makes one step and adds its results to the digest.
@@ -121,16 +121,19 @@ pub const STEPS: [Step; 20] = [
         let moments = [fourth, first, s.share_q32, second, third];
         let tare = core::array::from_fn(|column| s.words[column % 4].wrapping_mul(column as i32));
         let [pairs, gains, moments] = [pairs, gains, moments].map(halves);
-        let codes = Codes { rows: [pairs, moments], undriven: [0; COLUMNS] };
+        let codes = Codes { rows: [pairs, moments], undriven: gains };
         let signed = |row: [u16; COLUMNS]| row.map(u16::cast_signed);
-        let mut rows = [Row { gains: signed(gains), moments: signed(moments), tare, boost: 0, largest: 0 }; 2];
-        let common = Common { undriven: gains, dead: fourth, sag: second & 0x7fff_7fff };
-        let mut taxels = [[0; COLUMNS]; 2];
-        let total = lanes::pass(&codes, &mut rows, &common, &mut taxels);
-        let Total { first, second, running, largest, peak } = total;
-        [first, second, running, peak, rows[0].boost, rows[1].boost].into_iter().for_each(|number| mix.add(number));
-        taxels.into_iter().flatten().for_each(|taxel| mix.add(taxel));
-        [largest, rows[0].largest, rows[1].largest].into_iter().for_each(|number| mix.add(number));
+        for curve in [Curve::LINE, Curve { least: s.words[1], growth: s.words[2] | 1 }] {
+            let mut rows = [Row { tare, ..Row::new(signed(gains), signed(moments)) }; 2];
+            let common = Common { dead: fourth, sag: second & 0x7fff_7fff, curve };
+            let mut taxels = [[0; COLUMNS]; 2];
+            let total = lanes::pass(&codes, &mut rows, &common, &mut taxels);
+            let Total { first, second, running, largest, peak } = total;
+            [first, second, running, peak, rows[0].boost, rows[1].boost].into_iter().for_each(|number| mix.add(number));
+            taxels.into_iter().flatten().for_each(|taxel| mix.add(taxel));
+            [largest, rows[0].largest, rows[1].largest].into_iter().for_each(|number| mix.add(number));
+            rows.iter().for_each(|row| (0..COLUMNS).for_each(|column| mix.add(row.reading(column))));
+        }
     }),
     ("lanes::near_root", |_, s, mix| mix.add(lanes::near_root(s.share_q32 | 1 << 30))),
     ("lanes::root_and_product", |_, s, mix| {

@@ -4,7 +4,6 @@ use super::machines::Machines;
 use super::model::Sample;
 use super::{Mix, Source};
 use fingertip::config::ArrayDrift;
-use fingertip::config::Curve;
 use fingertip::config::Gains;
 use fingertip::config::Motions;
 use fingertip::config::{self, ConfigError};
@@ -154,10 +153,8 @@ fn add_config(mix: &mut Mix, config: &Config) {
     for number in [newtons_per_sum_q48, pascals_per_sum_q32, mm_per_count_q40] {
         mix.add(*number);
     }
-    let Curve { least, growth } = curve.unwrap_or(Curve { least: 0, growth: 0 });
-    for number in [least, growth] {
-        mix.add(number);
-    }
+    mix.add(curve.least);
+    mix.add(curve.growth);
     for number in [creep_share_q32, creep_leak_q32, frame_ns, jump, voltage_shift, duty_gain, share_per_mv_q32] {
         mix.add(*number);
     }

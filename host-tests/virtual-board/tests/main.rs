@@ -15,7 +15,6 @@ mod injected_faults;
 mod library;
 mod measured;
 mod parameters;
-mod refused_writes;
 mod scenes;
 mod serve;
 mod temperature;

@@ -234,12 +234,14 @@ fn text(bytes: &[u8]) -> &str {
 
 #[test]
 fn columns_come_in_any_order_and_others_are_ignored() {
-    let output = run("note,r_mm,d_mm,Y_kPa,a_mm\nfirst,0,2,250,10\nsecond,6.0,2.0,250.0,10.0\n");
+    let output =
+        run("note,r_mm,d_mm,Y_kPa,a_mm\nfirst,0,2,250,10\nsecond,6.0,2.0,250.0,10.0\nnearest,0,1.99999998,250,10\n");
     assert!(output.status.success(), "{}", text(&output.stderr));
     let expected = format!(
-        "{HEADER}{}{}",
+        "{HEADER}{}{}{}",
         "10,250,2,0,6,0.6435011,50,3.14159,3.14159,1.999998\n",
-        "10.0,250.0,2.0,6.0,6,0.6435011,0,3.14159,3.14159,1.999998\n"
+        "10.0,250.0,2.0,6.0,6,0.6435011,0,3.14159,3.14159,1.999998\n",
+        "10,250,1.99999998,0,6,0.6435011,50,3.14159,3.14159,1.999998\n"
     );
     assert_eq!(text(&output.stdout), expected);
     assert_eq!(text(&output.stderr), "");

@@ -277,8 +277,6 @@ fn every_page_that_a_source_names_exists() {
     }
 }
 
-// The paper's figures: well-formed, the same bytes every time, and of the model.
-
 /// The schematic's labels are names and values of its page, and each net begins at the pin of the netlist, which the
 /// image uses.
 #[test]
@@ -316,6 +314,8 @@ fn the_schematic_is_that_of_the_netlist() {
         assert!(named, "docs/board.md does not name {label}");
     }
 }
+
+// The paper's figures: well-formed, the same bytes every time, and of the model.
 
 #[test]
 fn the_pictures_are_well_formed_and_the_same_every_time() {

@@ -5,8 +5,7 @@
 //! bytes and name. Those programs know items of 1, 2 and 4 bytes; so each pressure is an item, and raw codes and zeros,
 //! which none of them needs, are none.
 
-use fingertip::link::table::indirect;
-use fingertip::link::table::{Kind, Register};
+use fingertip::link::table::{Kind, Register, indirect};
 use fingertip::shipped::{COLUMNS, REGISTERS, address};
 
 /// Names that X-series servos have for these addresses: drivers use these names.

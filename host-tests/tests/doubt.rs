@@ -2,8 +2,7 @@
 
 use core::f64::consts::PI;
 use fastrand::Rng;
-use fingertip::contact::Contact;
-use fingertip::contact::{FitLevel, from_sums};
+use fingertip::contact::{Contact, FitLevel, from_sums};
 use fingertip::shipped::{Fit, ROWS, TactileImage};
 use fingertip::units::Millimetres;
 use host_tests::finger::config;

@@ -9,6 +9,9 @@ use sim::native::bench::Bench;
 use sim::scene::read;
 use sim::setup::Setup;
 
+/// Speed of an object that is carried.
+const CARRIED_MM_PER_S: f64 = 5.0;
+
 fn bench() -> Bench {
     let mut board = Bench::of(&Setup::default(), &config());
     board.tare();
@@ -41,15 +44,6 @@ fn told<E: Set>(board: &mut Bench<E>) -> String {
     )
 }
 
-/// 5 mm/s, frame by frame.
-fn carry<E: Set>(board: &mut Bench<E>, from: f64, to: f64) {
-    let frames = ((to - from).abs() / 5.0 / 1e-4).ceil() as u32;
-    for frame in 1..=frames {
-        board.place_object(from + (to - from) * f64::from(frame) / f64::from(frames));
-        board.step();
-    }
-}
-
 /// Requests a release, and returns the force that is still held after the given time, s.
 fn kept<E: Set>(board: &mut Bench<E>, seconds: f64) -> Option<String> {
     board.command().goal = newtons(0);
@@ -60,7 +54,7 @@ fn kept<E: Set>(board: &mut Bench<E>, seconds: f64) -> Option<String> {
 fn moved_while_held<E: Set>(board: &mut Bench<E>, goal_mn: i32, moved_mm: f64) -> Option<String> {
     board.command().goal = newtons(goal_mn);
     board.run(0.7);
-    carry(board, 5.0, 5.0 - moved_mm);
+    board.carry_object(5.0, 5.0 - moved_mm, CARRIED_MM_PER_S, |_| {});
     board.run(0.3);
     let held = board.truth().force_n;
     kept(board, 2.0).map(|told| format!("goal {goal_mn} mN, {moved_mm} mm: held {held:.3} N, then let go: {told}"))
@@ -126,7 +120,7 @@ fn a_press_from_a_released_tip_ends_at_the_clearance() {
     board.run(1.0);
     board.command().goal = newtons(0);
     board.run(0.7);
-    carry(&mut board, 10.0, 7.5);
+    board.carry_object(10.0, 7.5, CARRIED_MM_PER_S, |_| {});
     board.request(Task::Press);
     board.run(16.0);
     if board.truth().force_n > 0.0 {
@@ -149,7 +143,7 @@ fn a_residue_from_before_torque_does_not_make_the_tip_go_back() {
         board.run(0.3);
         let config = board.pipeline().config().clone();
         board.pipeline().configure(&config);
-        carry(&mut board, 5.0, 15.0);
+        board.carry_object(5.0, 15.0, CARRIED_MM_PER_S, |_| {});
         let before_mm = board.truth().travel_mm;
         let residue_n: f64 = board.status().contact.force.0.to_num();
         board.command().torque = true;
@@ -173,7 +167,7 @@ fn what_came_to_a_released_tip_is_held_and_let_go() {
         board.run(0.7);
         board.command().goal = newtons(0);
         board.run(0.7);
-        carry(&mut board, 5.0, to_mm);
+        board.carry_object(5.0, to_mm, CARRIED_MM_PER_S, |_| {});
         board.run(0.3);
         board.command().goal = newtons(goal_mn);
         board.run(1.0);

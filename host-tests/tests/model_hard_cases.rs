@@ -4,7 +4,7 @@ use fingertip::model::{MODULUS_MAX, MODULUS_MIN, RADIUS_MAX, RADIUS_MIN, Tip, Ti
 use fingertip::units::{Kilopascals, Millimetres};
 use host_tests::finger::config;
 use host_tests::prove::exact;
-use host_tests::prove::random::{boundary_distances, boundary_tips, mm, newtons, reference_tip, tip};
+use host_tests::prove::random::{boundary_distances, boundary_tips, mm, newtons, reference_tip};
 use host_tests::prove::reference::{Reference, error_ulp, real};
 use paper::units::{Radians, Ratio};
 use paper::{Displacement, Load};
@@ -104,18 +104,6 @@ fn distances_near_and_beyond_the_radius() {
         assert!(length > 10_000);
         // A distance has no sign.
         assert_eq!(tip.pressure(mm(-radius / 2), tip.depth_max()), tip.pressure(mm(radius / 2), tip.depth_max()));
-    }
-}
-
-#[test]
-fn the_softest_and_the_stiffest_tip() {
-    for modulus in [MODULUS_MIN, MODULUS_MAX] {
-        for radius in [RADIUS_MIN, RADIUS_MAX] {
-            let tip = Tip::new(radius, modulus).unwrap();
-            for share in 1..=100 {
-                judge_depth(&tip, (i64::from(tip.depth_max().to_bits()) * share / 100) as i32);
-            }
-        }
     }
 }
 
@@ -256,29 +244,5 @@ fn the_friction_of_a_deep_contact() {
             assert!(error.abs() <= 0.56, "d {d}: {error}");
             assert_eq!(paper::limit_surface(&tip, mm(d), Ratio::from_bits(i32::MAX)), limit);
         }
-    }
-}
-
-#[test]
-#[expect(clippy::approx_constant, reason = "figures computed elsewhere, kept as they are")]
-fn the_papers_figures() {
-    let tip = tip(10 << 24, 250 << 16);
-    // d um, r_c, p(0), F, k: 40-digit arithmetic for the reference tip.
-    let figures = [
-        (1_000_i64, 4.358_898_944, 25.0, 0.785_398_163_397_448, 1.570_796),
-        (2_000, 6.0, 50.0, 3.141_592_653_589_79, 3.141_593),
-        (3_000, 7.141_428_429, 75.0, 7.068_583_470_577_03, 4.712_389),
-        (5_000, 8.660_254_038, 125.0, 19.634_954_084_936_2, 7.853_982),
-    ];
-    for (d_um, radius, peak, force, stiffness) in figures {
-        let d = Millimetres::from_bits(((d_um << 24) / 1_000) as i32);
-        let close = |value: f64, expected: f64, unit: f64| {
-            assert!((value - expected).abs() <= unit, "d {d_um} um: {value}, not {expected}");
-        };
-        close(tip.contact_radius(d).0.to_num(), radius, 6e-8);
-        close(tip.peak_pressure(d).0.to_num(), peak, 1.6e-5);
-        close(tip.pressure(mm(0), d).0.to_num(), peak, 1.6e-5);
-        close(tip.force(d).0.to_num(), force, 1.6e-5);
-        close(tip.stiffness(d).0.to_num(), stiffness, 1.6e-5);
     }
 }

@@ -43,39 +43,6 @@ proptest! {
     #![proptest_config(config())]
 
     #[test]
-    fn force_radius_angle_and_stiffness_never_fall_with_the_depth((tip, d) in tip_and_depth(), step in 1..10_000_i32) {
-        let deeper = mm(d + step);
-        prop_assert!(tip.force(deeper) >= tip.force(mm(d)));
-        prop_assert!(tip.contact_radius(deeper) >= tip.contact_radius(mm(d)));
-        prop_assert!(tip.stiffness(deeper) >= tip.stiffness(mm(d)));
-        prop_assert!(tip.peak_pressure(deeper) >= tip.peak_pressure(mm(d)));
-        // No step larger than the slope at its far end allows, and one unit of rounding.
-        let rise = number(tip.force(deeper).to_bits() - tip.force(mm(d)).to_bits(), 16);
-        let slope = number(tip.stiffness(deeper).to_bits() + 1, 16);
-        prop_assert!(rise <= slope * number(step, 24) + number(1, 16));
-    }
-
-    #[test]
-    fn the_pressure_never_rises_with_the_distance((tip, d) in tip_and_depth(), share in 0.0..1.1_f64) {
-        let start = (number(tip.contact_radius(mm(d)).to_bits(), 0) * share) as i32;
-        let mut before = tip.pressure(mm(start), mm(d));
-        for r in start + 1..start + 200 {
-            let now = tip.pressure(mm(r), mm(d));
-            prop_assert!(now <= before, "r {r}");
-            before = now;
-        }
-    }
-
-    #[test]
-    fn the_way_back_from_the_force_is_as_good_as_the_force((tip, d) in tip_and_depth()) {
-        let (depth, again) = (number(d, 24), number(tip.indentation(tip.force(mm(d))).to_bits(), 24));
-        // Half a unit of force, at the local slope or from zero, and half a unit of depth.
-        let lost = number(1, 17) / (std::f64::consts::PI * number(tip.modulus().to_bits(), 16) / 1000.0);
-        let bound = lost.sqrt().min(lost / depth) * 1.000_001 + number(1, 25);
-        prop_assert!((again - depth).abs() <= bound, "{again}, {depth}, {bound}");
-    }
-
-    #[test]
     fn the_way_back_from_the_radius_and_the_peak_is_as_good_as_they_are((tip, d) in tip_and_depth()) {
         let (a, depth) = (number(tip.radius().to_bits(), 24), number(d, 24));
         let by_radius = number(tip.indentation_from_radius(tip.contact_radius(mm(d))).to_bits(), 24);
@@ -123,36 +90,10 @@ proptest! {
         prop_assert!((pressure - number(tip.pressure(r, mm(d)).to_bits(), 16)).abs() <= bound);
     }
 
-    /// The energy is a cubic of the depth, so Simpson's rule on the force gives its differences exactly.
     #[test]
-    fn the_force_is_the_slope_of_the_energy((tip, d) in tip_and_depth(), step in 0.0..=1.0_f64) {
-        let half = (number(d.min(tip.depth_max().to_bits() - d), 0) * step) as i32;
-        let at = |d: i32| Displacement { normal: mm(d), ..Displacement::default() };
-        let gained = number(paper::energy(&tip, at(d + half)).to_bits() - paper::energy(&tip, at(d - half)).to_bits(), 14);
-        let forces = [d - half, d, d + half].map(|d| number(tip.force(mm(d)).to_bits(), 16));
-        let width = number(half, 24);
-        let work = width / 3.0 * (forces[0] + 4.0 * forces[1] + forces[2]);
-        prop_assert!((gained - work).abs() <= number(1, 14) + number(1, 16) * width, "{gained}, {work}");
-        prop_assert_eq!(paper::load(&tip, at(d)).normal, tip.force(mm(d)));
-        prop_assert_eq!(paper::load(&tip, at(d)).tangential.to_bits(), 0);
-        prop_assert_eq!(paper::load(&tip, at(d)).moment.to_bits(), 0);
-    }
-
-    #[test]
-    fn tangential_force_and_moment_are_slopes_of_the_energy((tip, d) in tip_and_depth(), s in -0.45..0.45_f64, t in -0.9..0.9_f64) {
-        let shift = (number(tip.radius().to_bits(), 0) * s) as i32;
-        let tilt = (t * number(1 << 24, 0)) as i32;
-        let at = |shift: i32, tilt: i32| Displacement { normal: mm(d), shift: mm(shift), tilt: Radians::from_bits(tilt) };
-        let load = paper::load(&tip, at(shift, tilt));
-        let h = 1 << 18; // 1/64 mm or rad
-        // The energy is a quadratic of the shift: the central difference is exact.
-        let by_shift = number(paper::energy(&tip, at(shift + h, tilt)).to_bits() - paper::energy(&tip, at(shift - h, tilt)).to_bits(), 14) * 32.0;
-        prop_assert!((by_shift - number(load.tangential.to_bits(), 16)).abs() <= number(1, 14) * 35.0);
-        // Of the tilt it is not: the third derivative is below 60 pi Y (d^3 + d^2 |s|) for these tilts.
-        let by_tilt = number(paper::energy(&tip, at(shift, tilt + h)).to_bits() - paper::energy(&tip, at(shift, tilt - h)).to_bits(), 14) * 32.0;
-        let (depth, y) = (number(d, 24), number(tip.modulus().to_bits(), 16) / 1000.0);
-        let third = 60.0 * std::f64::consts::PI * y * depth * depth * (depth + number(shift.abs(), 24));
-        prop_assert!((by_tilt - number(load.moment.to_bits(), 14)).abs() <= number(1, 14) * 35.0 + third / 6.0 / 64.0 / 64.0);
+    fn a_tip_that_is_only_pressed_has_the_models_force((tip, d) in tip_and_depth()) {
+        let load = paper::load(&tip, Displacement { normal: mm(d), ..Displacement::default() });
+        prop_assert_eq!((load.normal, load.tangential.to_bits(), load.moment.to_bits()), (tip.force(mm(d)), 0, 0));
     }
 
     #[test]
@@ -246,17 +187,6 @@ fn the_quadrature_converges_with_the_square_of_the_rings_down_to_the_formats_flo
 }
 
 #[test]
-fn the_friction_shape_is_that_of_the_pressure_profile() {
-    let tip = reference_tip();
-    for (d_mm, shape) in [(1, 0.541_284), (2, 0.549_963), (3, 0.559_480)] {
-        let ours = number(paper::friction_shape(&tip, mm(d_mm << 24)).to_bits(), 16);
-        assert!((ours - shape).abs() < 1.6e-5, "{ours}");
-    }
-    let shallow = number(paper::friction_shape(&tip, mm(1)).to_bits(), 16);
-    assert!((shallow - 8.0 / 15.0).abs() < 1e-5, "{shallow}");
-}
-
-#[test]
 fn a_held_tip_relaxes_by_its_terms_and_recovers() {
     // Half of the force relaxes: 30 % with 10 ms, 20 % with 1 s.
     let terms = [(19_661, 10_000), (13_107, 1_000_000)]
@@ -304,12 +234,14 @@ fn text(bytes: &[u8]) -> &str {
 
 #[test]
 fn columns_come_in_any_order_and_others_are_ignored() {
-    let output = run("note,r_mm,d_mm,Y_kPa,a_mm\nfirst,0,2,250,10\nsecond,6.0,2.0,250.0,10.0\n");
+    let output =
+        run("note,r_mm,d_mm,Y_kPa,a_mm\nfirst,0,2,250,10\nsecond,6.0,2.0,250.0,10.0\nnearest,0,1.99999998,250,10\n");
     assert!(output.status.success(), "{}", text(&output.stderr));
     let expected = format!(
-        "{HEADER}{}{}",
+        "{HEADER}{}{}{}",
         "10,250,2,0,6,0.6435011,50,3.14159,3.14159,1.999998\n",
-        "10.0,250.0,2.0,6.0,6,0.6435011,0,3.14159,3.14159,1.999998\n"
+        "10.0,250.0,2.0,6.0,6,0.6435011,0,3.14159,3.14159,1.999998\n",
+        "10,250,1.99999998,0,6,0.6435011,50,3.14159,3.14159,1.999998\n"
     );
     assert_eq!(text(&output.stdout), expected);
     assert_eq!(text(&output.stderr), "");
@@ -361,31 +293,6 @@ fn a_missing_column_is_said() {
     assert_eq!(output.status.code(), Some(1));
     assert!(text(&output.stderr).contains("no column Y_kPa"), "{}", text(&output.stderr));
     assert_eq!(text(&output.stdout), "");
-}
-
-#[test]
-fn the_oracle_passes_through_within_the_bounds() {
-    let oracle = std::fs::read_to_string(host_tests::prove::reference::path()).unwrap();
-    let output = run(&oracle);
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    let mut ours = csv::Reader::from_reader(output.stdout.as_slice());
-    let mut theirs = csv::Reader::from_reader(oracle.as_bytes());
-    let mut rows = 0;
-    for (ours, theirs) in ours.records().zip(theirs.records()) {
-        let (ours, theirs) = (ours.unwrap(), theirs.unwrap());
-        let number = |record: &csv::StringRecord, place: usize| record[place].parse::<f64>().unwrap();
-        // Units of the last place, and half a unit more for the decimals printed.
-        for (place, (ulp, bound)) in [(24, 1.0), (24, 4.0), (16, 2.0), (16, 1.0), (16, 1.0)]
-            .into_iter()
-            .map(|(bits, b)| (0.5_f64.powi(bits), b))
-            .enumerate()
-        {
-            let error = (number(&ours, 4 + place) - number(&theirs, 4 + place)) / ulp;
-            assert!(error.abs() <= bound + 0.5, "row {rows}, column {}: {error} ulp", 4 + place);
-        }
-        rows += 1;
-    }
-    assert_eq!(rows, 400);
 }
 
 // A quick part of the proof: thousands of inputs where `cargo xtask prove` takes them all.

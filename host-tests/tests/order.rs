@@ -1,9 +1,8 @@
 //! The core reads from top to bottom: no stage uses one that comes after it in `src/lib.rs`.
 
 use std::collections::BTreeSet;
-use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 /// A stage of the core: a module that `src/lib.rs` names.
 #[derive(Clone, Debug, PartialEq, Eq)]

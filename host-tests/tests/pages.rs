@@ -277,6 +277,44 @@ fn every_page_that_a_source_names_exists() {
     }
 }
 
+/// The schematic's labels are names and values of its page, and each net begins at the pin of the netlist, which the
+/// image uses.
+#[test]
+fn the_schematic_is_that_of_the_netlist() {
+    let read = |path: &str| fs::read_to_string(root().join(path)).expect("a file of the repository");
+    let (page, picture) = (read("docs/board.md"), read("docs/pictures/schematic.svg"));
+    let image = read("src/main.rs") + &read("src/board/pins.rs");
+    let netlist = page.split("## Netlist").nth(1).and_then(|rest| rest.split("\n## ").next()).expect("a netlist");
+    let mut pins = BTreeMap::new();
+    for row in netlist.lines().filter(|line| line.starts_with('|')) {
+        let cells: Vec<_> = row.split('|').map(str::trim).collect();
+        let [nets, from] = [cells[1], cells[2]].map(|cell| cell.split(", "));
+        pins.extend(nets.zip(from).filter(|(_, pin)| pin.starts_with('P')));
+    }
+    let labels = picture.split("<text ").skip(1).filter_map(|text| {
+        text.split(['>', '<']).find(|part| {
+            // The text itself, without the tags around it.
+            !part.is_empty() && !part.contains('=')
+        })
+    });
+    let labels: Vec<&str> = labels.filter(|label| *label != "/text").collect();
+    let shown: BTreeMap<&str, &str> =
+        labels.windows(2).filter(|pair| pair[1].contains(" CN")).map(|pair| (pair[0], pair[1])).collect();
+    assert_eq!(shown, pins);
+    for pin in pins.values().map(|pin| pin.split(' ').next().expect("a pin")) {
+        assert!(
+            image.split(|sign: char| !sign.is_alphanumeric()).any(|word| word == pin),
+            "the image does not use {pin}"
+        );
+    }
+    let titles: Vec<&str> =
+        picture.split("font-weight=\"bold\">").skip(1).filter_map(|text| text.split('<').next()).collect();
+    for label in labels.iter().filter(|label| !titles.contains(label) && **label != "10k") {
+        let named = page.contains(label) || label.split(' ').all(|word| page.contains(word));
+        assert!(named, "docs/board.md does not name {label}");
+    }
+}
+
 // The paper's figures: well-formed, the same bytes every time, and of the model.
 
 #[test]

@@ -102,28 +102,6 @@ fn without_force_the_centre_is_the_middle() {
 }
 
 #[test]
-fn dead_and_saturated_taxels_are_counted_and_left_out() {
-    let mut bench = Bench::new(&Setup::default());
-    bench.press(1.0);
-    bench.frame.set_code(4, 4, 0);
-    bench.frame.set_code(5, 7, 4095);
-    let picture = bench.array.read(&bench.frame, &bench.config);
-    assert_eq!(picture.bad_count, 2);
-    assert_eq!((picture.taxels[4][4], picture.taxels[5][7]), (0, 0));
-    assert_eq!((picture.bad[4], picture.bad[5]), (1 << 4, 1 << 7));
-}
-
-#[test]
-fn a_row_that_is_never_driven_is_ten_dead_taxels() {
-    let mut bench = Bench::new(&Setup::default());
-    for column in 0..10 {
-        let undriven = bench.frame.code(ROWS, column);
-        bench.frame.set_code(3, column, undriven);
-    }
-    assert_eq!(bench.array.read(&bench.frame, &bench.config).bad_count, 10);
-}
-
-#[test]
 fn the_undriven_slot_takes_out_a_common_offset() {
     let mut bench = Bench::new(&Setup::default());
     let before = bench.press(1.0);
@@ -155,25 +133,6 @@ fn the_baseline_follows_drift_only_when_told() {
     }
     let left = f64::from(bench.array.read(&bench.frame, &bench.config).sum) / f64::from(drifted);
     assert!((0.33..0.42).contains(&left), "1/e is left, not {left}");
-}
-
-#[test]
-fn any_frame_is_taken() {
-    let mut bench = Bench::new(&Setup::default());
-    for pattern in [0, 0xffff, 4095, 4089, 1, 0x1000] {
-        for alternate in [pattern, 0, 4095] {
-            let mut frame = Frame::EMPTY;
-            for slot in 0..SLOTS {
-                for column in 0..10 {
-                    frame.set_code(slot, column, if (slot + column) % 2 == 0 { pattern } else { alternate });
-                }
-            }
-            let contact = from_sums(bench.array.read(&frame, &bench.config), &bench.config);
-            assert!(contact.force.to_bits() >= 0);
-            bench.array.continue_tare();
-            bench.array.follow_drift(drift_weight());
-        }
-    }
 }
 
 /// The highest code of a centred contact, as the plant's electrical model has it, stays where it is said to.

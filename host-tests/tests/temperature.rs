@@ -3,8 +3,7 @@
 use fingertip::chip::{Chip, FRAMES, Factory};
 use fingertip::command::Command;
 use fingertip::config::newtons;
-use fingertip::control::Creep;
-use fingertip::control::TemperatureDrift;
+use fingertip::control::{Creep, TemperatureDrift};
 use fingertip::params::Params;
 use fingertip::shipped::{Config, TARE_FRAMES};
 use fingertip::state::{Fault, Mode};

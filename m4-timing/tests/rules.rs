@@ -4,8 +4,7 @@
 use m4_timing::core::Touched;
 use m4_timing::decode::{decode, is_wide};
 use m4_timing::flash::{Flash, Settings};
-use m4_timing::meter::Summary;
-use m4_timing::meter::{Meter, MeterError, Registers, Site};
+use m4_timing::meter::{Meter, MeterError, Registers, Site, Summary};
 
 const BEGIN: [u16; 2] = [0xf3af, 0x8040];
 const END: [u16; 2] = [0xf3af, 0x8041];

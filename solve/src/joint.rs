@@ -6,8 +6,7 @@
 use crate::gains::{Condition, Gain, Gains, NoGains, Posed};
 use crate::judge::{judge, shifts};
 use crate::model::{At, Pose, Share, Square, UNKNOWNS};
-use crate::press::{Array, Press, Step};
-use crate::press::{first_pose, forces};
+use crate::press::{Array, Press, Step, first_pose, forces};
 use crate::robust::{huber, huber_cost, median, spread};
 use nalgebra::{DMatrix, DVector};
 

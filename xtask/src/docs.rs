@@ -14,7 +14,6 @@ const GENERATED: &[(&str, &str)] = &[
     ("docs/scenes.md", "scenes-page"),
     ("docs/budget.md", "budget-page"),
     ("docs/board.md", "generated"),
-    ("docs/pictures/schematic.svg", "schematic"),
     ("examples/dynamixel/fingertip.model", "generated"),
     ("examples/dynamixel/fingertip_direct.model", "generated"),
     ("python/fingertip/registers.py", "generated"),

@@ -5,11 +5,10 @@ use bringup::text::{CHECK, READY, checked};
 use serde_json::Value;
 use serial2::SerialPort;
 use std::fmt::Write as _;
-use std::fs;
 use std::os::fd::AsRawFd as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use std::thread;
+use std::{fs, thread};
 
 /// The report of a sound board, but for one figure.
 fn report(spoilt: Option<&str>) -> String {

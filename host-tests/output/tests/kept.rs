@@ -1,11 +1,10 @@
 //! Files that are there whole or not at all, written by one at a time.
 
 use output::kept::{self, Lock, Whole};
-use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread;
+use std::{fs, thread};
 
 fn folder(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("kept").join(name);

@@ -28,7 +28,8 @@ pub struct Profile {
 }
 
 /// Motion that the motor cannot make within its limits.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("no way from {from_mm} mm to {to_mm} mm of indentation: {reason}")]
 pub struct Unreachable {
     /// Start of the motion.
     pub from_mm: f64,
@@ -39,25 +40,15 @@ pub struct Unreachable {
 }
 
 /// Reason why the motor cannot reach a place.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Reason {
     /// Full drive stops, or creeps for more than 10 s, before the target: allow more voltage or current.
+    #[error("full drive stops short of it: allow more voltage or current")]
     TooWeak,
     /// Full brake does not stop the motion.
+    #[error("full brake does not stop there")]
     RunsAway,
 }
-
-impl core::fmt::Display for Unreachable {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let why = match self.reason {
-            Reason::TooWeak => "full drive stops short of it: allow more voltage or current",
-            Reason::RunsAway => "full brake does not stop there",
-        };
-        write!(f, "no way from {} mm to {} mm of indentation: {why}", self.from_mm, self.to_mm)
-    }
-}
-
-impl core::error::Error for Unreachable {}
 
 /// Shortest time from rest at one indentation to rest at another; see [`profile`].
 pub fn minimum_time_s(

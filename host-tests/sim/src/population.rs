@@ -17,8 +17,7 @@ pub use report::Report;
 
 use crate::effects::stream;
 use crate::part::{cannot_write, make_folder};
-use crate::population::report::Ran;
-use crate::population::report::judged;
+use crate::population::report::{Ran, judged};
 use crate::run::{Run, RunError, run};
 use crate::scene::text::set;
 use crate::scene::{self, Scene, SceneErrors};

@@ -2,13 +2,11 @@
 //! reproduces its forces and pressures.
 
 use fingertip::shipped::{COLUMNS, ROWS, SLOTS};
-use sim::cores;
 use sim::metrics::Verdict;
-use sim::native;
-use sim::registry;
 use sim::run::run;
 use sim::scene::{Bound, Scene, library};
 use sim::watch::{Step, Watch};
+use sim::{cores, native, registry};
 use std::collections::BTreeSet;
 
 fn scene(name: &str) -> Scene {

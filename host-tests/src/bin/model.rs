@@ -7,9 +7,8 @@
 //! the exit code 1.
 
 use std::error::Error;
-use std::fmt;
-use std::io;
 use std::process::ExitCode;
+use std::{fmt, io};
 
 use csv::StringRecord;
 use dashu_float::DBig;

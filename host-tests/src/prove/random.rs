@@ -18,32 +18,19 @@ const CHUNK: u64 = 1_000;
 /// the rest together.
 const ANGLE_EVERY: u64 = 10;
 
-/// Force, indentation, contact radius, stiffness, pressure and touching angle.
-pub struct Tallies(pub [Tally; 6]);
-
-impl Tallies {
-    /// Tallies without results.
-    pub const fn new() -> Self {
-        Self([
-            Tally::new("F(d)", 0.5),
-            Tally::new("d(F)", 0.5),
-            Tally::new("r_c(d)", 0.5),
-            Tally::new("k(d)", 0.5),
-            Tally::new("p(r, d)", 0.5),
-            Tally::new("theta_max(d)", 1.0),
-        ])
-    }
-}
-
-impl Default for Tallies {
-    fn default() -> Self {
-        Self::new()
-    }
-}
+/// Tallies without results: force, indentation, contact radius, stiffness, pressure and touching angle.
+const TALLIES: [Tally; 6] = [
+    Tally::new("F(d)", 0.5),
+    Tally::new("d(F)", 0.5),
+    Tally::new("r_c(d)", 0.5),
+    Tally::new("k(d)", 0.5),
+    Tally::new("p(r, d)", 0.5),
+    Tally::new("theta_max(d)", 1.0),
+];
 
 /// Random tips, depths, forces and distances.
 pub fn points(range: Range<u64>, progress: Progress<'_>) -> [Tally; 6] {
-    parallel(range, CHUNK, Tallies::new().0, progress, |range, tallies| {
+    parallel(range, CHUNK, TALLIES, progress, |range, tallies| {
         let mut rng = Rng::with_seed(SEED ^ range.start);
         for place in range {
             let Point { tip, d, force, r } = Point::random(&mut rng);
@@ -62,7 +49,7 @@ pub fn points(range: Range<u64>, progress: Progress<'_>) -> [Tally; 6] {
 /// Every combination of boundary tips with boundary depths, forces and distances.
 pub fn boundaries(progress: Progress<'_>) -> [Tally; 6] {
     let tips = boundary_tips();
-    parallel(0..tips.len() as u64, 1, Tallies::new().0, progress, |range, tallies| {
+    parallel(0..tips.len() as u64, 1, TALLIES, progress, |range, tallies| {
         for tip in &tips[range.start as usize..range.end as usize] {
             let reference = Reference::new(tip);
             let [by_depth @ .., by_angle] = tallies;
@@ -209,11 +196,6 @@ impl Point {
             _ => rng.i32(rim..=tip.radius().to_bits()),
         };
         Self { tip, d, force, r }
-    }
-
-    /// The raw inputs with one of the others.
-    pub fn at(&self, third: i32, fourth: i32) -> [i64; 4] {
-        at(&self.tip, third, fourth)
     }
 }
 

@@ -1,8 +1,7 @@
 //! Tests of the gain schedule: the gain set that it selects in each frame, and the gains of each set.
 
 use crate::config;
-use fingertip::config::Config;
-use fingertip::config::GAIN_SETS;
+use fingertip::config::{Config, GAIN_SETS};
 use fingertip::control::GainSchedule;
 use fingertip::params::Params;
 use fingertip::shipped;

@@ -4,10 +4,7 @@ mod gain_schedule;
 mod grip;
 
 use fingertip::config::Config;
-use fingertip::control::Drive;
-use fingertip::control::Observer;
-use fingertip::control::Reference;
-use fingertip::control::SpeedLoop;
+use fingertip::control::{Drive, Observer, Reference, SpeedLoop};
 use fingertip::params::Params;
 use fingertip::shipped;
 use fingertip::state::Limits;

@@ -5,8 +5,7 @@
 mod steps;
 
 use fingertip::command::Command;
-use fingertip::config::ConfigError;
-use fingertip::config::Gains;
+use fingertip::config::{ConfigError, Gains};
 use fingertip::frame::Sense;
 use fingertip::params::Params;
 use fingertip::shipped::{COLUMNS, Config, Frame, ROWS, SLOTS};

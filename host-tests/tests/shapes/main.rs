@@ -18,8 +18,7 @@ use fingertip::units::CoreCycles;
 use images::record::Digest;
 use sim::bridge::Bridge;
 use sim::mechanics::pressures::Cell;
-use sim::mechanics::rotor::Dynamics;
-use sim::mechanics::rotor::{Shaft, Source};
+use sim::mechanics::rotor::{Dynamics, Shaft, Source};
 use sim::native::DUTY_DELAY_SLOTS;
 use sim::setup::Setup;
 

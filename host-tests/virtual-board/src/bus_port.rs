@@ -50,13 +50,8 @@ impl Device for BusPort {
         Device::on_clock(&mut self.port, hz, registers, context);
     }
 
-    fn read(
-        &mut self,
-        register: Register,
-        registers: &mut RegisterFile,
-        context: &mut DeviceContext<'_>,
-    ) -> Option<u64> {
-        Device::read(&mut self.port, register, registers, context)
+    fn read(&mut self, register: Register, file: &mut RegisterFile, context: &mut DeviceContext<'_>) -> Option<u64> {
+        Device::read(&mut self.port, register, file, context)
     }
 
     fn peek(&self, register: Register, registers: &RegisterFile, now: VirtualNanos) -> Option<u64> {

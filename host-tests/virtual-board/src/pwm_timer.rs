@@ -81,17 +81,12 @@ impl Device for PwmTimer {
         Device::layout(&self.timer)
     }
 
-    fn read(
-        &mut self,
-        register: Register,
-        registers: &mut RegisterFile,
-        context: &mut DeviceContext<'_>,
-    ) -> Option<u64> {
+    fn read(&mut self, register: Register, file: &mut RegisterFile, context: &mut DeviceContext<'_>) -> Option<u64> {
         // No edge changes it, so the timer sleeps on: a break does, at once.
         if register == Register::Bdtr {
             return None;
         }
-        Device::read(&mut self.timer, register, registers, context)
+        Device::read(&mut self.timer, register, file, context)
     }
 
     fn peek(&self, register: Register, registers: &RegisterFile, now: VirtualNanos) -> Option<u64> {

@@ -148,14 +148,9 @@ impl Device for ScanTimer {
         Device::layout(&self.timer)
     }
 
-    fn read(
-        &mut self,
-        register: Register,
-        registers: &mut RegisterFile,
-        context: &mut DeviceContext<'_>,
-    ) -> Option<u64> {
-        let value = Device::read(&mut self.timer, register, registers, context);
-        self.announce(registers, context);
+    fn read(&mut self, register: Register, file: &mut RegisterFile, context: &mut DeviceContext<'_>) -> Option<u64> {
+        let value = Device::read(&mut self.timer, register, file, context);
+        self.announce(file, context);
         value
     }
 

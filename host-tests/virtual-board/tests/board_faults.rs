@@ -1,6 +1,4 @@
 //! The defects that the rig can inject do to the microcontroller what they say.
-//!
-//! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
 use crate::common::{
     PING, WAIT_NS, holding, image, on_a_shared, on_bus, poke, read_u8, reboot, register, running, scratch, write_u8,

@@ -1,6 +1,4 @@
 //! What ROBOTIS' own drivers expect of the bus, from the flash image: time, recovery, goals that end with torque.
-//!
-//! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
 use crate::common::{
     WAIT_NS, away, holding, holding_on_a_bus, let_go, on_bus, poke, read_u8, read_u16, read_u32, running, write_goal,

@@ -1,7 +1,5 @@
 //! A capture over the bus, on the flash image: it replays to the bit on this machine, also with calibrated gains; and
 //! what becomes of one that is asked for out of turn, interrupted, or read while it is under way.
-//!
-//! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
 use crate::common::{
     away, let_go, on_bus, read_u8, read_u16, read_u32, reboot, refused, running, write_goal, write_param, write_u8,

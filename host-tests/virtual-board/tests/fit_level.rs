@@ -1,7 +1,5 @@
 //! The fit level over the bus: the controller runs the highest level that its time budget allows, reports a limit when
 //! it holds a requested level back, and misses no deadline.
-//!
-//! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
 use crate::common::{away, read_u8, read_u16, read_u32, register, running, write_goal, write_u8, write_u32};
 use fingertip::contact::FitLevel;

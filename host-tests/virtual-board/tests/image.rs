@@ -1,6 +1,4 @@
 //! The flash image on the emulated board: it boots, scans, repeats, and survives a snapshot.
-//!
-//! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
 use crate::common::{
     PING, WAIT_NS, away, holding, image, on_a_shared, read_u8, read_u16, read_u32, register, running, scratch,

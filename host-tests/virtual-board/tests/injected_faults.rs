@@ -1,7 +1,5 @@
 //! Faults injected while the image holds 1 N: the time until the bridge drives nothing, what it does then, and the
 //! number on the bus.
-//!
-//! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
 use crate::common::{holding, holding_on_a_bus, read_u8, refused, running, write_goal, write_u8};
 use fingertip::params::Params;

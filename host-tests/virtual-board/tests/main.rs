@@ -1,23 +1,20 @@
 //! The tests of the flash image on the emulated board, as one program: it is linked once, both cores have work until the
 //! end, and a board that holds 1 N is started once. One file of them: `cargo test ... --test board temperature::`.
+//!
+//! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
 mod board_faults;
 mod bringup;
 mod bus;
 mod capture;
-mod client;
 mod clients;
 mod common;
-mod demo;
 mod fit_level;
 mod image;
 mod injected_faults;
-mod library;
 mod measured;
 mod parameters;
-mod refused_writes;
 mod scenes;
-mod serve;
 mod temperature;
 mod trace_pins;
 

@@ -1,7 +1,5 @@
 //! Jog, strokes and a press over the bus, on the flash image: each completes, and its record is read and parsed by the
 //! host's solver.
-//!
-//! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
 use crate::common::{away, let_go, on_bus, read_u8, read_u16, read_u32, running, write_goal, write_param, write_u8};
 use fingertip::measure::{MeasureState, Task};

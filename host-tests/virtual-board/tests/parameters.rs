@@ -1,6 +1,4 @@
 //! Parameters in the flash of the emulated board: sectors that take turns, and words that take as long as they may.
-//!
-//! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
 use crate::common::{image, read_u8, read_u32, reboot, register, write_u8, write_u32};
 use fingertip::link::table::address;

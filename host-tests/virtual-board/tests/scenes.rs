@@ -1,12 +1,12 @@
 //! Scenes with the flash image: it does what the native board does, and what is made of a run holds.
-//!
-//! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
 use crate::common::{image, scratch};
 use sim::agreement::{Agreement, BEYOND_MM, BEYOND_N, Path};
-use sim::metrics;
-use sim::scene::{Scene, read};
+use sim::demo::figures::{draw, missed, table};
+use sim::scene::{Scene, library, read};
 use sim::watch::{Step, Summary, Watch};
+use sim::{cores, metrics};
+use virtual_board::demo::{self, Plan};
 use virtual_board::scene::simulate;
 use virtual_board::{Error, Options, Rig};
 
@@ -176,4 +176,54 @@ fn a_scene_has_no_snapshot_and_no_plant() {
     rig.run_ms(1).expect("it runs");
     assert!(rig.snapshot(&scratch("never-written.snapshot")).is_err());
     assert!(matches!(rig.world(|world| world.force_n()), Err(Error::InAScene)));
+}
+
+// The library of scenes with the flash image: each holds its bounds there, too.
+
+/// Runs a scene. Says which bounds it breaks.
+fn broken(name: &str) -> Vec<String> {
+    let scene = sim::cli::load(name, &[], None).unwrap_or_else(|error| panic!("{error}"));
+    let outcome = sim::run::run(&scene, &|scene, watch| Ok(simulate(&image(), scene, watch)?), &mut []);
+    let outcome = outcome.unwrap_or_else(|error| panic!("{name}: {error}"));
+    println!("{name}: {:.2} times real time", outcome.summary.virtual_s / outcome.summary.wall_s);
+    let verdicts = outcome.verdicts.iter().filter(|verdict| !verdict.held);
+    verdicts.map(|verdict| format!("{name}: {:?} is {:?}", verdict.bound, verdict.value)).collect()
+}
+
+#[test]
+fn every_scene_of_the_library_holds_its_bounds_on_the_image() {
+    let mut names = library::names().expect("the library is there");
+    assert!(names.len() >= 14, "{names:?}");
+    // The longest begins first: it takes as long as all others together.
+    names.sort_by_key(|name| name != "hot_hour");
+    let broken = cores::map(&names, |name| broken(name)).concat();
+    assert!(broken.is_empty(), "{broken:#?}");
+}
+
+// The demonstration on the flash image.
+
+#[test]
+fn every_bound_holds_and_the_pictures_are_drawn() {
+    let (figures, run) = demo::run(&Plan { image: image(), quick: true }).expect("the demonstration runs");
+    assert_eq!(missed(&figures.checks), 0, "\n{}", table(&figures.checks, &figures.forces));
+    assert_eq!(figures.forces.steps.len(), 4);
+    assert_eq!(run.pictures.iter().map(|picture| picture.goal_n).collect::<Vec<_>>(), [1.0, 2.0, 5.0]);
+
+    // What the board senses is what the world has, and the circle is that of the model: r_c^2 = d (2a - d).
+    for picture in &run.pictures {
+        assert!((picture.force_n - picture.goal_n).abs() < 0.01 * picture.goal_n, "{picture:?}");
+        let d = (picture.goal_n / (std::f64::consts::PI * 0.25)).sqrt();
+        assert!((picture.radius_mm - (d * (20.0 - d)).sqrt()).abs() < 0.05, "{picture:?}");
+        let sum_n: f64 = picture.pressures_kpa.iter().flatten().sum::<f64>() * 1.5 * 1.5 * 1e-3;
+        assert!((sum_n - picture.goal_n).abs() < 0.03 * picture.goal_n, "{sum_n} N in {picture:?}");
+    }
+
+    let folder = scratch("pictures");
+    let drawn = draw(&run, &figures.forces, &folder).expect("the pictures are drawn");
+    for path in &drawn {
+        let svg = std::fs::read_to_string(path).expect("it was written");
+        assert!(svg.starts_with("<svg") && !svg.contains("NaN"), "{}", path.display());
+    }
+    assert_eq!(drawn.len(), 3);
+    std::fs::remove_dir_all(&folder).expect("it was there");
 }

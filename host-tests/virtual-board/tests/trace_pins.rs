@@ -1,6 +1,4 @@
 //! The trace pins show what `docs/board.md` says that they show, as wide as it says.
-//!
-//! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
 use crate::common::{running, write_param};
 use fingertip::params::Params;

@@ -2,9 +2,8 @@
 //! effects of the scene. Hysteresis, creep and relaxation go on from press to press.
 
 use fingertip::params::Params;
-use sim::effects::contact;
 use sim::effects::sensor::{self, Readout};
-use sim::effects::{Named, Set};
+use sim::effects::{Named, Set, contact};
 use sim::mechanics::contact::Contact;
 use sim::scene::{Scene, read};
 use sim::setup::Setup;

@@ -4,10 +4,9 @@ mod drive;
 
 use core::ops::Range;
 use drive::{DELAY_S, FRAME_S, Rig, SimulatedDrive};
-use fingertip::measure::Ended;
 use fingertip::measure::series::{CHECK, HEAD, Head, Out};
 use fingertip::measure::strokes::{Kept, StrokeInputs, Strokes};
-use fingertip::measure::{MeasureState, MeasureStatus, Row, Task};
+use fingertip::measure::{Ended, MeasureState, MeasureStatus, Row, Task};
 use fingertip::params::Params;
 use fingertip::shipped::Config;
 use fingertip::units::Newtons;

@@ -116,13 +116,16 @@ pub fn replay<const ROWS: usize, const COLUMNS: usize>(
 // The frames of a capture, read.
 
 /// Reason why bytes cannot be replayed as a capture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ReplayError {
     /// The bytes do not begin like a capture.
+    #[error("no capture: it does not begin as one")]
     NoCapture,
     /// Capture with another version of the layout.
+    #[error("a capture of layout {0}; this firmware's is layout {VERSION}")]
     Version(u8),
     /// Capture of an array with another number of rows or columns.
+    #[error("a capture of {rows} x {columns} taxels, which this is not built for")]
     Shape {
         /// Number of rows in the capture.
         rows: u8,
@@ -130,18 +133,28 @@ pub enum ReplayError {
         columns: u8,
     },
     /// Capture of a firmware with another set of parameters.
+    #[error(
+        "a capture of a firmware with other parameters than these {}: replay it with the version that it names",
+        Params::COUNT
+    )]
     Layout,
     /// Capture that was not ended on the board.
+    #[error("the capture was not ended on the board")]
     Unfinished,
     /// Bytes are missing.
+    #[error("the capture is cut off")]
     Cut,
     /// Bytes follow the capture.
+    #[error("the capture is longer than it says")]
     Longer,
     /// The capture has changed since the board wrote it.
+    #[error("the capture is damaged: it is not as the board wrote it")]
     Damaged,
     /// Parameters without a valid configuration.
+    #[error("the capture's parameters make no configuration: {0}")]
     Config(ConfigError),
     /// Another frame time than the parameters give: the board had other clocks.
+    #[error("captured with a frame each {captured} ns; by its parameters it is {here} ns here")]
     FrameTime {
         /// Frame time in the capture, ns.
         captured: u32,
@@ -149,36 +162,9 @@ pub enum ReplayError {
         here: u32,
     },
     /// Number, from 0, of a frame whose bits are invalid.
+    #[error("the capture is damaged: frame {0} makes no sense")]
     Frame(u32),
 }
-
-impl std::fmt::Display for ReplayError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::NoCapture => f.write_str("no capture: it does not begin as one"),
-            Self::Version(version) => write!(f, "a capture of layout {version}; this firmware's is layout {VERSION}"),
-            Self::Shape { rows, columns } => {
-                write!(f, "a capture of {rows} x {columns} taxels, which this is not built for")
-            }
-            Self::Layout => write!(
-                f,
-                "a capture of a firmware with other parameters than these {}: replay it with the version that it names",
-                Params::COUNT
-            ),
-            Self::Unfinished => f.write_str("the capture was not ended on the board"),
-            Self::Cut => f.write_str("the capture is cut off"),
-            Self::Longer => f.write_str("the capture is longer than it says"),
-            Self::Damaged => f.write_str("the capture is damaged: it is not as the board wrote it"),
-            Self::Config(error) => write!(f, "the capture's parameters make no configuration: {error}"),
-            Self::FrameTime { captured, here } => {
-                write!(f, "captured with a frame each {captured} ns; by its parameters it is {here} ns here")
-            }
-            Self::Frame(frame) => write!(f, "the capture is damaged: frame {frame} makes no sense"),
-        }
-    }
-}
-
-impl std::error::Error for ReplayError {}
 
 /// A captured frame, and the answer of the board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -13,9 +13,8 @@ use fingertip::shipped::address;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
-use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 /// Options of every guided procedure.
 #[derive(Debug, clap::Args)]

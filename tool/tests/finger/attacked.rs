@@ -1,9 +1,8 @@
 //! Robustness of the host's program against any request and any failure of the controller.
 
 use crate::served::Served;
+use crate::stopped::client;
 use fingertip::link::packet::instruction::REBOOT;
-use fingertip_cli::Client;
-use fingertip_cli::client::Reach;
 use std::fs;
 use std::io::{BufRead as _, BufReader, Read as _};
 use std::os::unix::fs::FileTypeExt as _;
@@ -53,9 +52,7 @@ fn a_pause_between_states_ends_at_once() {
     let file = finger.file("slow.csv");
     // A state in a quarter of an hour.
     let mut child = finger.start(&["record", "--rate-hz", "0.001", &file]);
-    while fs::read_to_string(format!("{file}.part")).is_err() {
-        std::thread::yield_now();
-    }
+    Served::begun(&format!("{file}.part"));
     Served::interrupt(&child);
     assert!(child.wait().expect("it ends").success());
     assert!(fs::read_to_string(&file).expect("it is there").starts_with("time_s,"));
@@ -163,11 +160,6 @@ fn recover_says_torque_is_off_only_where_it_is() {
     let why = finger.refused(&["tare"]);
     assert!(why.contains("torque is on") && why.contains("`fingertip stop`"), "{why}");
     assert_eq!(finger.json(&["info"])["torque_enable"], 1);
-}
-
-fn client(finger: &Served) -> Client {
-    let port = Some(finger.port.clone());
-    Client::connect(&Reach { port, baud: 1_000_000, ids: vec![1], timeout_ms: 600_000 }).expect("it answers")
 }
 
 #[test]

@@ -1,16 +1,11 @@
 //! Captures from the host's side: taken, kept as files, replayed; and files that are not as they were written.
 
-use super::served::Served;
+use crate::served::Served;
+use crate::stopped::client;
 use fingertip::shipped::address;
+use fingertip_cli::captured;
 use fingertip_cli::captured::{of_bytes, through_the_core};
-use fingertip_cli::client::Reach;
-use fingertip_cli::{Client, captured};
 use std::fs;
-
-fn client(finger: &Served) -> Client {
-    let reach = Reach { port: Some(finger.port.clone()), baud: 1_000_000, ids: vec![1], timeout_ms: 600_000 };
-    Client::connect(&reach).expect("it is served")
-}
 
 #[test]
 fn a_capture_is_taken_and_replays() {

@@ -48,9 +48,7 @@ fn who_is_not_there_is_told() {
     assert!(why.contains("cannot open /nowhere"), "{why}");
     // One line has one host.
     let mut first = finger.start(&["record", &finger.file("first.csv")]);
-    while fs::metadata(finger.file("first.csv.part")).is_err() {
-        std::thread::yield_now();
-    }
+    Served::begun(&finger.file("first.csv.part"));
     let why = finger.refused(&["info"]);
     assert!(why.contains("another program has it open"), "{why}");
     Served::interrupt(&first);

@@ -65,9 +65,7 @@ fn a_recording_that_is_interrupted_is_whole() {
     let file = finger.file("stopped.csv");
     let mut child = finger.start(&["record", &file]);
     // Until something is on its way.
-    while fs::metadata(format!("{file}.part")).is_err() {
-        std::thread::yield_now();
-    }
+    Served::begun(&format!("{file}.part"));
     Served::interrupt(&child);
     assert!(child.wait().expect("it ends").success());
     let text = fs::read_to_string(&file).expect("it is there");
@@ -77,9 +75,7 @@ fn a_recording_that_is_interrupted_is_whole() {
     // A recording whose connection is lost keeps its rows, and reports why it ends.
     let lost = finger.file("lost.csv");
     let child = finger.start(&["record", &lost]);
-    while fs::metadata(format!("{lost}.part")).is_err() {
-        std::thread::yield_now();
-    }
+    Served::begun(&format!("{lost}.part"));
     finger.end();
     let output = child.wait_with_output().expect("it ends");
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -195,9 +191,7 @@ fn no_file_is_written_over_without_force() {
     // One that came while it was recorded stays, and so does the recording.
     let (file, part) = (finger.file("late.csv"), finger.file("late.csv.part"));
     let child = finger.start(&["record", &file]);
-    while fs::metadata(&part).is_err() {
-        std::thread::yield_now();
-    }
+    Served::begun(&part);
     fs::write(&file, "mine").expect("a file");
     Served::interrupt(&child);
     let output = child.wait_with_output().expect("it ends");

@@ -293,6 +293,13 @@ impl Served {
         err
     }
 
+    /// Waits until a file is there.
+    pub fn begun(file: &str) {
+        while std::fs::metadata(file).is_err() {
+            std::thread::yield_now();
+        }
+    }
+
     /// Ctrl-C.
     pub fn interrupt(child: &Child) {
         Self::signal(child, Signal::INT);

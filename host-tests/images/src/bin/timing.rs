@@ -9,19 +9,20 @@
 #[path = "../study/call.rs"]
 mod call;
 mod host;
+#[path = "../study/parts.rs"]
+mod parts;
 #[path = "../timing/press.rs"]
 mod press;
 
 use call::pass_on;
 use cortex_m_semihosting::debug;
-use fingertip::contact;
 use fingertip::contact::Contact;
 use fingertip::control::{Reference, SpeedLoop, TemperatureDrift, Winding};
-use fingertip::grip::{Goal, Grip};
+use fingertip::grip::Grip;
 use fingertip::shipped::{Array, COLUMNS, Config, Fit, Pipeline, ROWS, TactileImage};
 use fingertip::state::{Limits, Mode};
 use fingertip::touch::Touch;
-use fingertip::units::{Celsius, Duty, Millimetres, Newtons};
+use fingertip::units::{Duty, Millimetres, Newtons};
 use host::{File, command_line, fail, say};
 use images::CORRECTED;
 use images::record::{MAGIC, Record};
@@ -37,7 +38,7 @@ static PRESS: StaticCell<Press> = StaticCell::new();
 struct Bench<'a> {
     config: &'a Config,
     /// Configuration with a nonlinear characteristic, creep, and a gain that drifts with temperature.
-    curved: &'a Config,
+    corrected: &'a Config,
     record: Record,
     pipeline: &'static mut Pipeline,
     array: Array,
@@ -78,22 +79,22 @@ const STEP: usize = 1;
 const KERNELS: [(&str, Kernel, When); 24] = [
     ("an empty call", nothing, Always),
     ("pipeline step", step, Always),
-    ("frame pass", frame_pass, Always),
-    ("frame pass, by a curve", curved_pass, Always),
+    ("frame pass", parts::read, Always),
+    ("frame pass, by a curve", parts::curved_read, Always),
     ("indentation from force", indentation, Always),
-    ("observer", observe, Driving),
-    ("goal and profile", reference, Driving),
-    ("goal and profile, with creep", creeping, Driving),
-    ("speed law and limits", follow, Driving),
-    ("duty from the voltage", duty, Driving),
-    ("winding", winding, Always),
-    ("warmth, with a coefficient", temperature_drift, Always),
-    ("contact, whole, moments", read_moments, When::Contact),
+    ("observer", parts::observe, Driving),
+    ("goal and profile", parts::reference, Driving),
+    ("goal and profile, with creep", parts::creeping, Driving),
+    ("speed law and limits", parts::follow, Driving),
+    ("duty from the voltage", parts::duty, Driving),
+    ("winding", parts::winding, Always),
+    ("warmth, with a coefficient", parts::temperature_drift, Always),
+    ("contact, whole, moments", parts::sums, When::Contact),
     ("contact, whole, followed", follow_whole, When::Contact),
     ("contact, whole, one", read_one, When::Contact),
     ("contact, whole, two", read_two, When::Contact),
     ("contact, whole, full", read_full, When::Contact),
-    ("contact, over the edge, moments", read_moments, Edge),
+    ("contact, over the edge, moments", parts::sums, Edge),
     ("contact, over the edge, followed", follow_edge, Edge),
     ("contact, over the edge, one", read_one, Edge),
     ("contact, over the edge, two", read_two, Edge),
@@ -109,58 +110,12 @@ extern "C" fn step(bench: &mut Bench) {
     bench.duty = bench.pipeline.step(frame, sense, command).0;
 }
 
-extern "C" fn frame_pass(bench: &mut Bench) {
-    bench.array.read(&bench.record.frame, bench.config);
-}
-
-extern "C" fn curved_pass(bench: &mut Bench) {
-    bench.array.read(&bench.record.frame, bench.curved);
-}
-
 extern "C" fn indentation(bench: &mut Bench) {
     bench.depth = bench.config.tip.indentation(bench.contact.force);
 }
 
-extern "C" fn observe(bench: &mut Bench) {
-    bench.motion.observe(bench.record.sense.encoder, bench.config);
-}
-
-extern "C" fn reference(bench: &mut Bench) {
-    let Bench { config, record, contact, touch, drift, motion, grip, limits, .. } = bench;
-    let goal = Goal { force: record.command.goal, drift: *drift };
-    bench.reference = images::reference(grip, goal, contact, touch, motion, config, limits);
-}
-
-extern "C" fn creeping(bench: &mut Bench) {
-    let Bench { curved, record, contact, touch, drift, motion, grip, limits, .. } = bench;
-    let goal = Goal { force: record.command.goal, drift: *drift };
-    bench.reference = images::reference(grip, goal, contact, touch, motion, curved, limits);
-}
-
-extern "C" fn follow(bench: &mut Bench) {
-    let supply_mv = bench.record.sense.supply_mv;
-    bench.motion.pull(bench.reference, supply_mv, bench.config, &mut bench.limits);
-}
-
-extern "C" fn duty(bench: &mut Bench) {
-    bench.duty = bench.motion.drive.duty(bench.record.sense.supply_mv, bench.config);
-}
-
-extern "C" fn winding(bench: &mut Bench) {
-    bench.winding.observe(bench.motion.drive.acceleration(), bench.config);
-}
-
-extern "C" fn temperature_drift(bench: &mut Bench) {
-    bench.temperature_drift.observe(Some(Celsius::from_bits(30 << 16)), bench.curved);
-    bench.drift = bench.temperature_drift.force(bench.record.command.goal, bench.curved);
-}
-
 fn read(bench: &mut Bench, refined: Refined) {
     bench.contact = single::read(&bench.picture, refined, bench.config);
-}
-
-extern "C" fn read_moments(bench: &mut Bench) {
-    bench.contact = contact::from_sums(&bench.picture, bench.config);
 }
 
 extern "C" fn follow_whole(bench: &mut Bench) {
@@ -195,10 +150,10 @@ fn main() -> ! {
     }
     let count = count.iter().rev().fold(0, |count, byte| count << 8 | u32::from(*byte));
     let Ok(config) = Config::shipped(&images::CONFIRMED) else { fail("the default parameters are refused") };
-    let Ok(curved) = Config::shipped(&CORRECTED) else { fail("a curve is refused") };
+    let Ok(corrected) = Config::shipped(&CORRECTED) else { fail("a curve is refused") };
     let mut bench = Bench {
         config: &config,
-        curved: &curved,
+        corrected: &corrected,
         record: Record::from_bytes(&[0; Record::BYTES]),
         pipeline: PIPELINE.init_with(|| Pipeline::new(&config)),
         array: Array::new(),

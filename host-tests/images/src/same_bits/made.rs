@@ -3,11 +3,7 @@
 use super::machines::Machines;
 use super::model::Sample;
 use super::{Mix, Source};
-use fingertip::config::ArrayDrift;
-use fingertip::config::Gains;
-use fingertip::config::Motions;
-use fingertip::config::{self, ConfigError};
-use fingertip::config::{Heat, Lag};
+use fingertip::config::{self, ArrayDrift, ConfigError, Gains, Heat, Lag, Motions};
 use fingertip::contact::Contact;
 use fingertip::control::Reference;
 use fingertip::params::Params;

@@ -2,22 +2,44 @@
 
 use super::number::Number;
 use super::root::hardware_q16;
-use super::scalar::{Call, Tools, Variant};
+use super::scalar::{Call, Tools, Variant, variant};
 use fingertip::units::Millimetres;
 use fixed::types::I16F16;
 use micromath::F32Ext;
 
 /// All of them; the first number is r, the second d.
 pub const VARIANTS: &[Variant] = &[
-    ("f32, textbook", Call::Single(textbook_single)),
-    ("f32, no cancellation", Call::Single(sound_single)),
-    ("f32, micromath", Call::Single(micro)),
-    ("f64, textbook", Call::Double(textbook_double)),
-    ("f64, no cancellation", Call::Double(sound_double)),
-    ("I16F16, textbook, `fixed`", Call::Fixed(textbook_fixed, 16, 16)),
-    ("I16F16, no cancellation, `fixed`", Call::Fixed(sound_fixed, 16, 16)),
-    ("Q16, VSQRT and UDIV", Call::Fixed(integers, 16, 16)),
-    ("**Q24 to Q16, Tip::pressure**", Call::Fixed(firmware, 24, 16)),
+    variant!("f32, textbook", Single f32: |r, d, tools| textbook(r * r, d, tools) * 1000.0),
+    variant!("f32, no cancellation", Single f32: |r, d, tools| sound(r * r, d, tools) * 1000.0),
+    variant!("f32, micromath", Single f32: |r, d, tools| {
+        let tip = &tools.single;
+        let inside = d * (tip.radius + tip.radius - d) - r * r;
+        if inside > 0.0 {
+            let length = F32Ext::sqrt(tip.radius * tip.radius - r * r);
+            1000.0 * tip.modulus * inside * F32Ext::recip(length * (length + tip.radius - d))
+        } else {
+            0.0
+        }
+    }),
+    variant!("f64, textbook", Double f64: |r, d, tools| textbook(r * r, d, tools) * 1000.0),
+    variant!("f64, no cancellation", Double f64: |r, d, tools| sound(r * r, d, tools) * 1000.0),
+    variant!("I16F16, textbook, `fixed`", Fixed i32, 16, 16: |r, d, tools| {
+        let (r, d) = (I16F16::from_bits(r), I16F16::from_bits(d));
+        (textbook(r * r, d, tools) * I16F16::from_small(1000)).to_bits()
+    }),
+    variant!("I16F16, no cancellation, `fixed`", Fixed i32, 16, 16: |r, d, tools| {
+        let (r, d) = (I16F16::from_bits(r), I16F16::from_bits(d));
+        (sound(r * r, d, tools) * I16F16::from_small(1000)).to_bits()
+    }),
+    variant!("Q16, VSQRT and UDIV", Fixed i32, 16, 16: |r, d, tools| {
+        let square = ((i64::from(r) * i64::from(r)) >> 16) as i32;
+        let (quotient, shift) = strain(square, d, tools);
+        // 250 kPa in Q16.
+        ((u64::from(quotient) * (250 << 16)) >> shift) as i32
+    }),
+    variant!("**Q24 to Q16, Tip::pressure**", Fixed i32, 24, 16: |r, d, tools| {
+        tools.tip.pressure(Millimetres::from_bits(r), Millimetres::from_bits(d)).to_bits()
+    }),
 ];
 
 /// Y (L - (a - d)) / L, in N/mm^2.
@@ -42,43 +64,6 @@ pub fn sound<T: Number>(square: T, d: T, tools: &Tools) -> T {
     }
 }
 
-extern "C" fn textbook_single(r: f32, d: f32, tools: &Tools) -> f32 {
-    textbook(r * r, d, tools) * 1000.0
-}
-
-extern "C" fn sound_single(r: f32, d: f32, tools: &Tools) -> f32 {
-    sound(r * r, d, tools) * 1000.0
-}
-
-extern "C" fn micro(r: f32, d: f32, tools: &Tools) -> f32 {
-    let tip = &tools.single;
-    let inside = d * (tip.radius + tip.radius - d) - r * r;
-    if inside > 0.0 {
-        let length = F32Ext::sqrt(tip.radius * tip.radius - r * r);
-        1000.0 * tip.modulus * inside * F32Ext::recip(length * (length + tip.radius - d))
-    } else {
-        0.0
-    }
-}
-
-extern "C" fn textbook_double(r: f64, d: f64, tools: &Tools) -> f64 {
-    textbook(r * r, d, tools) * 1000.0
-}
-
-extern "C" fn sound_double(r: f64, d: f64, tools: &Tools) -> f64 {
-    sound(r * r, d, tools) * 1000.0
-}
-
-extern "C" fn textbook_fixed(r: i32, d: i32, tools: &Tools) -> i32 {
-    let (r, d) = (I16F16::from_bits(r), I16F16::from_bits(d));
-    (textbook(r * r, d, tools) * I16F16::from_small(1000)).to_bits()
-}
-
-extern "C" fn sound_fixed(r: i32, d: i32, tools: &Tools) -> i32 {
-    let (r, d) = (I16F16::from_bits(r), I16F16::from_bits(d));
-    (sound(r * r, d, tools) * I16F16::from_small(1000)).to_bits()
-}
-
 /// Textbook form of dL/L: the rounding of L dominates the error.
 #[inline(always)]
 pub fn strain(square_q16: i32, d: i32, tools: &Tools) -> (u32, u32) {
@@ -89,15 +74,4 @@ pub fn strain(square_q16: i32, d: i32, tools: &Tools) -> (u32, u32) {
     let compression = (length - (radius - d)).max(0) as u32;
     let shift = compression.leading_zeros().min(31);
     ((compression << shift) / length.max(1) as u32, shift)
-}
-
-extern "C" fn integers(r: i32, d: i32, tools: &Tools) -> i32 {
-    let square = ((i64::from(r) * i64::from(r)) >> 16) as i32;
-    let (quotient, shift) = strain(square, d, tools);
-    // 250 kPa in Q16.
-    ((u64::from(quotient) * (250 << 16)) >> shift) as i32
-}
-
-extern "C" fn firmware(r: i32, d: i32, tools: &Tools) -> i32 {
-    tools.tip.pressure(Millimetres::from_bits(r), Millimetres::from_bits(d)).to_bits()
 }

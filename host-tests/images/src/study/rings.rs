@@ -2,23 +2,25 @@
 
 use super::number::Number;
 use super::pressure::{sound, strain, textbook};
-use super::scalar::{Call, Tools, Variant};
+use super::scalar::{Call, Tools, Variant, variant};
 use core::num::NonZeroU16;
 use fingertip::units::Millimetres;
 use fixed::types::I16F16;
 
 macro_rules! variants {
     ($($rings:literal)*) => { &[
-        ("f32, closed form", Call::Single(closed)),
-        ("**Tip::force, closed form**", Call::Fixed(firmware_closed, 24, 16)),
+        variant!("f32, closed form", Single f32: |d, _, tools| tools.single.pi_y * d * d),
+        variant!("**Tip::force, closed form**", Fixed i32, 24, 16: |d, _, tools| {
+            tools.tip.force(Millimetres::from_bits(d)).to_bits()
+        }),
         $(
-            (concat!("f32, r, ", $rings), Call::Single(single_r::<$rings>)),
-            (concat!("f32, u, ", $rings), Call::Single(single_u::<$rings>)),
+            variant!(concat!("f32, r, ", $rings), Single f32: |d, _, tools| in_r::<_, $rings>(d, tools)),
+            variant!(concat!("f32, u, ", $rings), Single f32: |d, _, tools| in_u::<_, $rings>(d, tools)),
             (concat!("`fixed`, r, ", $rings), Call::Fixed(fixed_r::<$rings>, 16, 16)),
             (concat!("`fixed`, u, ", $rings), Call::Fixed(fixed_u::<$rings>, 16, 16)),
             (concat!("Q16, u, ", $rings), Call::Fixed(integers_u::<$rings>, 16, 16)),
-            (concat!("f64, r, ", $rings), Call::Double(double_r::<$rings>)),
-            (concat!("f64, u, ", $rings), Call::Double(double_u::<$rings>)),
+            variant!(concat!("f64, r, ", $rings), Double f64: |d, _, tools| in_r::<_, $rings>(d, tools)),
+            variant!(concat!("f64, u, ", $rings), Double f64: |d, _, tools| in_u::<_, $rings>(d, tools)),
             (concat!("Tip, u, ", $rings), Call::Fixed(firmware_u::<$rings>, 24, 16)),
         )*
     ] };
@@ -52,26 +54,6 @@ fn in_u<T: Number, const N: u16>(d: T, tools: &Tools) -> T {
         sum = sum + sound(half * T::from_small(2 * ring + 1), d, tools);
     }
     sum * tip.pi * (half + half)
-}
-
-extern "C" fn closed(d: f32, _: f32, tools: &Tools) -> f32 {
-    tools.single.pi_y * d * d
-}
-
-extern "C" fn single_r<const N: u16>(d: f32, _: f32, tools: &Tools) -> f32 {
-    in_r::<_, N>(d, tools)
-}
-
-extern "C" fn single_u<const N: u16>(d: f32, _: f32, tools: &Tools) -> f32 {
-    in_u::<_, N>(d, tools)
-}
-
-extern "C" fn double_r<const N: u16>(d: f64, _: f64, tools: &Tools) -> f64 {
-    in_r::<_, N>(d, tools)
-}
-
-extern "C" fn double_u<const N: u16>(d: f64, _: f64, tools: &Tools) -> f64 {
-    in_u::<_, N>(d, tools)
 }
 
 extern "C" fn fixed_r<const N: u16>(d: i32, _: i32, tools: &Tools) -> i32 {
@@ -113,8 +95,4 @@ extern "C" fn integers_u<const N: u16>(d: i32, _: i32, tools: &Tools) -> i32 {
 extern "C" fn firmware_u<const N: u16>(d: i32, _: i32, tools: &Tools) -> i32 {
     let Some(rings) = NonZeroU16::new(N) else { return 0 };
     tools.tip.force_by_rings(Millimetres::from_bits(d), rings).to_bits()
-}
-
-extern "C" fn firmware_closed(d: i32, _: i32, tools: &Tools) -> i32 {
-    tools.tip.force(Millimetres::from_bits(d)).to_bits()
 }

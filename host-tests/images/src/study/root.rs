@@ -1,6 +1,6 @@
 //! Ways to take a square root.
 
-use super::scalar::{Call, Tools, Variant};
+use super::scalar::{Call, Tools, Variant, variant};
 use core::arch::naked_asm;
 use fingertip::arith::floor_sqrt;
 use fixed::types::I16F16;
@@ -9,12 +9,12 @@ use micromath::F32Ext;
 /// All of them.
 pub const VARIANTS: &[Variant] = &[
     ("f32, VSQRT", Call::Single(hardware)),
-    ("f32, micromath", Call::Single(micro)),
-    ("f32, libm", Call::Single(library)),
-    ("f64, libm", Call::Double(double)),
-    ("I16F16, `fixed`", Call::Fixed(fixed_point, 16, 16)),
-    ("Q16, u64::isqrt", Call::Fixed(wide_integer, 16, 16)),
-    ("Q16 to Q8, u32::isqrt", Call::Fixed(integer, 16, 8)),
+    variant!("f32, micromath", Single f32: |x, _, _| F32Ext::sqrt(x)),
+    variant!("f32, libm", Single f32: |x, _, _| libm::sqrtf(x)),
+    variant!("f64, libm", Double f64: |x, _, _| libm::sqrt(x)),
+    variant!("I16F16, `fixed`", Fixed i32, 16, 16: |x, _, _| I16F16::from_bits(x).sqrt().to_bits()),
+    variant!("Q16, u64::isqrt", Fixed i32, 16, 16: |x, _, _| (u64::from(x as u32) << 16).isqrt() as i32),
+    variant!("Q16 to Q8, u32::isqrt", Fixed i32, 16, 8: |x, _, _| (x as u32).isqrt() as i32),
     ("Q16, VCVT and VSQRT", Call::Fixed(hardware_q16, 16, 16)),
     ("Q16, table of 193", Call::Fixed(table, 16, 16)),
     ("**u64 to u32, floor_sqrt**", Call::Wide(firmware, 48, 24)),
@@ -37,30 +37,6 @@ pub extern "C" fn hardware_q16(x: i32, _: i32, _: &Tools) -> i32 {
         "vmov r0, s0",
         "bx lr"
     )
-}
-
-extern "C" fn micro(x: f32, _: f32, _: &Tools) -> f32 {
-    F32Ext::sqrt(x)
-}
-
-extern "C" fn library(x: f32, _: f32, _: &Tools) -> f32 {
-    libm::sqrtf(x)
-}
-
-extern "C" fn double(x: f64, _: f64, _: &Tools) -> f64 {
-    libm::sqrt(x)
-}
-
-extern "C" fn fixed_point(x: i32, _: i32, _: &Tools) -> i32 {
-    I16F16::from_bits(x).sqrt().to_bits()
-}
-
-extern "C" fn wide_integer(x: i32, _: i32, _: &Tools) -> i32 {
-    (u64::from(x as u32) << 16).isqrt() as i32
-}
-
-extern "C" fn integer(x: i32, _: i32, _: &Tools) -> i32 {
-    (x as u32).isqrt() as i32
 }
 
 /// sqrt(n / 64) in Q24 for n from 64 to 256.

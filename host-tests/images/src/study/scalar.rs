@@ -96,6 +96,19 @@ pub enum Call {
     Double(extern "C" fn(f64, f64, &Tools) -> f64),
 }
 
+/// Makes a variant whose kernel is written as a closure: `variant!("f32", Single f32: |x, y, tools| ...)`. In fixed
+/// point the fractional bits before and after come with it.
+macro_rules! variant {
+    ($name:expr, $call:ident $number:ty $(, $from:literal, $to:literal)?: |$x:pat_param, $y:pat_param, $tools:pat_param|
+        $body:expr) => {{
+        extern "C" fn kernel($x: $number, $y: $number, $tools: &Tools) -> $number {
+            $body
+        }
+        ($name, Call::$call(kernel $(, $from, $to)?))
+    }};
+}
+pub(super) use variant;
+
 /// Variant of a kernel.
 pub type Variant = (&'static str, Call);
 

@@ -1,13 +1,12 @@
 //! Reader of populations and of their draws, such as `{ uniform = [1, 10] }`.
 
 use crate::events::{EVENT, KINDS, own_keys};
-use crate::metrics;
 use crate::population::draw::{Draw, Drawn, Expression};
 use crate::population::{Counted, Events, Place, Population};
-use crate::registry;
 use crate::scene::library;
 use crate::scene::reader::{SceneError, SceneErrors, did_you_mean, item_span, key_span};
 use crate::scene::tables::{EXPECT, Key, Kind, ROOT, SCRIPT, TABLES};
+use crate::{metrics, registry};
 use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};

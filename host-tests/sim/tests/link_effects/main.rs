@@ -5,7 +5,7 @@ use sim::effects::link::{Named, Stages};
 use sim::effects::{Part, stream};
 use sim::host::Host;
 use sim::registry;
-use sim::scene::{Scene, read, text};
+use sim::scene::{Scene, read};
 
 fn scene(tables: &str) -> Scene {
     let text = format!("about = \"\"\nduration_s = 1000\n{tables}");
@@ -134,23 +134,6 @@ fn the_last_of_simultaneous_events_counts_and_late_packets_keep_their_order() {
         }
         assert_eq!(last, 2.0);
     }
-}
-
-#[test]
-fn without_magnitude_nothing_changes() {
-    let tables: String = sim::effects::link::EFFECTS.iter().map(text::zero).collect();
-    let scene = scene(&tables);
-    let mut stages = Named::default();
-    for (name, part) in registry::build(&scene.effects, 1, 0) {
-        stages.take(name, part);
-    }
-    assert_eq!(stages.second_s(3.0), 1.0);
-    for packet in 0..1000 {
-        let sent_s = f64::from(packet) * 0.37;
-        assert_eq!(stages.pass(sent_s), Some(sent_s));
-    }
-    let counts: Vec<u64> = stages.costs().map(|cost| cost.evaluations).collect();
-    assert_eq!(counts, [1, 1000, 1000, 1000]);
 }
 
 #[test]

@@ -49,25 +49,6 @@ fn stall_torque_and_time_constant_are_the_data_sheets() {
 }
 
 #[test]
-fn the_gear_presses_with_its_efficiency_and_gives_back_less() {
-    // Slowly in and slowly out: the force is the motor's net torque times n/r, times 0.7 or over 2 - 1/0.7.
-    let mut world = pressed(0.0);
-    let setup = world.setup().clone();
-    let per_nm = setup.transmission.ratio / (setup.transmission.drum_radius_mm * 1e-3);
-    let steps = 500_000;
-    for (from, to, share, sign) in [(0.0, 0.3, 0.7, 1.0), (0.3, 0.05, 1.0 / (2.0 - 1.0 / 0.7), -1.0)] {
-        for n in 0..steps {
-            let duty = from + (to - from) * f64::from(n) / f64::from(steps);
-            world.advance(STEP_S, Bridge::Driven { duty });
-        }
-        assert!(world.speed_mm_per_s() * sign > 0.0);
-        let motor_nm = world.current_a() * setup.motor.torque_nm_per_a - sign * setup.motor.friction_nm;
-        let expected_n = motor_nm * per_nm * share;
-        assert!((world.force_n() / expected_n - 1.0).abs() < 1e-3, "{} N for {expected_n} N", world.force_n());
-    }
-}
-
-#[test]
 fn friction_holds_inside_its_band_and_not_outside() {
     for d in [0.0, 0.5, 1.0, 2.0, 3.0] {
         let world = pressed(d);
@@ -94,19 +75,6 @@ fn friction_holds_inside_its_band_and_not_outside() {
             assert_eq!(world.shaft().angle_rad == angle, holds, "d {d} mm, {torque} N m");
         }
     }
-}
-
-#[test]
-fn coasting_gives_back_force_only_against_friction() {
-    // Above 0.12 mNm / (0.279 mm (2 - 1/0.7)) = 0.75 N the tip pushes itself out, below it stays.
-    let mut held = pressed(0.95);
-    let before = held.force_n();
-    run(&mut held, 0.2, Bridge::Coast);
-    assert_eq!(held.force_n(), before);
-    let mut released = pressed(2.0);
-    run(&mut released, 0.2, Bridge::Coast);
-    assert!(released.force_n() < 0.8, "{} N", released.force_n());
-    assert_eq!(released.speed_mm_per_s(), 0.0);
 }
 
 fn energy_j(world: &Plant) -> f64 {

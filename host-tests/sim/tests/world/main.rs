@@ -159,14 +159,6 @@ fn the_finger_touches_and_holds() {
     assert!((0.995..=1.05).contains(&last.peak_n), "{} N", last.peak_n);
 }
 
-#[test]
-fn without_effects_and_with_none_compiled_it_is_the_same_to_the_bit() {
-    let scene = scene("duration_s = 0.3\n[[script]]\nat_s = 0.0\ngoal_n = 1.0\n");
-    let with = simulate_with::<Named>(&scene, &mut Last::default()).unwrap();
-    let without = simulate_with::<()>(&scene, &mut Last::default()).unwrap();
-    assert_eq!(with.digest, without.digest);
-}
-
 /// Touches, changes the goal and releases, with tables of effects.
 fn run_script<E: Set>(tables: &str) -> Summary {
     let script = [(0.0, 1.0), (0.2, 2.0), (0.3, 0.0)]

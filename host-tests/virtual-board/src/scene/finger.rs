@@ -6,14 +6,12 @@ use fingertip::frame::Sense;
 use fingertip::shipped::{COLUMNS, Frame, ROWS, SLOTS};
 use sim::SimError;
 use sim::bridge::Bridge;
-use sim::effects::link;
 use sim::effects::sensor::{self, Readout, Stages as _};
-use sim::effects::{Named, Parts, Set};
+use sim::effects::{Named, Parts, Set, link};
 use sim::scene::Scene;
 use sim::setup::Array;
 use sim::watch::{Cost, Truth};
-use sim::world::Surroundings;
-use sim::world::World;
+use sim::world::{Surroundings, World};
 use std::collections::VecDeque;
 
 /// A frame as the converters made it, and the world at its end.

@@ -70,7 +70,7 @@ pub struct Config {
     pub saturated_codes: u16,
     /// Characteristic of the array.
     pub curve: Curve,
-    /// Force for a sixteenth of a corrected code on one taxel, Q48 of the force's bit.
+    /// Force for a sixteenth of a corrected code on one taxel, Q48 N: Q32 of a bit of [`Newtons`].
     pub newtons_per_sum_q48: i64,
     /// Pressure in Pa for a sixteenth of a corrected code, Q32.
     pub pascals_per_sum_q32: i64,
@@ -109,18 +109,18 @@ pub struct Config {
     /// c in 1/s, Q17: at most 16,384, for a motor that stops within less than a frame.
     pub damping_q17_per_s: i32,
     /// g V_max, Q8 mm/s^2.
-    pub voltage_limit: i32,
+    pub voltage_max_q8_mm_per_s2: i32,
     /// g R i_max, Q8 mm/s^2.
-    pub current_limit: i32,
+    pub current_max_q8_mm_per_s2: i32,
     /// Supply below which the current is reduced, mV: 4 % above the fault level.
     pub supply_weak_mv: i32,
     /// Largest change of g V in a frame, Q8 mm/s^2.
-    pub slew_limit: i32,
+    pub slew_max_q8_mm_per_s2: i32,
     /// Least, usual and largest deceleration that the profile uses, Q8 mm/s^2.
     pub brake: [i32; 3],
     /// Share of [`Params::voltage_max_mv`] per mV, Q32.
     pub share_per_mv_q32: u32,
-    /// Left shift that takes [`Config::voltage_limit`] to 31 bits.
+    /// Left shift that takes [`Config::voltage_max_q8_mm_per_s2`] to 31 bits.
     pub voltage_shift: u32,
     /// Duty (Q15) for a shifted g V, Q31, times the supply in mV.
     pub duty_gain: u32,
@@ -162,7 +162,7 @@ impl Config {
     pub fn push(&self, voltage_mv: i32) -> i32 {
         let most = self.params.voltage_max_mv.max(0).unsigned_abs();
         let share = voltage_mv.unsigned_abs().min(most).wrapping_mul(self.share_per_mv_q32);
-        let push = ((u64::from(self.voltage_limit.cast_unsigned()) * u64::from(share)) >> 32) as i32;
+        let push = ((u64::from(self.voltage_max_q8_mm_per_s2.cast_unsigned()) * u64::from(share)) >> 32) as i32;
         if voltage_mv < 0 { -push } else { push }
     }
 
@@ -222,9 +222,9 @@ impl Config {
         let creep = p.creep_permille as f32 * 1e-3;
         let mm_per_count_q40 = wide(mm_per_count * exp2(40));
         let gain_sets = motor::gain_sets(frame_s, mm_per_count, g * p.voltage_max_mv as f32 * 1e-3);
-        let voltage_limit = narrow(g * p.voltage_max_mv as f32 * 1e-3 * exp2(8));
-        let current_limit = narrow(g * resistance * p.current_max_ma as f32 * 1e-3 * exp2(8));
-        let voltage_shift = voltage_limit.max(1).leading_zeros() - 1;
+        let voltage_max_q8_mm_per_s2 = narrow(g * p.voltage_max_mv as f32 * 1e-3 * exp2(8));
+        let current_max_q8_mm_per_s2 = narrow(g * resistance * p.current_max_ma as f32 * 1e-3 * exp2(8));
+        let voltage_shift = voltage_max_q8_mm_per_s2.max(1).leading_zeros() - 1;
         // The full duty for the supply's voltage: 32767 for a mV at 1 mV.
         let duty_gain = f32::from(Duty::FULL) * exp2(23) / exp2(voltage_shift) * 1e3 / g;
         Ok(Self {
@@ -256,11 +256,11 @@ impl Config {
             )),
             calm_frames: (CALM_TIME_CONSTANTS / (gain_sets[0].slope_per_s as f32 * frame_s)) as u32,
             damping_q17_per_s: narrow(c * exp2(17)),
-            voltage_limit,
-            current_limit,
+            voltage_max_q8_mm_per_s2,
+            current_max_q8_mm_per_s2,
             supply_weak_mv: p.supply_min_mv + p.supply_min_mv / 25,
-            slew_limit: narrow(g * p.voltage_slew_mv_per_ms as f32 * frame_s * exp2(8)),
-            brake: brake(current_limit.min(voltage_limit)),
+            slew_max_q8_mm_per_s2: narrow(g * p.voltage_slew_mv_per_ms as f32 * frame_s * exp2(8)),
+            brake: brake(current_max_q8_mm_per_s2.min(voltage_max_q8_mm_per_s2)),
             share_per_mv_q32: u32::MAX / p.voltage_max_mv.unsigned_abs().max(1),
             voltage_shift,
             duty_gain: wide(duty_gain).min(u32::MAX.into()) as u32,
@@ -273,7 +273,7 @@ impl Config {
             clearance: millimetres(p.clearance_um),
             bounds,
             drift: ArrayDrift::new(p, shape),
-            heat: Heat::new(p, frame_s, current_limit),
+            heat: Heat::new(p, frame_s, current_max_q8_mm_per_s2),
             motions: Motions::new(p, &Driven { frame_s, mm_per_count, damping: c }),
             force_fault: newtons(p.force_fault_mn),
             force_max: newtons(p.force_max_mn),

@@ -92,8 +92,8 @@ impl SpeedLoop {
     /// Computes the voltage by the law, and limits it.
     #[inline(always)]
     pub fn pull(&mut self, reference: Reference, supply_mv: u16, config: &Config, limits: &mut Limits) {
-        // Speeds are held to 2,048 mm/s, which is beyond every reference, and to twice that where they are subtracted:
-        // so no product here leaves 32 bits. Accelerations are Q4, of which 28 bits are Q8's 32.
+        // Speeds are held to 2,048 mm/s, which is beyond every reference, and their difference to 8,192 mm/s: so no
+        // product here leaves 32 bits. Accelerations are Q4 here, held to 28 bits, so that they fit 32 bits as Q8.
         let speed = clamp_bits(self.observer.speed.to_bits(), 28);
         let behind = clamp_bits(reference.speed.to_bits().saturating_sub(speed), 30);
         // c v, the acceleration that the back-EMF takes away.

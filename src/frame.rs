@@ -70,7 +70,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Frame<ROWS, COLUMNS> {
     }
 }
 
-/// Measurements beside the frame, sampled at the frame's end.
+/// Measurements beside the frame: the encoder at the frame's end, the supply by its last conversion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sense {
     /// Quadrature count of the motor's encoder, unwrapped; grows as the tip presses in.

@@ -265,7 +265,7 @@ fn stopping_speed(goal: Newtons, sensed: Millimetres, config: &Config) -> Millim
     MillimetresPerSecond::from_bits(speed.min(i32::MAX.into()) as i32)
 }
 
-/// Distance that the tip moved since the middle of the scan, which is half a frame ago.
+/// Distance that the tip moved since the middle of the scan, half a frame ago: the shift holds that half.
 fn since_scan(speed: MillimetresPerSecond, config: &Config) -> I8F24 {
     I8F24::from_bits(product(speed.to_bits(), config.frame_s_q37, 30))
 }

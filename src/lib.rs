@@ -2,9 +2,9 @@
 //!
 //! # Reading on
 //!
-//! The modules are declared in signal order: read them top to bottom to follow a sample from the converter to the
-//! bridge. After configuration, floating point is used only for the first estimate of a square root, which
-//! [`arith::floor_sqrt`] then corrects in integers.
+//! Each module uses only those declared before it. [`pipeline`] begins with the path of a frame, stage by stage, from
+//! the converter's codes to the bridge. After configuration, floating point is used only for the first estimate of a
+//! square root, which [`arith::floor_sqrt`] then corrects in integers.
 #![no_std]
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]

@@ -1,4 +1,19 @@
-//! The path of a frame from codes to duty.
+//! The path of a frame from codes to duty, as [`Pipeline::step`] takes it while a force is held:
+//!
+//! | stage | file | from | to |
+//! | --- | --- | --- | --- |
+//! | fit level | `pipeline/budget.rs` | time of the last answer | rows of the fit in this frame |
+//! | motion | `control/observer.rs` | encoder count, last g V (Q8 mm/s^2) | travel (Q24 mm), speed (Q16 mm/s), disturbance (Q8 mm/s^2) |
+//! | array | `pressure.rs`, by the pass of `lanes/src/rows.rs` | codes | sixteenths of a code above the tare, their sum and moments, flags |
+//! | contact | `contact.rs`, `contact/fit.rs` | sums; a row of taxels | force (Q16 N), centre (Q24 mm), uncertainty |
+//! | requests | `pipeline/requests.rs` | the command | tare, clear, another activity |
+//! | faults | `safety/monitor.rs`, `safety/guard.rs` | array, supply, bus; encoder, force, last g V | a fault, or none |
+//! | touch | `touch.rs` | force, travel | the surface, and how well it is known |
+//! | goal | `activity.rs`, `grip.rs`, `control/compensation.rs` | goal less force (Q16 N) | distance to go (Q24 mm), largest speed |
+//! | law | `control.rs` | distance, speed, disturbance | requested g V (Q8 mm/s^2) |
+//! | limits | `control/drive.rs` | requested g V, supply (mV) | g V within slew, current and voltage; duty (Q15) |
+//! | last check | `safety/guard.rs` | duty | the duty, or 0 |
+//! | result | `status.rs` | mode, duty | state of the bridge: driven by the duty, shorted, or open |
 
 pub mod budget;
 mod requests;
@@ -101,8 +116,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         let contact = self.contact(sound);
 
         // Requests of the host, and reasons to stop.
-        let tares = command.tare_request == self.status.taken.tare;
-        let zeroes = self.tared || !tares || matches!(self.activity, Activity::Tare { .. });
+        let no_new_tare = command.tare_request == self.status.taken.tare;
+        let zeroes = self.tared || !no_new_tare || matches!(self.activity, Activity::Tare { .. });
         self.armed = zeroes && (self.armed || !self.torque);
         self.torque = command.torque;
         if self.asked(command) {
@@ -122,7 +137,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             touch.observe(&felt, || guard.depth_felt(config), config);
             self.learn_baseline(contact.force);
         }
-        let wanted = self.act(&contact, [sound, tares], sense, command, &mut limits);
+        let wanted = self.act(&contact, [sound, no_new_tare], sense, command, &mut limits);
         let duty = if sound { self.guard.allow(wanted, &mut limits) } else { Duty::ZERO };
         if duty != wanted {
             self.motion.drive.cut();
@@ -186,7 +201,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             force: summed.map_or(contact.force, |summed| summed.max(contact.force)),
             pressing: !self.activity.releases(&self.touch),
             goal: command.goal,
-            voltage: self.motion.drive.voltage(),
+            given_q8_mm_per_s2: self.motion.drive.given(),
         };
         let unsafe_motion = if drives || self.tared { self.guard.check(&seen, drives, &self.config) } else { None };
         if !drives && !matches!(self.activity, Activity::Tare { .. }) {
@@ -240,7 +255,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     fn act(
         &mut self,
         contact: &Contact,
-        [sound, tares]: [bool; 2],
+        [sound, no_new_tare]: [bool; 2],
         sense: &Sense,
         command: &Command,
         limits: &mut Limits,
@@ -280,7 +295,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
                 return motion.push(voltage, supply_mv, config, limits);
             }
             Activity::Off(_) | Activity::Tare { .. } | Activity::Fault(_) => {
-                self.rest(sound && tares);
+                self.rest(sound && no_new_tare);
                 return Duty::ZERO;
             }
         };
@@ -289,7 +304,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
 
     /// A frame in which the motor is not driven.
     #[inline(never)]
-    fn rest(&mut self, tares: bool) {
+    fn rest(&mut self, tare_goes_on: bool) {
         let Self { activity, motion, config, array, status, .. } = self;
         status.braking = match activity {
             Activity::Off(halt) | Activity::Tare { halt, .. } => halt.brakes(motion, config),
@@ -302,7 +317,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         }
         let Activity::Tare { halt, free } = activity else { return };
         // Not in the frame with the request, which was read with the tare before.
-        if tares && array.continue_tare() {
+        if tare_goes_on && array.continue_tare() {
             if !*free {
                 array.judge_tare(config);
             }

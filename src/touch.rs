@@ -107,7 +107,7 @@ pub struct Felt<'a> {
     pub summed: Newtons,
     /// Travel of the tip.
     pub travel: Millimetres,
-    /// True in an approach and a hold. In a release the grip places the surface, not this record.
+    /// True except in a release, where the grip places the surface, not this record.
     pub presses: bool,
 }
 

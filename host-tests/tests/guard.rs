@@ -112,7 +112,7 @@ fn no_input_opens_an_end() {
                 force: Newtons::from_bits(if wild { rng.i32(..) } else { rng.i32(-9_000..most.min(90_000)) }),
                 pressing: rng.bool(),
                 goal: newtons(rng.i32(-1..8_000)),
-                voltage: rng.i32(..) >> rng.u32(0..8),
+                given_q8_mm_per_s2: rng.i32(..) >> rng.u32(0..8),
             };
             let fault = guard.check(&seen, true, &config);
             let [forward, backward] = lets_through(&guard);
@@ -143,8 +143,11 @@ fn only_a_push_takes_the_rear_end_along() {
         let mut at = |travel_mm: f64, force_mn: i32| {
             let force = newtons(force_mn);
             let encoder = counts(travel_mm, &config);
-            let fault =
-                guard.check(&Seen { encoder, force, pressing: false, goal: Newtons::ZERO, voltage: 0 }, true, &config);
+            let fault = guard.check(
+                &Seen { encoder, force, pressing: false, goal: Newtons::ZERO, given_q8_mm_per_s2: 0 },
+                true,
+                &config,
+            );
             (fault, lets_through(&guard)[1])
         };
         // The tip moves back slowly. The force appears once the tip is back, or is constant from the start.
@@ -184,7 +187,7 @@ impl Adversary {
         }
         self.left -= 1;
         let duty = guard.allow(Duty(self.duty), &mut Limits::default());
-        let voltage = i64::from(duty.0) * i64::from(config.voltage_limit) / i64::from(Duty::FULL);
+        let voltage = i64::from(duty.0) * i64::from(config.voltage_max_q8_mm_per_s2) / i64::from(Duty::FULL);
         let frame_s = 1.0 / f64::from(config.bounds.frames_per_s);
         let damping = f64::from(config.damping_q17_per_s) / 131_072.0;
         let push = strength * voltage as f64 / 256.0 - push_mm_per_s2;
@@ -210,7 +213,7 @@ fn no_duty_makes_it_fast_in_the_air() {
         for _ in 0..STEPS / 1_000 {
             let encoder = (finger.travel_mm / count_mm(&config)).floor() as i32;
             let force = newtons(offset_mn).max(newtons(rng.i32(-20..20)));
-            let seen = Seen { encoder, force, pressing: rng.bool(), goal: Newtons::ZERO, voltage };
+            let seen = Seen { encoder, force, pressing: rng.bool(), goal: Newtons::ZERO, given_q8_mm_per_s2: voltage };
             if guard.check(&seen, true, &config).is_some() {
                 stopped += 1;
                 break;
@@ -252,8 +255,13 @@ fn a_sound_finger_is_never_stopped_for_its_direction() {
             }
             let sensed = force_n * (0.8 + 0.4 * strength / 1.3) + rng.f64() * 0.01;
             let encoder = (finger.travel_mm / count_mm(&config)).floor() as i32;
-            let seen =
-                Seen { encoder, force: newtons((1e3 * sensed) as i32), pressing: true, goal: Newtons::ZERO, voltage };
+            let seen = Seen {
+                encoder,
+                force: newtons((1e3 * sensed) as i32),
+                pressing: true,
+                goal: Newtons::ZERO,
+                given_q8_mm_per_s2: voltage,
+            };
             match guard.check(&seen, true, &config) {
                 Some(Fault::Runaway) => break,
                 None => {}
@@ -279,7 +287,13 @@ fn the_wrong_way_ends_within_half_a_millimetre() {
             let frames = (1..200).find(|_| {
                 let encoder = (turns * finger.travel_mm / count_mm(&config)).floor() as i32;
                 let fault = guard.check(
-                    &Seen { encoder, force: Newtons::ZERO, pressing: true, goal: Newtons::ZERO, voltage },
+                    &Seen {
+                        encoder,
+                        force: Newtons::ZERO,
+                        pressing: true,
+                        goal: Newtons::ZERO,
+                        given_q8_mm_per_s2: voltage,
+                    },
                     true,
                     &config,
                 );
@@ -307,7 +321,13 @@ fn a_touch_bounds_the_retreat() {
     for (pressing, floor_mm) in [(true, 10.0 - 2.0 - 1.0), (false, -f64::from(config.bounds.back.0.to_num::<f32>()))] {
         let mut guard = started(0, &config);
         let at = |travel_mm: f64, force: Newtons, guard: &mut Guard| {
-            let seen = Seen { encoder: counts(travel_mm, &config), force, pressing, goal: Newtons::ZERO, voltage: 0 };
+            let seen = Seen {
+                encoder: counts(travel_mm, &config),
+                force,
+                pressing,
+                goal: Newtons::ZERO,
+                given_q8_mm_per_s2: 0,
+            };
             guard.check(&seen, true, &config)
         };
         // Forward slowly, then 1 N at 10 mm and its indentation, then back into the air.

@@ -38,7 +38,13 @@ impl Finger {
         let damping = f64::from(self.config.damping_q17_per_s) / 131_072.0;
         let voltage = (damping * self.speed_mm_per_s * 256.0) as i32 + beyond;
         let encoder = (self.travel_mm / count_mm).round() as i32;
-        let seen = Seen { encoder, force: self.force, pressing: self.pressing, goal: Newtons::ZERO, voltage };
+        let seen = Seen {
+            encoder,
+            force: self.force,
+            pressing: self.pressing,
+            goal: Newtons::ZERO,
+            given_q8_mm_per_s2: voltage,
+        };
         self.guard.check(&seen, true, &self.config)
     }
 
@@ -270,7 +276,7 @@ fn a_jump_before_torque_is_forgotten() {
         finger.travel_mm = jump_mm;
         let count_mm = finger.config.mm_per_count_q40 as f64 / 2_f64.powi(40);
         let encoder = (jump_mm / count_mm).round() as i32;
-        let seen = Seen { encoder, force: Newtons::ZERO, pressing: true, goal: Newtons::ZERO, voltage: 0 };
+        let seen = Seen { encoder, force: Newtons::ZERO, pressing: true, goal: Newtons::ZERO, given_q8_mm_per_s2: 0 };
         // 1 ms at rest.
         for _ in 0..10 {
             finger.guard.check(&seen, false, &finger.config);

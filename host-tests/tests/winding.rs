@@ -25,7 +25,7 @@ fn frame_s(config: &Config) -> f64 {
 /// g R i of a current, Q8 mm/s^2.
 fn driven(config: &Config, amperes: f64) -> i32 {
     let most = f64::from(config.params.current_max_ma) * 1e-3;
-    (f64::from(config.current_limit) * amperes / most) as i32
+    (f64::from(config.current_max_q8_mm_per_s2) * amperes / most) as i32
 }
 
 fn degrees(winding: &Winding, config: &Config) -> f64 {
@@ -140,9 +140,9 @@ fn it_never_passes_its_largest_temperature() {
         for _ in 0..(60.0 / frame_s(&config)) as u32 {
             motion.winding.observe(motion.drive.acceleration(), &config);
             let mut limits = Limits::default();
-            motion.push(config.voltage_limit, 8_000, &config, &mut limits);
+            motion.push(config.voltage_max_q8_mm_per_s2, 8_000, &config, &mut limits);
             held += u32::from(limits.has(Limits::WINDING));
-            let amperes = f64::from(motion.drive.acceleration()) / f64::from(config.current_limit)
+            let amperes = f64::from(motion.drive.acceleration()) / f64::from(config.current_max_q8_mm_per_s2)
                 * f64::from(params.current_max_ma)
                 * 1e-3;
             truth.pass(amperes * truth.ohm, frame_s(&config));

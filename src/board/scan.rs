@@ -361,6 +361,7 @@ fn written_half(stream: usize) -> usize {
 /// again.
 fn in_step() -> bool {
     let slots = SLOTS as u16;
+    // The count falls from `slots` to 1; twice that keeps the difference above 0.
     let current = (2 * slots - pac::DMA2.st(STREAM_ROWS).ndtr().read().ndt() - 1) % slots;
     [STREAM_A, STREAM_B].into_iter().all(|stream| {
         let completed = stored(stream) / BANK_COLUMNS as u16 % slots;

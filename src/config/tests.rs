@@ -22,7 +22,7 @@ fn check(config: &Config) {
     let leak = frame_s * (1.0 + creep) / (f64::from(p.creep_time_ms) * 1e-3);
     near("creep_leak", config.creep_leak_q32.into(), leak * two(32), 1e-6);
     let slew = g * f64::from(p.voltage_slew_mv_per_ms) * frame_s * two(8);
-    near("slew_limit", config.slew_limit.into(), slew.min(i32::MAX.into()), 1e-5);
+    near("slew_limit", config.slew_max_q8_mm_per_s2.into(), slew.min(i32::MAX.into()), 1e-5);
     let jump = (4e-3 * f64::from(p.speed_max_um_per_s) * frame_s).max(0.5);
     near("jump", config.jump.into(), jump * two(24), 1e-5);
     near("calm_frames", config.calm_frames.into(), 4.0 / (f64::from(config.gain_sets[0].slope_per_s) * frame_s), 1e-5);

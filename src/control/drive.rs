@@ -27,7 +27,7 @@ use fixed::types::I16F16;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Drive {
     /// g V.
-    voltage: i32,
+    given: i32,
     /// g V - c v.
     net: i32,
     /// Share of the current limit that the supply can deliver, Q8.
@@ -50,7 +50,7 @@ impl Default for Drive {
 impl Drive {
     /// No voltage at the motor.
     pub const fn new() -> Self {
-        Self { voltage: 0, net: 0, share: WHOLE, allowed: WHOLE }
+        Self { given: 0, net: 0, share: WHOLE, allowed: WHOLE }
     }
 
     /// g V - c v since the last frame (Q8 mm/s^2).
@@ -59,18 +59,18 @@ impl Drive {
     }
 
     /// g V that the bridge was given (Q8 mm/s^2).
-    pub fn voltage(&self) -> i32 {
-        self.voltage
+    pub fn given(&self) -> i32 {
+        self.given
     }
 
     /// Takes note that the guard blocked the voltage: the bridge shorts the motor.
     pub fn cut(&mut self) {
-        (self.voltage, self.net) = (0, self.net.saturating_sub(self.voltage));
+        (self.given, self.net) = (0, self.net.saturating_sub(self.given));
     }
 
     /// Takes note that the motor is shorted: only the back-EMF (Q8 mm/s^2) acts.
     pub fn short(&mut self, back_emf: i32) {
-        (self.voltage, self.net) = (0, back_emf.saturating_neg());
+        (self.given, self.net) = (0, back_emf.saturating_neg());
     }
 
     /// Sets the share of the current limit that the winding's temperature allows, Q8.
@@ -83,9 +83,10 @@ impl Drive {
     /// The current follows from the motor's model, i = (V - k_e omega) / R: holding |g V - c v| to g R i_max holds it.
     #[inline(always)]
     pub fn apply(&mut self, wanted: i32, back_emf: i32, supply_mv: u16, config: &Config, limits: &mut Limits) {
-        let slewed = clamp_around(wanted, self.voltage, config.slew_limit);
+        let slewed = clamp_around(wanted, self.given, config.slew_max_q8_mm_per_s2);
         self.spare(supply_mv, config);
-        let within_current = clamp_around(slewed, back_emf, (config.current_limit >> 8) * self.share.min(self.allowed));
+        let within_current =
+            clamp_around(slewed, back_emf, (config.current_max_q8_mm_per_s2 >> 8) * self.share.min(self.allowed));
         let most = voltage_limit(supply_mv, config);
         let applied = within_current.max(-most).min(most);
         if applied != wanted {
@@ -97,7 +98,7 @@ impl Drive {
                     | flag(applied != within_current, Limits::VOLTAGE),
             );
         }
-        self.voltage = applied;
+        self.given = applied;
         self.net = applied.saturating_sub(back_emf);
     }
 
@@ -115,7 +116,7 @@ impl Drive {
         let supply_mv = u32::from(supply_mv.max(2));
         // Its rounding costs half a unit of the duty at most.
         let gain = (config.duty_gain.wrapping_add(supply_mv / 2) / supply_mv).cast_signed();
-        let duty = nearest_share(self.voltage.wrapping_shl(config.voltage_shift), gain);
+        let duty = nearest_share(self.given.wrapping_shl(config.voltage_shift), gain);
         Duty(duty.max(i16::MIN.into()).min(i16::MAX.into()) as i16)
     }
 }
@@ -131,11 +132,11 @@ fn clamp_around(value: i32, middle: i32, reach: i32) -> i32 {
 #[inline(always)]
 fn voltage_limit(supply_mv: u16, config: &Config) -> i32 {
     if i32::from(supply_mv) >= config.params.voltage_max_mv {
-        return config.voltage_limit;
+        return config.voltage_max_q8_mm_per_s2;
     }
     // The supply's share of the motor's voltage, Q32.
     let share = u32::from(supply_mv).wrapping_mul(config.share_per_mv_q32);
-    ((u64::from(config.voltage_limit.cast_unsigned()) * u64::from(share)) >> 32) as i32
+    ((u64::from(config.voltage_max_q8_mm_per_s2.cast_unsigned()) * u64::from(share)) >> 32) as i32
 }
 
 /// Fractional bits of a share of the current.

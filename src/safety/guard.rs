@@ -68,7 +68,7 @@ pub struct Seen {
     /// Force that the host requests.
     pub goal: Newtons,
     /// g V that the bridge was given in the last frame, Q8 mm/s^2.
-    pub voltage: i32,
+    pub given_q8_mm_per_s2: i32,
 }
 
 /// Ends of the travel, the last touch, and the motion over the last milliseconds.
@@ -227,7 +227,7 @@ impl Guard {
             saturated((i64::from(seen.force.to_bits().max(0)) * i64::from(config.bounds.acceleration_per_n)) >> 16);
         // Computed from the unfiltered speed: the delay of a filtered one would add up.
         let back_emf = saturated((i64::from(speed) * i64::from(config.damping_q17_per_s)) >> 25);
-        let acceleration = seen.voltage.saturating_sub(back_emf).saturating_sub(pushed);
+        let acceleration = seen.given_q8_mm_per_s2.saturating_sub(back_emf).saturating_sub(pushed);
         let gained = saturated((i64::from(acceleration) * i64::from(config.frame_s_q37)) >> 29);
         self.change = towards(self.change.saturating_add(gained), 0, config.bounds.leak);
         self.late_change = towards(self.late_change, self.change, 4 * config.bounds.leak);

@@ -59,7 +59,7 @@ fn queue<S: Clone + PartialEq + Send + 'static>(runs: &mut Vec<Run>, machines: V
 
 /// Encoder and acceleration, held or in turns.
 fn observers(scan: &str, config: &Config) -> Vec<Machine<Observer>> {
-    let limit = config.current_limit;
+    let limit = config.current_max_q8_mm_per_s2;
     let inputs = [
         ("nothing", [(0, 0); 2]),
         ("one count", [(1, 0); 2]),
@@ -254,7 +254,7 @@ fn windings(longest: bool) -> Vec<Machine<Winding>> {
     let inputs = [("none", [0; 2]), ("the limit", [1; 2]), ("extremes in turns", [0, i32::MAX])];
     let machine = |(input, pair): (&str, [i32; 2])| {
         let config = Config::shipped(&params).expect("allowed");
-        let currents = if pair == [1; 2] { [config.current_limit; 2] } else { pair };
+        let currents = if pair == [1; 2] { [config.current_max_q8_mm_per_s2; 2] } else { pair };
         let frames = 1 << config.heat.frames_bits;
         Machine {
             name: format!("winding over {} s, {input}", housing_time_ms / 1_000),

@@ -153,7 +153,7 @@ fn with_a_fine_encoder_the_frame_time_sets_the_gains() {
 fn a_coarse_encoder_makes_a_slower_loop() {
     let config = shipped::Config::shipped(&Params { encoder_counts_per_turn: 16, ..Params::DEFAULT }).expect("allowed");
     let q_mm = config.mm_per_count_q40 as f64 / 2_f64.powi(40);
-    let quickest = (0.75 * f64::from(config.voltage_limit) / 256.0 / (5.8 * q_mm)).sqrt();
+    let quickest = (0.75 * f64::from(config.voltage_max_q8_mm_per_s2) / 256.0 / (5.8 * q_mm)).sqrt();
     let frame_s = f64::from(config.frame_s_q37) / 2_f64.powi(37);
     assert!((120.0..0.2 / frame_s).contains(&quickest), "{quickest} /s");
     let mut at_the_least = 0;

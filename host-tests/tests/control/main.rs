@@ -29,7 +29,12 @@ const SUPPLY_MV: u16 = 6_000;
 
 /// Configuration in which only the largest voltage limits the drive.
 fn free() -> Config {
-    let config = Config { slew_limit: i32::MAX, current_limit: i32::MAX, voltage_limit: MOST, ..config() };
+    let config = Config {
+        slew_max_q8_mm_per_s2: i32::MAX,
+        current_max_q8_mm_per_s2: i32::MAX,
+        voltage_max_q8_mm_per_s2: MOST,
+        ..config()
+    };
     assert_eq!(config.params.voltage_max_mv, i32::from(SUPPLY_MV));
     config
 }
@@ -38,8 +43,8 @@ fn free() -> Config {
 fn apply(drive: &mut Drive, wanted: i32, back_emf: i32, config: &Config) -> (i32, u16) {
     let mut limits = Limits::default();
     drive.apply(wanted, back_emf, SUPPLY_MV, config, &mut limits);
-    assert_eq!(drive.acceleration(), drive.voltage() - back_emf);
-    (drive.voltage(), limits.0)
+    assert_eq!(drive.acceleration(), drive.given() - back_emf);
+    (drive.given(), limits.0)
 }
 
 #[test]
@@ -53,7 +58,7 @@ fn what_is_within_all_limits_is_let_through_and_nothing_told() {
 
 #[test]
 fn the_slew_limit_is_a_step_from_the_last_voltage() {
-    let config = Config { slew_limit: 1_000, ..free() };
+    let config = Config { slew_max_q8_mm_per_s2: 1_000, ..free() };
     let mut drive = Drive::new();
     for (wanted, expected) in [
         (1_000, (1_000, 0)),
@@ -70,7 +75,7 @@ fn the_slew_limit_is_a_step_from_the_last_voltage() {
 /// The current is proportional to the voltage minus the back-EMF.
 #[test]
 fn the_current_limit_lies_around_the_back_emf() {
-    let config = Config { current_limit: 1 << 20, ..free() };
+    let config = Config { current_max_q8_mm_per_s2: 1 << 20, ..free() };
     let limit = 1 << 20;
     for back_emf in [0, 5_000_000, -5_000_000] {
         for (wanted, expected) in [
@@ -86,11 +91,11 @@ fn the_current_limit_lies_around_the_back_emf() {
 
 #[test]
 fn the_voltage_limit_is_the_last_and_each_that_cuts_is_told() {
-    let config = Config { voltage_limit: 10_000, ..free() };
+    let config = Config { voltage_max_q8_mm_per_s2: 10_000, ..free() };
     assert_eq!(apply(&mut Drive::new(), 10_000, 0, &config), (10_000, 0));
     assert_eq!(apply(&mut Drive::new(), 10_001, 0, &config), (10_000, Limits::VOLTAGE));
     assert_eq!(apply(&mut Drive::new(), -10_001, 0, &config), (-10_000, Limits::VOLTAGE));
-    let all = Config { slew_limit: 40_000, current_limit: 1 << 14, ..config };
+    let all = Config { slew_max_q8_mm_per_s2: 40_000, current_max_q8_mm_per_s2: 1 << 14, ..config };
     let told = Limits::SLEW | Limits::CURRENT | Limits::VOLTAGE;
     assert_eq!(apply(&mut Drive::new(), 50_000, 0, &all), (10_000, told));
 }
@@ -101,7 +106,7 @@ fn a_supply_below_the_motors_voltage_makes_as_much_less() {
     for (supply_mv, share) in [(7_000, 1.0), (6_000, 1.0), (5_999, 5_999.0 / 6e3), (3_000, 0.5), (600, 0.1), (0, 0.0)] {
         let mut drive = Drive::new();
         drive.apply(MOST, 0, supply_mv, &config, &mut Limits::default());
-        let applied = f64::from(drive.voltage()) / f64::from(MOST);
+        let applied = f64::from(drive.given()) / f64::from(MOST);
         assert!((applied - share).abs() < 2e-6, "{applied} at {supply_mv} mV");
     }
 }
@@ -109,10 +114,10 @@ fn a_supply_below_the_motors_voltage_makes_as_much_less() {
 /// Halved in each frame down to a sixteenth, and back by 1/128 in each.
 #[test]
 fn a_weak_source_is_given_less_current_at_once_and_more_again_slowly() {
-    let config = Config { current_limit: 1 << 20, ..free() };
+    let config = Config { current_max_q8_mm_per_s2: 1 << 20, ..free() };
     let share_q8 = |drive: &mut Drive, supply_mv: i32| {
         drive.apply(MOST, 0, supply_mv as u16, &config, &mut Limits::default());
-        drive.voltage() >> 12
+        drive.given() >> 12
     };
     let weak_mv = config.supply_weak_mv;
     let mut drive = Drive::new();
@@ -131,8 +136,9 @@ fn the_duty_is_the_voltages_share_of_the_supply() {
     for supply_mv in [6_000_u16, 8_000, 12_000, 24_000] {
         for share in [1.0, 0.5, 0.01, -0.25, -1.0] {
             let mut drive = Drive::new();
-            let config = Config { slew_limit: i32::MAX, current_limit: i32::MAX, ..config.clone() };
-            let wanted = (share * f64::from(config.voltage_limit)) as i32;
+            let config =
+                Config { slew_max_q8_mm_per_s2: i32::MAX, current_max_q8_mm_per_s2: i32::MAX, ..config.clone() };
+            let wanted = (share * f64::from(config.voltage_max_q8_mm_per_s2)) as i32;
             drive.apply(wanted, 0, supply_mv, &config, &mut Limits::default());
             let expected = 32_767.0 * share * 6_000.0 / f64::from(supply_mv);
             let duty = f64::from(drive.duty(supply_mv, &config).0);
@@ -154,9 +160,9 @@ fn a_cut_takes_the_voltage_and_leaves_the_back_emf() {
     for (wanted, back_emf) in [(5_000, 300), (-2_000, -70), (40, 0)] {
         apply(&mut drive, wanted, back_emf, &config);
         drive.cut();
-        assert_eq!((drive.voltage(), drive.acceleration()), (0, -back_emf));
+        assert_eq!((drive.given(), drive.acceleration()), (0, -back_emf));
         drive.cut();
-        assert_eq!((drive.voltage(), drive.acceleration()), (0, -back_emf), "once is enough");
+        assert_eq!((drive.given(), drive.acceleration()), (0, -back_emf), "once is enough");
     }
     assert_eq!(drive.duty(SUPPLY_MV, &config), Duty::ZERO);
 }
@@ -233,7 +239,12 @@ fn beyond_the_limit_there_is_no_curve_to_stay_on() {
 /// g V = k_v (v_ref - v) + a_ref + c v - w.
 #[test]
 fn the_law_is_the_documented_one() {
-    let config = Config { slew_limit: i32::MAX, current_limit: i32::MAX, voltage_limit: 1 << 30, ..config() };
+    let config = Config {
+        slew_max_q8_mm_per_s2: i32::MAX,
+        current_max_q8_mm_per_s2: i32::MAX,
+        voltage_max_q8_mm_per_s2: 1 << 30,
+        ..config()
+    };
     let gain = f64::from(config.gain_sets[0].speed_q18_per_s) / 2_f64.powi(18);
     let damping = f64::from(config.damping_q17_per_s) / 2_f64.powi(17);
     let mut rng = fastrand::Rng::with_seed(7);
@@ -247,7 +258,7 @@ fn the_law_is_the_documented_one() {
         let mut limits = Limits::default();
         let duty = motion.follow(reference, 6_000, &config, &mut limits);
         let expected = gain * (wanted - now) + feed + damping * now - disturbance;
-        let voltage = f64::from(motion.drive.voltage()) / 256.0;
+        let voltage = f64::from(motion.drive.given()) / 256.0;
         assert!((voltage - expected).abs() < 1.0, "{voltage}, {expected} expected");
         let net = f64::from(motion.drive.acceleration()) / 256.0;
         assert!((net - (expected - damping * now)).abs() < 1.0, "{net}");

@@ -308,7 +308,7 @@ fn config(params: &Params) -> Config {
     let positive = [config.mm_per_count_q40, config.newtons_per_sum_q48, config.pascals_per_sum_q32];
     assert!(positive.iter().all(|value| (1..1 << 61).contains(value)), "{config:?}");
     // Room for the rounding of its quotient; a motor too weak for the acceleration's resolution is not driven.
-    assert!((1..u32::MAX - 65_535).contains(&config.duty_gain) || config.voltage_limit == 0, "{config:?}");
+    assert!((1..u32::MAX - 65_535).contains(&config.duty_gain) || config.voltage_max_q8_mm_per_s2 == 0, "{config:?}");
     let positive = [config.frame_s_q37, config.counts_max, config.calm_band.to_bits(), config.bounds.leak];
     let gains = config.gain_sets.iter().flat_map(|gains| {
         let Gains { observer: [l1, l2, l3], speed_q18_per_s, slope_per_s, half_over_slope_q32, half_over_slope2_q40 } =
@@ -318,7 +318,12 @@ fn config(params: &Params) -> Config {
     // Below the limit of their type: they were not clamped.
     assert!(positive.into_iter().chain(gains).all(|value| (1..i32::MAX).contains(&value)), "{config:?}");
     // 0 where the motor is too weak for the acceleration's resolution: then it is not driven.
-    let limits = [config.voltage_limit, config.current_limit, config.slew_limit, config.damping_q17_per_s];
+    let limits = [
+        config.voltage_max_q8_mm_per_s2,
+        config.current_max_q8_mm_per_s2,
+        config.slew_max_q8_mm_per_s2,
+        config.damping_q17_per_s,
+    ];
     assert!(limits.iter().all(|value| *value >= 0), "{config:?}");
     config
 }

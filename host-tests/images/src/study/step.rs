@@ -99,7 +99,7 @@ extern "C" fn guard(bench: &mut Bench) {
         force: bench.contact.force,
         pressing: true,
         goal: bench.record.command.goal,
-        voltage: bench.motion.drive.voltage(),
+        given_q8_mm_per_s2: bench.motion.drive.given(),
     };
     if bench.guard.check(&seen, true, bench.config).is_none() {
         bench.duty = bench.guard.allow(bench.duty, &mut bench.limits);

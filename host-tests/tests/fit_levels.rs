@@ -281,13 +281,6 @@ fn a_contact_that_appears_is_fitted_wherever_it_lies() {
     }
 }
 
-/// A contact that reaches over the edge.
-fn cut_off_picture(d_mm: f64, x_mm: f64) -> TactileImage {
-    let scene = Scene { pitch_mm: 1.5, d_mm, x_mm, y_mm: 1.0, object: Object::Plane };
-    let reading = Reading { steps: Steps::Sixteenths, noise: Noise::None, dead: 0 };
-    reading.picture(&scene.pressures(), NONE, &mut fastrand::Rng::with_seed(0)).0
-}
-
 /// A contact that jumps from place to place, farther than a refinement goes, is found again: a guess that leads nowhere
 /// is given up.
 #[test]
@@ -296,7 +289,8 @@ fn a_contact_elsewhere_is_found_again() {
     for fit_level in [FitLevel::OneRow, FitLevel::AllRows] {
         let mut fit = Fit::new(fit_level);
         for (d_mm, x_mm) in [(1.0, -7.0), (0.5, 6.5), (2.5, -6.0), (0.6, 6.0), (0.4, -6.5)] {
-            let picture = cut_off_picture(d_mm, x_mm);
+            let scene = Scene { x_mm, ..cut_off(d_mm) };
+            let picture = picture(&scene, Noise::None, &mut Rng::with_seed(0));
             let frames = if fit_level == FitLevel::AllRows { 60 } else { 660 };
             for _ in 0..frames {
                 fit.read(&picture, &config);

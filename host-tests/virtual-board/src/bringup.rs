@@ -1,6 +1,6 @@
 //! The image of `cargo xtask bringup` on the emulated board, listened to as on a NUCLEO's virtual COM port.
 
-use crate::demo::flashable::Flashable;
+use crate::image::Flashable;
 use crate::{Error, Options, Rig};
 use bringup::judge::{Board, Judgement, judge};
 use bringup::listen::listen;

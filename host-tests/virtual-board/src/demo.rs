@@ -4,13 +4,12 @@
 //! same scene must leave the same trace.
 
 pub mod figures;
-pub mod flashable;
 pub mod screen;
 
+use crate::image::Flashable;
 use crate::scene::{Boards, simulate};
 use crate::{Error, Rig};
 use figures::{Counts, Figures};
-use flashable::Flashable;
 use screen::Screen;
 use sim::demo::{self, Run, Trace};
 use sim::watch::{Step, Watch};

@@ -1,8 +1,8 @@
 //! The defects that the rig can inject do to the microcontroller what they say.
 
 use crate::common::{
-    PING, WAIT_NS, holding, image, on_a_shared, on_bus, poke, read_u8, reboot, register, running, scratch, write_u8,
-    write_u32,
+    PING, WAIT_NS, holding, image, on_a_shared, on_bus, poke, read_u8, reboot, register, running, scratch,
+    write_and_run_ms, write_u8, write_u32,
 };
 use fingertip::shipped::address;
 use rigless::mcu::Operate;
@@ -97,8 +97,7 @@ fn a_clock_that_fails_cuts_the_bridge_and_the_board_comes_up_without_torque() {
     assert_eq!(read_u8(&mut rig, address::CRASH_CAUSE), 4);
     // It scans at its rate, answers, and cannot be brought to drive.
     assert_eq!(read_u8(&mut rig, address::FAULT), 17);
-    write_u8(&mut rig, address::CLEAR_FAULT, 1);
-    rig.run_ms(2).expect("it runs");
+    write_and_run_ms(&mut rig, address::CLEAR_FAULT, 1, 2);
     assert_eq!((read_u8(&mut rig, address::FAULT), read_u8(&mut rig, address::PRESENT_MODE)), (17, 5));
     let before = frames(&mut rig);
     rig.run_ms(100).expect("it runs");
@@ -114,8 +113,7 @@ fn a_clock_that_fails_cuts_the_bridge_and_the_board_comes_up_without_torque() {
 fn a_part_as_the_factory_left_it_refuses_torque_until_its_brown_out_level_is_programmed() {
     let mut rig = running(&Setup::default(), &Options { brown_out_bits: 3, ..Options::default() });
     assert_eq!(read_u8(&mut rig, address::FAULT), 18);
-    write_u8(&mut rig, address::CLEAR_FAULT, 1);
-    rig.run_ms(1).expect("it runs");
+    write_and_run_ms(&mut rig, address::CLEAR_FAULT, 1, 1);
     assert_eq!(read_u8(&mut rig, address::FAULT), 18);
     // What `cargo xtask flash` writes: two keys, the level, the start.
     const OPTKEYR: u64 = 0x4002_3c08;

@@ -1,8 +1,8 @@
 //! What ROBOTIS' own drivers expect of the bus, from the flash image: time, recovery, goals that end with torque.
 
 use crate::common::{
-    WAIT_NS, away, holding, holding_on_a_bus, let_go, on_bus, poke, read_u8, read_u16, read_u32, running, write_goal,
-    write_u8,
+    WAIT_NS, away, holding, holding_on_a_bus, let_go, on_bus, poke, read_u8, read_u16, read_u32, running,
+    write_and_run_ms, write_goal, write_u8,
 };
 use dynamixel2::{ReadError, TransferError};
 use fingertip::link::Reply;
@@ -67,8 +67,7 @@ fn before_the_first_tare_no_force_is_told() {
     assert_eq!(told(&mut rig), (0, true));
     assert!(Limits(read_u16(&mut rig, address::LIMITS)).has(Limits::NOT_TARED));
     assert!(read(&mut rig, address::RAW_CODES, 2) != [0, 0], "the array itself is seen");
-    write_u8(&mut rig, address::TARE, 1);
-    rig.run_ms(20).expect("it runs");
+    write_and_run_ms(&mut rig, address::TARE, 1, 20);
     assert!(!Limits(read_u16(&mut rig, address::LIMITS)).has(Limits::NOT_TARED));
     assert!(told(&mut rig).0 <= 20, "now it is a force: none");
 }
@@ -97,8 +96,7 @@ fn torque_off_ends_the_goal() {
 #[test]
 fn one_write_recovers_from_a_silent_bus() {
     let mut rig = holding();
-    write_u8(&mut rig, address::BUS_WATCHDOG, 1);
-    rig.run_ms(200).expect("it runs");
+    write_and_run_ms(&mut rig, address::BUS_WATCHDOG, 1, 200);
     assert_eq!(read_u8(&mut rig, address::FAULT), Fault::BusSilent as u8);
     assert_eq!(rig.world(|world| world.force_n()).expect("it runs"), 0.0, "released before the fault");
     let refused = |rig: &mut Rig, register: u16, bytes: &'static [u8]| {
@@ -112,8 +110,7 @@ fn one_write_recovers_from_a_silent_bus() {
     assert_eq!(refused(&mut rig, address::GOAL_FORCE_MN, &[0xE8, 3, 0, 0]), 0x84);
     assert_eq!(refused(&mut rig, address::TORQUE_ENABLE, &[1]), 0x81);
     assert_eq!(read_u8(&mut rig, address::RECOVER_HINDRANCE), 0);
-    write_u8(&mut rig, address::RECOVER, 1);
-    rig.run_ms(2).expect("it runs");
+    write_and_run_ms(&mut rig, address::RECOVER, 1, 2);
     assert_eq!((read_u8(&mut rig, address::FAULT), read_u8(&mut rig, address::BUS_WATCHDOG)), (0, 0));
     assert_eq!(read_u8(&mut rig, address::PRESENT_MODE), Mode::Off as u8);
     write_u8(&mut rig, address::TORQUE_ENABLE, 1);
@@ -189,8 +186,7 @@ fn turning_the_bridge_on_keeps_the_phase_of_the_pwm() {
     let before = counts(&mut rig).expect("it runs");
     for _ in 0..TURNS {
         for (torque, ms) in [(1, 1), (0, 40)] {
-            write_u8(&mut rig, address::TORQUE_ENABLE, torque);
-            rig.run_ms(ms).expect("it runs");
+            write_and_run_ms(&mut rig, address::TORQUE_ENABLE, torque, ms);
         }
     }
     let after = counts(&mut rig).expect("it runs");

@@ -2,8 +2,8 @@
 //! what becomes of one that is asked for out of turn, interrupted, or read while it is under way.
 
 use crate::common::{
-    away, let_go, on_bus, read_u8, read_u16, read_u32, reboot, refused, running, write_goal, write_param, write_u8,
-    write_u16,
+    away, let_go, on_bus, read_u8, read_u16, read_u32, reboot, refused, running, write_and_run_ms, write_goal,
+    write_param, write_u8, write_u16,
 };
 use fingertip::capture::Ended;
 use fingertip::shipped::{CAPTURE_BYTES, CLOCKS, COLUMNS, ROWS, address};
@@ -30,8 +30,7 @@ fn start() -> Rig {
 
 /// Arms, tares, and presses with half a newton from then on.
 fn press(rig: &mut Rig) {
-    write_u8(rig, address::CAPTURE, 1);
-    rig.run_ms(1).expect("it runs");
+    write_and_run_ms(rig, address::CAPTURE, 1, 1);
     assert_eq!(read_u8(rig, address::CAPTURE_STATE), ARMED);
     write_u8(rig, address::TARE, 1);
     write_u8(rig, address::TORQUE_ENABLE, 1);
@@ -88,8 +87,7 @@ fn same(rig: &mut Rig, bytes: &[u8]) -> (Replayed<ROWS, COLUMNS>, Vec<Mode>) {
 fn a_press_replays_to_the_bit_also_with_calibrated_gains() {
     let mut rig = start();
     // What the finger did before is no part of it.
-    write_u8(&mut rig, address::TARE, 1);
-    rig.run_ms(20).expect("it runs");
+    write_and_run_ms(&mut rig, address::TARE, 1, 20);
     write_u8(&mut rig, address::TORQUE_ENABLE, 1);
     write_goal(&mut rig, 1_000);
     rig.run_ms(60).expect("it runs");
@@ -135,36 +133,28 @@ fn a_press_replays_to_the_bit_also_with_calibrated_gains() {
 fn out_of_turn_and_interrupted() {
     let mut rig = start();
     // Armed twice is armed; called off is off.
-    write_u8(&mut rig, address::CAPTURE, 1);
-    rig.run_ms(1).expect("it runs");
-    write_u8(&mut rig, address::CAPTURE, 1);
-    rig.run_ms(1).expect("it runs");
+    write_and_run_ms(&mut rig, address::CAPTURE, 1, 1);
+    write_and_run_ms(&mut rig, address::CAPTURE, 1, 1);
     assert_eq!(read_u8(&mut rig, address::CAPTURE_STATE), ARMED);
-    write_u8(&mut rig, address::CAPTURE, 0);
-    rig.run_ms(1).expect("it runs");
+    write_and_run_ms(&mut rig, address::CAPTURE, 0, 1);
     assert_eq!(read_u8(&mut rig, address::CAPTURE_STATE), NONE);
 
     // Parameters between arming and the tare: those of the tare count.
-    write_u8(&mut rig, address::CAPTURE, 1);
-    rig.run_ms(1).expect("it runs");
+    write_and_run_ms(&mut rig, address::CAPTURE, 1, 1);
     write_param(&mut rig, "modulus_pa", 260_000);
     assert_eq!(read_u8(&mut rig, address::CAPTURE_STATE), ARMED);
-    write_u8(&mut rig, address::TARE, 1);
-    rig.run_ms(8).expect("it runs");
+    write_and_run_ms(&mut rig, address::TARE, 1, 8);
     assert_eq!(read_u8(&mut rig, address::CAPTURE_STATE), RECORDING);
     assert_eq!(refused(&mut rig, address::CAPTURE, 1), RESULT, "frames are being kept");
-    write_u8(&mut rig, address::CAPTURE, 0);
-    rig.run_ms(1).expect("it runs");
+    write_and_run_ms(&mut rig, address::CAPTURE, 0, 1);
     let bytes = fetch(&mut rig);
     let (replayed, _) = same(&mut rig, &bytes);
     assert_eq!((replayed.head.ended, replayed.head.params.modulus_pa), (Ended::Asked, 260_000));
     assert!((60..160).contains(&replayed.head.frames), "{} frames", replayed.head.frames);
 
     // Parameters in the middle end it; what is there replays with those before.
-    write_u8(&mut rig, address::CAPTURE, 1);
-    rig.run_ms(1).expect("it runs");
-    write_u8(&mut rig, address::TARE, 1);
-    rig.run_ms(20).expect("it runs");
+    write_and_run_ms(&mut rig, address::CAPTURE, 1, 1);
+    write_and_run_ms(&mut rig, address::TARE, 1, 20);
     write_param(&mut rig, "modulus_pa", 250_000);
     let bytes = fetch(&mut rig);
     let (replayed, modes) = same(&mut rig, &bytes);
@@ -172,15 +162,12 @@ fn out_of_turn_and_interrupted() {
     assert_eq!(modes, [Mode::Tare, Mode::Off]);
 
     // A reset in the middle leaves nothing.
-    write_u8(&mut rig, address::CAPTURE, 1);
-    rig.run_ms(1).expect("it runs");
-    write_u8(&mut rig, address::TARE, 1);
-    rig.run_ms(5).expect("it runs");
+    write_and_run_ms(&mut rig, address::CAPTURE, 1, 1);
+    write_and_run_ms(&mut rig, address::TARE, 1, 5);
     reboot(&mut rig, 30);
     assert_eq!((read_u8(&mut rig, address::CAPTURE_STATE), read_u8(&mut rig, address::CAPTURE_COUNT)), (NONE, 0));
     assert_eq!((read_u32(&mut rig, address::CAPTURE_BYTES), window(&mut rig, 0)), (0, vec![0; WINDOW.into()]));
-    write_u8(&mut rig, address::CAPTURE, 1);
-    rig.run_ms(1).expect("it runs");
+    write_and_run_ms(&mut rig, address::CAPTURE, 1, 1);
     write_u8(&mut rig, address::TARE, 1);
     until_done(&mut rig);
     let bytes = fetch(&mut rig);

@@ -34,6 +34,12 @@ pub fn write_u8(rig: &mut Rig, register: u16, value: u8) {
     on_bus(rig, move |bus| bus.write_u8(1, register, value).map(drop));
 }
 
+/// Writes a register, then runs the board for this time.
+pub fn write_and_run_ms(rig: &mut Rig, register: u16, value: u8, ms: u64) {
+    write_u8(rig, register, value);
+    rig.run_ms(ms).expect("it runs");
+}
+
 pub fn write_u16(rig: &mut Rig, register: u16, value: u16) {
     on_bus(rig, move |bus| bus.write_u16(1, register, value).map(drop));
 }
@@ -142,8 +148,7 @@ pub fn confirm_direction(rig: &mut Rig) {
 fn hold(options: &Options) -> Rig {
     let mut rig = running(&away(0.5), options);
     confirm_direction(&mut rig);
-    write_u8(&mut rig, address::TARE, 1);
-    rig.run_ms(20).expect("it runs");
+    write_and_run_ms(&mut rig, address::TARE, 1, 20);
     write_u8(&mut rig, address::TORQUE_ENABLE, 1);
     write_goal(&mut rig, 1_000);
     rig.run_ms(150).expect("it runs");

@@ -1,7 +1,9 @@
 //! The fit level over the bus: the controller runs the highest level that its time budget allows, reports a limit when
 //! it holds a requested level back, and misses no deadline.
 
-use crate::common::{away, read_u8, read_u16, read_u32, register, running, write_goal, write_u8, write_u32};
+use crate::common::{
+    away, read_u8, read_u16, read_u32, register, running, write_and_run_ms, write_goal, write_u8, write_u32,
+};
 use fingertip::contact::FitLevel;
 use fingertip::shipped::address;
 use fingertip::state::Limits;
@@ -21,8 +23,7 @@ fn holding_over_the_edge() -> Rig {
     let mut setup = away(0.5);
     (setup.wall.centre_x_mm, setup.wall.centre_y_mm) = (7.5, 1.0);
     let mut rig = running(&setup, &Options::confirmed());
-    write_u8(&mut rig, address::TARE, 1);
-    rig.run_ms(20).expect("it runs");
+    write_and_run_ms(&mut rig, address::TARE, 1, 20);
     // As long as a frame in the air: the fit level goes by the longest, and a tare must not miss its deadline.
     let longest_us = read_u16(&mut rig, address::LOOP_TIME_MAX_US);
     assert!(longest_us <= 45, "a frame of the tare, or at rest: {longest_us} us");
@@ -43,8 +44,7 @@ fn the_highest_fit_level_is_held_back_before_a_deadline_is_missed() {
     let (in_use, held_back, before_us) = said(&mut rig);
     assert_eq!((in_use, held_back), (FitLevel::default() as u8, false), "the default has its time");
     for asked in [5, 4, 3] {
-        write_u8(&mut rig, address::FIT_LEVEL, asked);
-        rig.run_ms(300).expect("it runs");
+        write_and_run_ms(&mut rig, address::FIT_LEVEL, asked, 300);
         let (in_use, held_back, longest_us) = said(&mut rig);
         println!("asked {asked}: in use {in_use}, longest loop time {longest_us} us ({before_us} us with the default)");
         assert_eq!(held_back, in_use < asked, "{in_use} of {asked}");
@@ -56,8 +56,7 @@ fn the_highest_fit_level_is_held_back_before_a_deadline_is_missed() {
         }
     }
     for asked in [0, 1, 2] {
-        write_u8(&mut rig, address::FIT_LEVEL, asked);
-        rig.run_ms(50).expect("it runs");
+        write_and_run_ms(&mut rig, address::FIT_LEVEL, asked, 50);
         let (in_use, held_back, _) = said(&mut rig);
         assert_eq!((in_use, held_back), (asked, false));
         assert_eq!(read_u32(&mut rig, address::MISSED_FRAMES), 0);
@@ -77,8 +76,7 @@ fn the_highest_fit_level_is_held_back_before_a_deadline_is_missed() {
 #[test]
 fn slower_frames_leave_room_for_the_highest_fit_level() {
     let mut rig = holding_over_the_edge();
-    write_u8(&mut rig, address::FIT_LEVEL, 5);
-    rig.run_ms(100).expect("it runs");
+    write_and_run_ms(&mut rig, address::FIT_LEVEL, 5, 100);
     let (in_use, held_back, _) = said(&mut rig);
     assert!(in_use < 5 && held_back, "{in_use}");
     write_u8(&mut rig, address::TORQUE_ENABLE, 0);

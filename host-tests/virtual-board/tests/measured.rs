@@ -1,7 +1,9 @@
 //! Jog, strokes and a press over the bus, on the flash image: each completes, and its record is read and parsed by the
 //! host's solver.
 
-use crate::common::{away, let_go, on_bus, read_u8, read_u16, read_u32, running, write_goal, write_param, write_u8};
+use crate::common::{
+    away, let_go, on_bus, read_u8, read_u16, read_u32, running, write_and_run_ms, write_goal, write_param,
+};
 use fingertip::measure::{MeasureState, Task};
 use fingertip::params::Params;
 use fingertip::shipped::address;
@@ -16,8 +18,7 @@ const LONGEST_MS: u64 = 20_000;
 
 /// Makes a motion, which must complete without a fault.
 fn measure(rig: &mut Rig, task: Task) {
-    write_u8(rig, address::MEASURE, task as u8);
-    rig.run_ms(2).expect("it runs");
+    write_and_run_ms(rig, address::MEASURE, task as u8, 2);
     for _ in 0..LONGEST_MS / 20 {
         let mode = read_u8(rig, address::PRESENT_MODE);
         let state = read_u8(rig, address::MEASURE_STATE);
@@ -51,8 +52,7 @@ fn fetch(rig: &mut Rig) -> Vec<u8> {
 }
 
 fn tare(rig: &mut Rig) {
-    write_u8(rig, address::TARE, 1);
-    rig.run_ms(20).expect("it runs");
+    write_and_run_ms(rig, address::TARE, 1, 20);
     assert_eq!(read_u8(rig, address::TARE_STATE), 2);
 }
 
@@ -79,8 +79,7 @@ fn a_press_completes_and_the_modulus_is_solved() {
     let setup = away(0.5);
     let mut rig = running(&setup, &Options::confirmed());
     tare(&mut rig);
-    write_u8(&mut rig, address::TORQUE_ENABLE, 1);
-    rig.run_ms(2).expect("it runs");
+    write_and_run_ms(&mut rig, address::TORQUE_ENABLE, 1, 2);
     measure(&mut rig, Task::Press);
     let press = record::press(&fetch(&mut rig), &Params::DEFAULT).expect("a press");
     let kpa = solve::modulus(&[press]).expect("a modulus").kpa;

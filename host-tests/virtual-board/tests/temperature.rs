@@ -1,6 +1,6 @@
 //! The microcontroller's temperature and the analogue supply as the board measures them while it runs.
 
-use crate::common::{image, poke, read_u16, read_u32, running, write_goal, write_param, write_u8};
+use crate::common::{image, poke, read_u16, read_u32, running, write_and_run_ms, write_goal, write_param, write_u8};
 use fingertip::chip::Factory;
 use fingertip::params::Params;
 use fingertip::shipped::{Record, address};
@@ -109,8 +109,7 @@ fn a_low_analogue_supply_is_reported_and_does_not_change_the_temperature() {
 #[test]
 fn the_means_go_on_where_the_scan_starts_anew() {
     let mut rig = warming(inside::factory());
-    write_u8(&mut rig, address::TORQUE_ENABLE, 0);
-    rig.run_ms(40).expect("it runs");
+    write_and_run_ms(&mut rig, address::TORQUE_ENABLE, 0, 40);
     let before = chip_mc(&mut rig);
     write_param(&mut rig, "settle_ns", 2_500);
     rig.run_ms(400).expect("it runs");

@@ -118,17 +118,7 @@ fn dead_taxels_under_the_contact_do_not_keep_the_scale_from_being_found() {
 /// `population unlike --fingers 40` prints the figures of more fingers.
 #[test]
 fn calibration_leaves_a_few_percent_of_the_force() {
-    leaves_a_few_percent(1);
-}
-
-#[test]
-#[ignore = "long: cargo xtask test --long"]
-fn long_calibration_leaves_a_few_percent_of_the_force() {
-    leaves_a_few_percent(4);
-}
-
-fn leaves_a_few_percent(count: usize) {
-    let fingers = fingers(1, count).unwrap_or_else(|error| panic!("{error}"));
+    let fingers = fingers(1, 4).unwrap_or_else(|error| panic!("{error}"));
     println!("{}", errors_text(&fingers));
     let [before, after] = percentiles(&fingers);
     for (test, most) in [9.0, 8.0, 12.0].into_iter().enumerate() {

@@ -145,7 +145,7 @@ fn any_setting_is_answered() {
 #[rustfmt::skip]
 const PLAIN: &[&str] = &[
     "seed", "ratio", "efficiency", "bits", "min", "max", "fingers", "share", "chip_share", "left", "still",
-    "slipping", "teeth", "grip_friction", "row", "column", "factor",
+    "slipping", "teeth", "grip_friction", "row", "column", "factor", "fit_level",
 ];
 
 fn described() -> Vec<(&'static str, &'static Key)> {

@@ -14,7 +14,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     // Sections follow each other without padding to a page: flash has no pages to protect.
     println!("cargo:rustc-link-arg-bins=--nmagic");
     println!("cargo:rustc-link-arg-bins=-Tlink.x");
-    // What the image logs is part of the image: it does not hang on the builder's environment.
+    // Fixed log level: the image does not depend on the builder's environment.
     println!("cargo:rustc-env=DEFMT_LOG=info");
     println!("cargo:rustc-link-arg-bins=-Tdefmt.x");
     Ok(())

@@ -146,8 +146,8 @@ pub struct Config {
     pub force_fault: Newtons,
     /// See [`Params::force_max_mn`].
     pub force_max: Newtons,
-    /// Largest force of a centred contact that the converter still sees whole: by the tip's model its peak stays a
-    /// twentieth below saturation. It may be less than [`Config::force_max`].
+    /// Centred force at which the highest taxel reaches 95 % of the saturation code, by the tip's model. It may be less
+    /// than [`Config::force_max`].
     pub force_seen: Newtons,
 }
 

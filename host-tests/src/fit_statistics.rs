@@ -76,7 +76,7 @@ pub struct Case {
     pub scene: Scene,
     /// Pressures on the taxels.
     pub pressures: Pressures,
-    /// Tactile image of it.
+    /// Tactile image of `pressures`.
     pub picture: TactileImage,
     /// Share of the seen force that an edge takes; 0 without one.
     pub cut: f64,
@@ -87,7 +87,7 @@ pub struct Case {
 }
 
 impl Series {
-    /// The case of this number that is to be judged.
+    /// Case `number` of the series. Draws with too few live taxels or too small a cut are skipped.
     pub fn case(&self, number: usize) -> Case {
         let mut rng = Rng::with_seed(0x5eed_0000_0000 + number as u64);
         let (mut too_few, mut invisible) = (0, 0);

@@ -177,7 +177,7 @@ fn a_contact_out_of_nothing_finds_an_effort_that_fits() {
 
 // The budget frame by frame: when the fit level falls, when it rises, and how long it waits.
 
-/// Ticks that are all to be used.
+/// Deadline of a frame, core cycles; [`USABLE`] is seven eighths of it.
 const TICKS: u32 = 32_000;
 const USABLE: u32 = 28_000;
 /// Ticks that must be free before the level rises.

@@ -85,8 +85,8 @@ impl RearEnd {
 }
 
 /// Beyond an end of the travel no duty drives the tip farther out, and 1 mm beyond it is stopped: for any counts, forces
-/// and voltages, jumps included. The front end never opens. The rear end opens only behind an object that pushes, by at
-/// most the indentation, the clearance and 1 mm behind the place of the push.
+/// and voltages, jumps included. The front end never moves outwards. The rear end moves back only behind an object that pushes,
+/// at most by the indentation, the clearance and 1 mm behind the place of the push.
 #[test]
 fn no_input_opens_an_end() {
     let mut rng = Rng::with_seed(1);

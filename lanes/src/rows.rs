@@ -171,7 +171,7 @@ pub struct Curve {
 }
 
 impl Curve {
-    /// The line: every load is its reading.
+    /// Linear characteristic: a load equals its reading.
     pub const LINE: Self = Self::new(0);
     /// Fractional bits of q.
     const FACTOR_BITS: u32 = 26;
@@ -218,8 +218,8 @@ pub struct Common {
     pub curve: Curve,
 }
 
-/// Sums over the rows. With a curve the first two are those of the taxels, `second` with twice each column's distance
-/// from the middle for its weight, and `running` is `first` after each row, added up.
+/// Sums over the rows. With a curve `first` sums the taxels, `second` weights each by twice its column's distance from
+/// the middle, and `running` accumulates `first` after each row.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Total {
     /// Sum of the rows' sums, each less [`sum_drop`] bits times its boost; upper half of the product.

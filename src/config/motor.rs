@@ -95,7 +95,7 @@ impl Gains {
 
 /// Number of frames of a step of the model, as a power of two: at most 256.
 const FRAMES_BITS: u32 = 8;
-/// Longest step of the model, s: longer frames make fewer of them a step. The shortest time constant is 2 s.
+/// Longest step of the model, s: the frames of a step are halved until it fits. The shortest time constant is 2 s.
 const STEP_S: f32 = 0.0625;
 /// Range of the temperature over which the current falls from its limit to 0, as a power of two of K: the last 16 K
 /// below the largest temperature.

@@ -22,8 +22,9 @@ use std::fs;
 use std::io::{Seek, Write};
 use std::path::Path;
 
-/// The attachment's name, and the metadata record's.
+/// Name of the attachment.
 const ATTACHED: &str = "capture.bin";
+/// Name of the metadata record.
 const ABOUT: &str = "fingertip.capture";
 /// Entry of the metadata: host's time of the last frame, ns since 1970.
 pub const ENDED: &str = "ended_unix_ns";

@@ -169,7 +169,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
     }
 }
 
-/// Everything that the commands install when they need it, at once.
+/// Installs now what the commands would install at first use.
 fn setup(choice: Choice, console: &mut Console) -> anyhow::Result<()> {
     toolchain::ensure(choice, console)?;
     timing::ensure(console)?;

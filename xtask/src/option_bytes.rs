@@ -1,6 +1,6 @@
 //! The option bytes: brown-out level 3, written so that nothing can interrupt.
 //!
-//! A write erases and programs a sector of its own. If a reset or a power loss cuts it short, the device can come up
+//! A write erases and programs the sector of the option bytes. If a reset or a power loss cuts it short, the device can come up
 //! with read protection level 1, and leaving level 1 erases the whole flash (sources: docs/board.md, Option bytes). The
 //! image's window watchdog resets a halted core too, after 1 ms. So the write begins behind a reset that halts the core
 //! before its first instruction: no code has started a watchdog, and none can request a reset.
@@ -39,7 +39,7 @@ pub const PAUSE_MS: u64 = 10;
 pub trait Probe {
     /// Reads a word, also while the core runs.
     fn read(&mut self, address: u32) -> Result<u32>;
-    /// Writes a word by a halted core.
+    /// Writes a word while the core is halted.
     fn write(&mut self, address: u32, value: u32) -> Result<()>;
     /// Resets the device, and halts the core before its first instruction.
     fn reset_and_halt(&mut self) -> Result<()>;

@@ -1,5 +1,5 @@
-//! The encoder: both channels' edges counted by an interrupt. A motor with more than 50,000 counts in a second asks for a
-//! program of the PIO in its place.
+//! The encoder: both channels' edges counted by an interrupt. Above 50,000 counts a second use a
+//! program of the PIO instead.
 
 use crate::pins;
 use core::cell::Cell;

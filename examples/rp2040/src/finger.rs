@@ -1,4 +1,4 @@
-//! The finger and its clocks: what a host checks as well.
+//! Parameters and clocks of the finger.
 
 use fingertip::params::Params;
 use fingertip::scan::Clocks;

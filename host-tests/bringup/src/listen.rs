@@ -17,7 +17,7 @@ pub struct Report {
 /// Asks for a report and takes it in; `progress` hears how far it is.
 ///
 /// # Errors
-/// The port's own, silence for as long as that waits, a report that is damaged, or an image that crashed.
+/// An error or a time-out of the port, a damaged report, or an image that crashed.
 pub fn listen(port: &mut (impl Read + Write), frames: u32, progress: &mut dyn FnMut(&str)) -> Result<Report, Error> {
     let (mut line, mut report, mut check) = (Vec::new(), None::<Report>, CHECK);
     let mut bytes = [0; 256];

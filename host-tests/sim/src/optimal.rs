@@ -63,7 +63,7 @@ pub fn minimum_time_s(
 
 /// The time-optimal motion from rest at one indentation to rest at another.
 ///
-/// `voltage_limit` is the bridge's mean voltage before the supply sags; more than the supply has counts as all of it.
+/// `voltage_limit` is the bridge's mean voltage before the supply sags; values above the supply voltage are limited to it.
 pub fn profile(
     setup: &Setup,
     d_from_mm: f64,

@@ -31,7 +31,7 @@ pub struct Inputs {
     pub rings: Vec<Pair>,
     /// Frames of contacts, and the calibration.
     pub frames: Frames,
-    /// Contacts without noise and with it, seen over and over.
+    /// Contacts without noise, and with noise of 1 % of each reading: several tactile images of each.
     pub fits: [Vec<Seen>; 2],
     /// A controller's errors, -1 to 1.
     pub control: Vec<Pair>,

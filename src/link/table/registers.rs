@@ -228,8 +228,8 @@ control_table! {
     /// Fit level in use: less than requested if the deadline leaves no time for that.
     368 FIT_LEVEL_IN_USE: U8 ReadOnly, "" * 1, 0 to 5,
         |view, _| view.snapshot.status.fit_level as u32;
-    /// State of the last requested tare: 0 none since reset, 1 running, 2 done, 3 refused or ended by a fault:
-    /// ask again once that is cleared.
+    /// State of the last requested tare: 0 none since reset, 1 running, 2 done, 3 refused, or ended by a fault:
+    /// remove the object or clear the fault, then request again.
     369 TARE_STATE: U8 ReadOnly, "" * 1, 0 to 3,
         |view, _| view.tare_state();
     /// Part of present_force_mn that is taken for the array's creep: the force that is held is less by this. 0 where

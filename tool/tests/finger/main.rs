@@ -148,7 +148,7 @@ fn parameters_are_set_all_or_none_and_saved() {
         assert!(said.contains(why), "{said}");
     }
     assert_eq!(get(&["tip_radius_um"]), serde_json::json!({ "tip_radius_um": 10_000 }));
-    // Two that contradict each other one after the other go together.
+    // `contact_on_mn=10` alone is refused; with a lower `contact_off_mn` in the same packet it is accepted.
     finger.done(&["params", "set", "contact_on_mn=10", "contact_off_mn=5"]);
     let said = finger.done(&["params", "set", "contact_on_mn=10"]);
     assert!(said.contains("nothing differs"), "{said}");

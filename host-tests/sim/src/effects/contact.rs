@@ -344,7 +344,7 @@ pub const EFFECTS: &[Description] = &[
             "both coefficients times 1 + spread_percent / 100 g, g normal within 3 deviations, drawn once",
         ],
         state: "stretch of the patch, distance slipped (mm), and direction of the slip",
-        reference: "Coulomb friction behind a spring (Dahl; Mindlin's full stick): silicone on skin-like surfaces 0.5 to 1",
+        reference: "Coulomb friction behind a spring (Dahl; Mindlin's full stick): friction coefficient 0.5 to 1 for silicone on skin-like surfaces",
         keys: &[
             Key::number("n_per_mm", "Stiffness of the patch along the surface.", 0.001, 1000.0, 1.0),
             Key::number("damping_n_s_per_mm", "Damping of the patch along the surface.", 0.0, 10.0, 0.001),

@@ -125,7 +125,8 @@ struct StageTimes {
 
 /// Frames for one that is timed.
 const TIMED: u64 = 64;
-/// Stages of a frame, and the families of the effects whose own time is not counted with each.
+/// Stages of a frame, and the families of the effects whose own time is not counted with each. Effects of clock and bus act
+/// between the stages: their time, which is small, is in their own row and in a stage.
 const STAGES: [(&str, &[Family]); 4] = [
     ("motion", &[registry::CONTACT, registry::DRIVE]),
     ("readout", &[registry::SENSOR]),
@@ -253,7 +254,6 @@ impl<E: Set> Board<E> {
 
     fn run(&mut self, scene: &Scene, watch: &mut dyn Watch) {
         self.runs = true;
-        self.times = StageTimes::default();
         for unit in &mut self.units {
             unit.command.torque = true;
             unit.command.bus_watchdog_ms = scene.table("host").whole("watchdog_ms") as u16;

@@ -25,8 +25,9 @@ type Errors = [f64; GOALS];
 pub struct WholeLoop {
     /// By fit level: of fingers as they come, and calibrated.
     levels: Vec<[Errors; 2]>,
-    /// By frame rate: settle time of a row in ns, longest settling in ms, duty at rest in %, and errors.
-    rates: Vec<(f64, f64, f64, Errors)>,
+    /// By frame rate: settle time of a row in ns, longest settling in ms, duty at rest in %, errors, and number of holds
+    /// without a fault.
+    rates: Vec<(f64, f64, f64, Errors, f64)>,
     fingers: f64,
 }
 
@@ -44,7 +45,9 @@ impl WholeLoop {
             let numbers = numbers.map_err(|error| format!("{line}: {error}"))?;
             match (name, &numbers[..]) {
                 ("level", [_, a, b, c, d, e, f, g, h]) => all.levels.push([[*a, *b, *c, *d], [*e, *f, *g, *h]]),
-                ("rate", [ns, ms, percent, a, b, c, d]) => all.rates.push((*ns, *ms, *percent, [*a, *b, *c, *d])),
+                ("rate", [ns, ms, percent, a, b, c, d, holds]) => {
+                    all.rates.push((*ns, *ms, *percent, [*a, *b, *c, *d], *holds));
+                }
                 ("fingers", [fingers]) => all.fingers = *fingers,
                 ("goals", [0.5, 1.0, 2.0, 5.0]) => {}
                 _ => return Err(format!("`{line}` is not a line of `budget --whole-loop`")),
@@ -70,13 +73,13 @@ impl WholeLoop {
                  the errors of the taxels limit the force.\n\n\
                  Frame rate: the demonstration's longest settling and its duty at rest, and the same fingers at fit level 2 as they come. The array is \
                  slowed by its settle time; the cycles a second fall in proportion.\n\n\
-                 | settle, ns | frames a second | settling, ms | duty at rest, % | at 0.5 N, mN | 1 N | 2 N | 5 N |\n\
-                 | --- | --- | --- | --- | --- | --- | --- | --- |\n";
-        for (ns, ms, percent, errors) in &self.rates {
+                 | settle, ns | frames a second | settling, ms | duty at rest, % | at 0.5 N, mN | 1 N | 2 N | 5 N | holds without a fault |\n\
+                 | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
+        for (ns, ms, percent, errors, holds) in &self.rates {
             let params = Params { settle_ns: *ns as i32, ..Params::DEFAULT };
             let slot = Config::shipped(&params).map_err(|error| error.to_string())?.timing.slot;
             let hz = f64::from(CLOCKS.timer_hz) / (f64::from(slot.0) * SLOTS as f64);
-            let _ = writeln!(page, "| {ns} | {hz:.0} | {ms:.1} | {percent:.2} | {} |", cells(errors));
+            let _ = writeln!(page, "| {ns} | {hz:.0} | {ms:.1} | {percent:.2} | {} | {holds} |", cells(errors));
         }
         Ok(page + &formats(studied))
     }

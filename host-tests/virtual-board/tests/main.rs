@@ -14,6 +14,7 @@ mod image;
 mod injected_faults;
 mod measured;
 mod parameters;
+mod refused_writes;
 mod scenes;
 mod temperature;
 mod trace_pins;

@@ -1,4 +1,5 @@
-//! The microcontroller's temperature and the analogue supply as the board measures them while it runs.
+//! The microcontroller's temperature and the analogue supply as the board measures them while it runs, and the part of a
+//! held force's error that the temperature term removes.
 
 use crate::common::{image, poke, read_u16, read_u32, running, write_and_run_ms, write_goal, write_param, write_u8};
 use fingertip::chip::Factory;
@@ -6,8 +7,10 @@ use fingertip::params::Params;
 use fingertip::shipped::{Record, address};
 use sim::encode;
 use sim::plant::{Plant, Setup};
+use sim::run::run;
 use virtual_board::flash::SECTOR;
 use virtual_board::scene::finger::{Clock, Finger};
+use virtual_board::scene::simulate;
 use virtual_board::{Options, Rig, inside};
 
 const GAIN_PPM_PER_K: i32 = 3_600;
@@ -157,4 +160,28 @@ fn frames_shorter_than_the_three_conversions_find_the_supply_too() {
     }
     rig.check_gaps().expect("nothing starts before what is under way ends");
     assert!((chip_mc(&mut rig) - 25_000).abs() < 500);
+}
+
+/// Largest error of 3 N held through a hot hour, mN.
+fn error_mn(share: i32) -> f64 {
+    let keys = [
+        format!("controller.array_gain_ppm_per_k={}", GAIN_PPM_PER_K * share),
+        format!("controller.array_zero_pa_per_k={}", ZERO_PA_PER_K * share),
+        "duration_s=3.2".into(),
+        "effects.temperature_drift.time_constant_s=0.8".into(),
+    ];
+    let scene = sim::cli::load("hot_hour", &keys, None).unwrap_or_else(|error| panic!("{error}"));
+    let outcome = run(&scene, &|scene, watch| Ok(simulate(&image(), scene, watch)?), &mut []).expect("it runs");
+    assert_eq!(outcome.measured.get("faults_count"), Some(0.0));
+    outcome.measured.get("steady_error_max_mn").expect("it is held")
+}
+
+#[test]
+fn the_temperature_term_removes_most_of_the_error_of_a_hot_hour() {
+    let [without, with] = std::thread::scope(|scope| {
+        [0, 1].map(|share| scope.spawn(move || error_mn(share))).map(|run| run.join().expect("no panic"))
+    });
+    println!("without the term {without:.1} mN, with it {with:.1} mN");
+    assert!((225.0..250.0).contains(&without), "{without} mN");
+    assert!(with < 40.0, "{with} mN");
 }

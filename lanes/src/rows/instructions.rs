@@ -24,9 +24,9 @@ pub fn pass<const ROWS: usize, const COLUMNS: usize>(
     }
     let (first, second, running, largest, peak);
     // SAFETY: the rows have as many columns as the offsets suppose, and the codes begin on a word's border. Reads the
-    // codes, the rows and what is common, writes each row's boost and the taxels; the types hold their lengths and
-    // places, and the codes' end ends the loop. The stack is as it was at the end, and so are r6 and r7, which an
-    // operand cannot be. The flag that it can set (Q) is sticky and read nowhere.
+    // codes, the rows and what is common, writes each row's boost, nets and largest, and the taxels; the types hold
+    // their lengths and places, and the codes' end ends the loop. The stack is as it was at the end, and so are r6 and
+    // r7, which an operand cannot be. The flag that it can set (Q) is sticky and read nowhere.
     unsafe {
         core::arch::asm!(
             // The two columns of a pair, whose net codes are in `net`: sums, taxels, peak. The left one's tare goes to

@@ -130,6 +130,41 @@ fn a_pass_is_what_its_parts_say() {
     assert_eq!([(10, 10), (16, 16), (16, 32)].map(|(rows, columns)| sum_drop(rows, columns)), [0, 1, 2]);
 }
 
+/// With a curve: each taxel is the formula of its codes, the sums are those of the taxels, and the reading stays known.
+#[test]
+fn a_pass_with_a_curve_is_its_formula() {
+    fn curved<const ROWS: usize, const COLUMNS: usize>() {
+        const PERMILLE: u32 = 2_000;
+        let mut mix = Mix(7);
+        for _ in 0..50 {
+            let (codes, mut rows, common) = bench::<ROWS, COLUMNS>(&mut mix, false);
+            let (mut line, mut taxels) = ([[0; COLUMNS]; ROWS], [[0; COLUMNS]; ROWS]);
+            pass(&codes, &mut rows, &common, &mut line);
+            let total = pass(&codes, &mut rows, &Common { curve: Curve::new(PERMILLE), ..common }, &mut taxels);
+            let (mut first, mut second, mut running) = (0, 0, 0);
+            for ((row, line), taxels) in rows.iter().zip(line).zip(taxels) {
+                for (column, taxel) in taxels.into_iter().enumerate() {
+                    let tare = f64::from(row.tare[column]) / 65_536.0;
+                    assert_eq!(row.reading(column), line[column]);
+                    let formula = 16.0 * exact(PERMILLE, f64::from(line[column]) / 16.0, tare);
+                    let formula = formula.min(f64::from((1 << Curve::LARGEST_BITS) - 1));
+                    // The line is off by 1.6 sixteenths at most: its rounding, and its tare's cut. The curve's slope is 4.4 at most.
+                    assert!((f64::from(taxel) - formula).abs() < 7.0, "{taxel}, not {formula}");
+                    first += taxel;
+                    second += taxel * (2 * column as i32 + 1 - COLUMNS as i32);
+                }
+                running += first;
+            }
+            assert_eq!([total.first, total.second, total.running], [first, second, running]);
+        }
+    }
+    curved::<3, 3>();
+    curved::<3, 5>();
+    curved::<4, 4>();
+    curved::<10, 10>();
+    curved::<16, 32>();
+}
+
 #[test]
 fn a_half_of_the_array_at_the_top_fits() {
     fn upper<const ROWS: usize, const COLUMNS: usize>() {
@@ -152,7 +187,7 @@ fn a_half_of_the_array_at_the_top_fits() {
 fn exact(permille: u32, taxel: f64, tare: f64) -> f64 {
     let p = f64::from(permille) / 1_000.0;
     let least = 1.0 / (1.0 + p);
-    taxel * (least + least * p * ((taxel + tare).max(0.0) + tare) / 4_096.0)
+    taxel * (least + least * p * ((taxel + tare).max(0.0) + tare.max(0.0)) / 4_096.0)
 }
 
 #[test]

@@ -7,11 +7,11 @@ use sim::population::budget::Budget;
 use sim::population::whole_loop;
 use std::process::ExitCode;
 
-/// Says how much of the force's error each of the sensor's weaknesses makes at 0.5, 1 and 5 N.
+/// Says how much of the force's error each of the sensor's weaknesses makes at 0.5, 1, 2 and 5 N.
 #[derive(Debug, Parser)]
 #[command(name = "budget", version, after_help = "Examples:\n  budget --fingers 300")]
 struct Args {
-    /// Number of fingers, each run 14 times
+    /// Number of fingers, each run 14 times, for the whole loop 17 times
     #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u32).range(1..))]
     fingers: u32,
     /// Says instead how far the force is off at each fit level, and what other frame rates change, as words for a program

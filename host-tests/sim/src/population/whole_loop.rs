@@ -40,6 +40,8 @@ pub struct AtRate {
     pub rest_duty_percent: f64,
     /// Errors of the population at fit level 2, N.
     pub errors: Errors,
+    /// Holds that count: those without a fault.
+    pub holds: usize,
 }
 
 /// Runs the fingers at each fit level.
@@ -76,20 +78,22 @@ pub fn rates(fingers: usize) -> Result<Vec<AtRate>, RunError> {
         let off = each(fingers, |scene| Ok(off_n(&holds(&slower(scene)?, &native::board)?)))?;
         let [settling_ms, rest_duty_percent] =
             ["settling_ms", "rest_duty_percent"].map(|metric| measured.get(metric).unwrap_or(f64::NAN));
-        Ok(AtRate { settle_ns, settling_ms, rest_duty_percent, errors: rms(&off) })
+        let holds = off.iter().flatten().flatten().count();
+        Ok(AtRate { settle_ns, settling_ms, rest_duty_percent, errors: rms(&off), holds })
     };
     SETTLE_NS.into_iter().map(at).collect()
 }
 
-/// Returns the results as lines of words: `level L` or `rate NS MS PERCENT`, then the errors in mN.
+/// Returns the results as lines of words: `level L` or `rate NS MS PERCENT`, then the errors in mN; a rate
+/// ends with the number of holds without a fault.
 pub fn lines(fingers: usize) -> Result<String, RunError> {
     let mut text = String::new();
     let words = |errors: Errors| errors.map(|error_n| format!("{:.1}", 1e3 * error_n)).join(" ");
     for AtLevel { level, plain, calibrated } in levels(fingers)? {
         let _ = writeln!(text, "level {level} {} {}", words(plain), words(calibrated));
     }
-    for AtRate { settle_ns, settling_ms, rest_duty_percent, errors } in rates(fingers)? {
-        let _ = writeln!(text, "rate {settle_ns} {settling_ms:.1} {rest_duty_percent:.2} {}", words(errors));
+    for AtRate { settle_ns, settling_ms, rest_duty_percent, errors, holds } in rates(fingers)? {
+        let _ = writeln!(text, "rate {settle_ns} {settling_ms:.1} {rest_duty_percent:.2} {} {holds}", words(errors));
     }
     let _ = writeln!(text, "fingers {fingers}");
     let _ = writeln!(text, "goals {}", GOALS_N.map(|goal_n| goal_n.to_string()).join(" "));

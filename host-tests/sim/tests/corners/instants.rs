@@ -1,7 +1,7 @@
 //! One event at each of many instants of a press: torque off, goal 0, a fault of the bridge, a lost signal, a silent bus.
 //!
-//! Every 20th of the 2,000 instants is tried. `INSTANTS_STEP=1` tries all:
-//! `INSTANTS_STEP=1 cargo test -p sim --profile host --test corners instants -- --nocapture`
+//! Every 100th of the 500 instants of each press is tried, every 20th by `cargo xtask test --long`. `INSTANTS_STEP=1` tries
+//! all: `INSTANTS_STEP=1 cargo test -p sim --profile host --test corners instants -- --ignored --nocapture`
 
 use crate::{
     CONTACT_ON_N, Case, Finger, LOSSES, begun, force_n, judge, most_n, number, object, run_with, scene, set_goal, show,

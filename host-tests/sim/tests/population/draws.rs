@@ -4,7 +4,7 @@
 
 use crate::population;
 use sim::native;
-use sim::population::budget::{Budget, CAUSES};
+use sim::population::budget::{Budget, CAUSES, GOALS_N};
 use sim::population::{Drawn, Population, load};
 
 const FINGERS: usize = 4_000;
@@ -251,13 +251,13 @@ fn a_cause_that_nobody_drew_is_refused() {
 #[test]
 fn what_makes_the_force_wrong_is_larger_than_what_is_left() {
     let budget = Budget::of(1, &native::board, &native::calibrated::board).unwrap();
-    for goal in 0..3 {
+    for (goal, goal_n) in GOALS_N.into_iter().enumerate() {
         let largest = budget.changes.iter().map(|changes| changes[goal]).fold(0.0, f64::max);
         // The error of a finger comes from the variation of its parts, and the causes explain all of it.
-        assert!((0.02..0.25).contains(&(budget.all[goal] / [0.5, 1.0, 5.0][goal])), "{budget:?}");
+        assert!((0.02..0.25).contains(&(budget.all[goal] / goal_n)), "{budget:?}");
         assert!(largest > 10.0 * budget.none[goal] && budget.none[goal] > 0.0, "{budget:?}");
     }
-    assert!((1..3).all(|goal| budget.calibrated[goal] < 0.5 * budget.all[goal]), "{budget:?}");
+    assert!((1..GOALS_N.len()).all(|goal| budget.calibrated[goal] < 0.5 * budget.all[goal]), "{budget:?}");
     assert_eq!((budget.changes.len(), budget.left.len()), (CAUSES.len(), CAUSES.len()));
     let page = budget.page();
     assert!(CAUSES.iter().all(|cause| page.contains(cause.about)), "{page}");

@@ -395,7 +395,7 @@ impl Since {
 const TERMS: usize = 9;
 const TAUS_S: [f64; TERMS] = [1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4, 1e5];
 
-/// 1 - exp(-x) without cancellation at small x: a frame is 1e-8 of the slowest term. The series end at 4e-15 of the
+/// 1 - exp(-x) without cancellation at small x: a frame is 1e-8 of the slowest term. The series end at 4e-14 of the
 /// result.
 fn gone(x: f64) -> f64 {
     const THIRD: [f64; 2] = [1.0 / 3.0, 1.0 / 2.0];

@@ -72,7 +72,8 @@ impl WholeLoop {
         page += "\nFit level 2 is the default. Levels 3 to 5 refine the contact in 6, 3 and 1 frames instead of 11, and nothing measured here gains by it: \
                  the errors of the taxels limit the force.\n\n\
                  Frame rate: the demonstration's longest settling and its duty at rest, and the same fingers at fit level 2 as they come. The array is \
-                 slowed by its settle time; the cycles a second fall in proportion.\n\n\
+                 slowed by its settle time; the cycles a second fall in proportion. Why a slower loop holds the true force closer was not \
+                 examined.\n\n\
                  | settle, ns | frames a second | settling, ms | duty at rest, % | at 0.5 N, mN | 1 N | 2 N | 5 N | holds without a fault |\n\
                  | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
         for (ns, ms, percent, errors, holds) in &self.rates {

@@ -31,7 +31,7 @@ impl Finger {
         1.0 / f64::from(self.config.bounds.frames_per_s)
     }
 
-    /// Steps a frame with a voltage `beyond` the back-EMF of the speed, Q8 mm/s^2.
+    /// Advances the guard by a frame in which the g V given exceeds the back-EMF by `beyond`; both in Q8 mm/s^2.
     fn pushed(&mut self, beyond: i32) -> Option<Fault> {
         self.travel_mm += self.speed_mm_per_s * self.frame_s();
         let count_mm = self.config.mm_per_count_q40 as f64 / 2_f64.powi(40);

@@ -85,7 +85,11 @@ impl WholeLoop {
         Ok(page + &formats(studied))
     }
 
-    fn levels_table(&self, studied: &[Studied]) -> Result<String, String> {
+    /// Returns the table of the fit levels, which the README shows too.
+    ///
+    /// # Errors
+    /// The step was not studied at a fit level.
+    pub fn levels_table(&self, studied: &[Studied]) -> Result<String, String> {
         let mut table = String::from(
             "| fit level | cycles, median | with flash | max | as they come: at 0.5 N, mN | 1 N | 2 N | 5 N | calibrated: at 0.5 N, mN | 1 N | 2 N | 5 N |\n\
              | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
@@ -104,14 +108,6 @@ impl WholeLoop {
             );
         }
         Ok(table)
-    }
-
-    /// Returns the table of the README.
-    ///
-    /// # Errors
-    /// The step was not studied at a fit level.
-    pub fn readme(&self, studied: &[Studied]) -> Result<String, String> {
-        self.levels_table(studied)
     }
 
     /// Draws error over cycles.
@@ -164,10 +160,9 @@ fn formats(studied: &[Studied]) -> String {
         line(&format!("{bits} bits"), String::new(), rounded_error_kpa(bits));
     }
     for (_, points) in studied.iter().filter(|(kernel, _)| kernel.name == "pressure") {
-        for Point { name, firmware, error_max, .. } in points.iter().filter(|point| point.competes()) {
-            let bold = if *firmware { "**" } else { "" };
-            let cycles = points.iter().find(|point| point.name == *name).map_or(0, Point::cycles);
-            line(&format!("{bold}{name}{bold}"), cycles.to_string(), *error_max);
+        for point in points.iter().filter(|point| point.competes()) {
+            let bold = if point.firmware { "**" } else { "" };
+            line(&format!("{bold}{}{bold}", point.name), point.cycles().to_string(), point.error_max);
         }
     }
     page

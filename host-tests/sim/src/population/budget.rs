@@ -61,8 +61,10 @@ const fn cause(about: &'static str, names: &'static [&'static str], answer: &'st
 
 /// Root mean squares over all fingers for each goal, N.
 pub type Errors = [f64; GOALS_N.len()];
-/// Errors of each finger for each goal, N; none if a fault ended the hold.
-pub(super) type Off = Vec<[Option<f64>; GOALS_N.len()]>;
+/// Errors of a finger for each goal, N; none if a fault ended the hold.
+pub(super) type Held = [Option<f64>; GOALS_N.len()];
+/// Errors of each finger.
+pub(super) type Off = Vec<Held>;
 
 /// Errors with all causes, without each of them, and without all.
 #[derive(Clone, Debug)]
@@ -146,7 +148,7 @@ fn errors(fingers: &[Ran]) -> Off {
 }
 
 /// Errors of a finger's holds.
-pub(super) fn off_n(holds: &[Hold]) -> [Option<f64>; GOALS_N.len()] {
+pub(super) fn off_n(holds: &[Hold]) -> Held {
     GOALS_N.map(|goal_n| {
         let hold = holds.iter().find(|hold| hold.goal_n == goal_n && !hold.faulty)?;
         Some(hold.mean_n - goal_n)

@@ -398,13 +398,12 @@ const TAUS_S: [f64; TERMS] = [1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4, 1e5];
 /// 1 - exp(-x) without cancellation at small x: a frame is 1e-8 of the slowest term. The series end at 4e-14 of the
 /// result.
 fn gone(x: f64) -> f64 {
-    const THIRD: [f64; 2] = [1.0 / 3.0, 1.0 / 2.0];
-    const TENTH: [f64; 9] =
+    const SHARES: [f64; 9] =
         [1.0 / 10.0, 1.0 / 9.0, 1.0 / 8.0, 1.0 / 7.0, 1.0 / 6.0, 1.0 / 5.0, 1.0 / 4.0, 1.0 / 3.0, 1.0 / 2.0];
     let series = |shares: &[f64]| x * shares.iter().fold(1.0, |sum, share| 1.0 - x * share * sum);
     match x {
-        ..1e-4 => series(&THIRD),
-        ..0.125 => series(&TENTH),
+        ..1e-4 => series(&SHARES[7..]),
+        ..0.125 => series(&SHARES),
         _ => 1.0 - decay(x),
     }
 }

@@ -113,8 +113,11 @@ impl ControlTask {
 
     /// Restarts the scan when its fault is to be cleared, with torque off. The next frame clears the fault.
     fn find_frames(&mut self) {
+        if !self.lost {
+            return;
+        }
         let Command { torque, clear_request, .. } = HEARD.get().command;
-        if self.lost && clear_request != self.clear_seen && !torque {
+        if clear_request != self.clear_seen && !torque {
             self.clear_seen = clear_request;
             self.restart_scan();
         }

@@ -9,6 +9,7 @@ pub mod capture;
 pub mod clocks;
 pub mod control;
 pub mod crash;
+mod copy;
 pub mod encoder;
 pub mod exchange;
 pub mod flash;

@@ -116,10 +116,11 @@ impl Scan {
     /// DMA wrote to this half meanwhile.
     pub fn copy(&mut self, completed: Completed, frame: &mut Frame) -> bool {
         let half = completed.sequence as usize & 1;
-        let arrived = bank_a_completed(half) && !overrun() && in_step();
+        let arrived = bank_a_completed(half) && !overrun();
         copy_slots(half, SLOTS, frame);
         frame.sequence = completed.sequence;
         let untouched = [STREAM_A, STREAM_B].into_iter().all(|stream| written_half(stream) != half);
+        // Checked last: banks that are behind the rows stay behind.
         let whole = arrived && untouched && in_step() && newest() == completed;
         if !whole {
             health::note_broken(what_broke(half));
@@ -357,8 +358,7 @@ fn written_half(stream: usize) -> usize {
 /// Returns true if the codes belong to the rows under which they are stored.
 ///
 /// While slot n of a frame is set, each bank has completed n slots of this frame, or n + 1. A lost trigger leaves the
-/// banks behind the rows permanently; only a restart of the scan aligns them
-/// again.
+/// banks behind the rows permanently; only a restart of the scan aligns them again.
 fn in_step() -> bool {
     let slots = SLOTS as u16;
     // The count falls from `slots` to 1; twice that keeps the difference above 0.

@@ -187,7 +187,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         if !self.activity.fits() {
             self.fit.lose();
         }
-        self.budget.note(fits && self.fit.at_work());
+        self.budget.note(fits && self.fit.at_work() || matches!(self.activity, Activity::Tare { .. }));
         contact
     }
 

@@ -318,18 +318,18 @@ fn a_contact_that_comes_or_goes_begins_the_window_anew() {
     }
 }
 
-/// By the estimate: the start 2,100 cycles, a row 1,000, and the solution 1,600 where it falls into the same frame.
+/// By the estimate: a row 1,000 cycles, the solution 1,600, and the start 2,100 where it falls into the same frame.
 #[test]
-fn the_dearest_frame_is_the_start_and_the_rows_of_an_effort() {
-    for (fit_level, rows, solution) in [
+fn the_dearest_frame_is_the_last_rows_with_the_solution() {
+    for (fit_level, rows, start) in [
         (FitLevel::OneRow, 1, 0),
         (FitLevel::TwoRows, 2, 0),
         (FitLevel::FiveRows, 5, 0),
-        (FitLevel::AllRows, 10, 1_600),
+        (FitLevel::AllRows, 10, 2_100),
     ] {
         let [most, least] = Budget::model_cycles(fit_level);
-        assert_eq!(most, 2_100 + 1_000 * rows + solution, "{fit_level:?}");
-        assert!((most / 4..=most / 2).contains(&least), "{fit_level:?}: {least}");
+        assert_eq!(most, start + 1_000 * rows + 1_600, "{fit_level:?}");
+        assert!((most / 4..=most * 3 / 5).contains(&least), "{fit_level:?}: {least}");
     }
     assert_eq!([FitLevel::Sum, FitLevel::Moments].map(Budget::model_cycles), [[0; 2]; 2]);
 }

@@ -8,8 +8,8 @@ pub mod bus;
 pub mod capture;
 pub mod clocks;
 pub mod control;
-pub mod crash;
 mod copy;
+pub mod crash;
 pub mod encoder;
 pub mod exchange;
 pub mod flash;
@@ -29,10 +29,11 @@ pub mod watchdog;
 pub fn set_priorities() {
     for (interrupt, priority) in [
         (interrupt::TIM5, Priority::P0),
-        (interrupt::DMA2_STREAM1, Priority::P1),
         (interrupt::DMA2_STREAM2, Priority::P1),
         (interrupt::USART2, Priority::P1),
         (interrupt::SPI3, Priority::P2),
+        // Half of the rows: control's turn is not interrupted for it.
+        (interrupt::DMA2_STREAM1, Priority::P2),
         (interrupt::TIM2, Priority::P5),
         (interrupt::DMA1_STREAM5, Priority::P6),
         (interrupt::DMA1_STREAM6, Priority::P6),

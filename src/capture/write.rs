@@ -329,7 +329,7 @@ impl<'a> Writer<'a> {
     #[inline(never)]
     pub fn codes(&mut self, codes: &[u16], before: &[u16], width: u32) -> u32 {
         let width = width & 31;
-        let (mut sum, mask) = (0_u32, (1 << width) - 1);
+        let (mut sum, mask, more) = (0_u32, (1 << width) - 1, width + 1);
         let (mut held, mut filled) = (self.place.held, self.place.count);
         for (&code, &before) in codes.iter().zip(before) {
             let value = fold(code, before);
@@ -341,8 +341,9 @@ impl<'a> Writer<'a> {
                 (held, filled) = (self.place.held, self.place.count);
                 continue;
             }
-            let bits = (value & mask) << (ones + 1) | ((1 << ones) - 1);
-            let count = ones + 1 + width;
+            // The low bits, a 0, and as many ones, from the highest bit on.
+            let bits = ((2 * (value & mask) + 1) << ones) - 1;
+            let count = ones + more;
             held |= bits << (filled & 31);
             filled += count;
             if filled >= 32 {
@@ -400,6 +401,6 @@ pub(super) const fn mix(sum: u32, word: u32) -> u32 {
 /// Returns a difference of 16 bits, folded.
 #[inline(always)]
 pub(super) fn fold(value: u16, last: u16) -> u32 {
-    let difference = value.wrapping_sub(last).cast_signed();
-    (difference << 1 ^ difference >> 15).cast_unsigned().into()
+    let difference = i32::from(value.wrapping_sub(last).cast_signed());
+    (difference << 1 ^ difference >> 31).cast_unsigned()
 }

@@ -51,8 +51,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Budget<ROWS, COLUMNS> {
     ///
     /// Estimated cycles on a Cortex-M4F with the flash's wait states, all taxels under the contact, rounded up
     /// (`cargo xtask timing`, `docs/study.md`): with 10 x 10 taxels the start of a refinement takes at most 2,100,
-    /// its solution 1,600, a row 1,000. For other shapes a row is computed from its taxels, and the start from the
-    /// sum of both sides.
+    /// its solution 1,600, a row 1,000. A refinement that is spread over frames starts in a separate frame. For other
+    /// shapes a row is computed from its taxels, and the start from the sum of both sides.
     pub const fn model_cycles(fit_level: FitLevel) -> [u32; 2] {
         // A table that the compiler computes.
         Self::MODEL_CYCLES[fit_level as usize]
@@ -73,9 +73,15 @@ impl<const ROWS: usize, const COLUMNS: usize> Budget<ROWS, COLUMNS> {
         if rows == 0 {
             return [0, 0];
         }
-        let (start, row) = (1_700 + 20 * (ROWS + COLUMNS), 100 * COLUMNS);
-        let [solution, more] = if rows == ROWS { [1_600, 300] } else { [0, 0] };
-        [(start + rows * row + solution) as u32, (1_300 + rows * row / 5 + more) as u32]
+        let (start, taken) = (1_700 + 20 * (ROWS + COLUMNS), 100 * COLUMNS * rows);
+        let solved = taken + 1_600;
+        if rows == ROWS {
+            [(start + solved) as u32, (1_600 + taken / 5) as u32]
+        } else if start > solved {
+            [start as u32, (1_300 + taken / 5) as u32]
+        } else {
+            [solved as u32, (1_300 + taken / 5) as u32]
+        }
     }
 
     /// Part of a deadline that may be used: an eighth is left for what was never measured.
@@ -100,7 +106,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Budget<ROWS, COLUMNS> {
         self.fit_level
     }
 
-    /// Takes note if the present frame used the model.
+    /// Takes note if the present frame used the model, or is of a mode that never does: either takes no longer with it.
     pub fn note(&mut self, modelled: bool) {
         if modelled != self.modelled {
             self.modelled = modelled;

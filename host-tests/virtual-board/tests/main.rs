@@ -9,6 +9,7 @@ mod bus;
 mod capture;
 mod clients;
 mod common;
+mod corrected;
 mod fit_level;
 mod image;
 mod injected_faults;

@@ -1,10 +1,10 @@
 //! Prints `docs/porting.md` with its table of cores. The argument is a file with a line for each core, as `cargo xtask
-//! docs` writes it: name, target, flags, bytes, emulator and image, separated by tabs.
+//! docs` writes it: name, array, target, flags, bytes, emulator and image, separated by tabs.
 //!
 //! Fails if the digest of an emulated core differs from this machine's.
 
 use host_tests::{page::Page, program};
-use images::closed_loop;
+use images::closed_loop::{self, Ended};
 use sim::cores;
 use std::{collections::BTreeMap, env, error::Error, fmt::Write as _, fs, path::Path};
 
@@ -12,37 +12,42 @@ const PAGE: Page = Page { name: "docs/porting.md", tables: "cores", command: "ca
 
 fn main() -> Result<(), Box<dyn Error>> {
     let list = fs::read_to_string(env::args_os().nth(1).ok_or("usage: porting-page FILE")?)?;
-    let (host, _) = closed_loop::run(|finger, frame, sense, command| finger.step(frame, sense, command).0)?;
+    let host = BTreeMap::from([
+        ("6x4", here::<6, 4>(1_900)?),
+        ("10x10", here::<10, 10>(1_500)?),
+        ("16x16", here::<16, 16>(937)?),
+    ]);
     let mut table =
-        "| core | target | flags | DSP | FPU | instructions per frame, mean | largest | flash of the program |\n\
-        | --- | --- | --- | --- | --- | --- | --- | --- |\n"
+        "| core | taxels | target | flags | DSP | FPU | instructions per frame, mean | largest | true force held, mN | flash of the program |\n\
+        | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
             .to_owned();
     let mut lines = Vec::new();
     for line in list.lines() {
-        let [name, target, flags, bytes, emulator, image] = line.split('\t').collect::<Vec<_>>()[..] else {
-            return Err(format!("not a line of six columns: {line}").into());
+        let [name, array, target, flags, bytes, emulator, image] = line.split('\t').collect::<Vec<_>>()[..] else {
+            return Err(format!("not a line of seven columns: {line}").into());
         };
-        lines.push([name, target, flags, bytes, emulator, image]);
+        lines.push([name, array, target, flags, bytes, emulator, image]);
     }
-    let texts = cores::map(&lines, |[name, target, _, _, emulator, image]| {
+    let texts = cores::map(&lines, |[name, _, target, _, _, emulator, image]| {
         program::run_on(emulator, Path::new(image), Path::new("."), &[])
             .map_err(|error| format!("{name}, {target}: {error}"))
     });
-    for ([name, target, flags, bytes, ..], text) in lines.into_iter().zip(texts) {
+    for ([name, array, target, flags, bytes, ..], text) in lines.into_iter().zip(texts) {
         let text = text?;
         let report: BTreeMap<_, _> = text.lines().filter_map(|line| line.split_once(' ')).collect();
         let figure = |name| report.get(name).copied().ok_or_else(|| format!("{target} reported no {name}:\n{text}"));
         let emulated = figure("digest")?;
-        if emulated != format!("{host:016x}") {
+        let Ended { digest, true_mn, .. } = host[array];
+        if emulated != format!("{digest:016x}") {
             return Err(
-                format!("FAILED: {name}, {target}: digest {emulated}, and this machine's is {host:016x}").into()
+                format!("FAILED: {name}, {target}: digest {emulated}, and this machine's is {digest:016x}").into()
             );
         }
         let used = |name| figure(name).map(|used| if used == "1" { "yes" } else { "no" });
         let flags = if flags.is_empty() { "default".into() } else { format!("`{flags}`") };
         writeln!(
             table,
-            "| {name} | `{target}` | {flags} | {} | {} | {} | {} | {bytes} bytes |",
+            "| {name} | {array} | `{target}` | {flags} | {} | {} | {} | {} | {true_mn} | {bytes} bytes |",
             used("dsp")?,
             used("fpu")?,
             figure("instructions_mean")?,
@@ -51,4 +56,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     print!("{}", PAGE.renewed(&table)?.1);
     Ok(())
+}
+
+/// Results of the loop on this machine.
+fn here<const ROWS: usize, const COLUMNS: usize>(pitch_um: u32) -> Result<Ended, &'static str> {
+    closed_loop::run::<ROWS, COLUMNS>(pitch_um, |finger, frame, sense, command| finger.step(frame, sense, command).0)
 }

@@ -23,27 +23,44 @@ const WHY: &str = "running the loop on emulated cores";
 /// A core, how the image is built for it, and what runs the image.
 struct Core {
     name: &'static str,
+    /// Rows and columns of the array.
+    array: &'static str,
     target: &'static str,
     flags: &'static [&'static str],
     /// QEMU's board.
     board: &'static str,
 }
 
-const CORES: [Core; 9] = [
-    Core { name: "Cortex-M0", target: "thumbv6m-none-eabi", flags: &[], board: "microbit" },
-    Core { name: "Cortex-M3", target: "thumbv7m-none-eabi", flags: &[], board: "mps2-an385" },
-    Core { name: "Cortex-M4", target: "thumbv7em-none-eabi", flags: &[], board: "mps2-an386" },
-    Core { name: "Cortex-M4F", target: TARGET, flags: &[], board: "netduinoplus2" },
-    Core { name: "Cortex-M33", target: "thumbv8m.main-none-eabi", flags: &[], board: "mps2-an505" },
-    Core { name: "Cortex-M33F", target: "thumbv8m.main-none-eabihf", flags: &[], board: "mps2-an505" },
+const CORES: [Core; 11] = [
+    Core { name: "Cortex-M0", array: "6x4", target: "thumbv6m-none-eabi", flags: &[], board: "microbit" },
+    Core { name: "Cortex-M3", array: "6x4", target: "thumbv7m-none-eabi", flags: &[], board: "mps2-an385" },
+    Core { name: "Cortex-M4", array: "6x4", target: "thumbv7em-none-eabi", flags: &[], board: "mps2-an386" },
+    Core { name: "Cortex-M4F", array: "6x4", target: TARGET, flags: &[], board: "netduinoplus2" },
+    Core { name: "Cortex-M33", array: "6x4", target: "thumbv8m.main-none-eabi", flags: &[], board: "mps2-an505" },
+    Core { name: "Cortex-M33F", array: "6x4", target: "thumbv8m.main-none-eabihf", flags: &[], board: "mps2-an505" },
     Core {
         name: "Cortex-M33F",
+        array: "6x4",
         target: "thumbv8m.main-none-eabihf",
         flags: &["-Ctarget-cpu=cortex-m33"],
         board: "mps2-an505",
     },
-    Core { name: "RV32IMC", target: "riscv32imc-unknown-none-elf", flags: &[], board: "virt" },
-    Core { name: "RV32IMAC", target: "riscv32imac-unknown-none-elf", flags: &[], board: "virt" },
+    Core {
+        name: "Cortex-M4F",
+        array: "10x10",
+        target: TARGET,
+        flags: &["--cfg=array=\"10x10\""],
+        board: "netduinoplus2",
+    },
+    Core {
+        name: "Cortex-M4F",
+        array: "16x16",
+        target: TARGET,
+        flags: &["--cfg=array=\"16x16\""],
+        board: "netduinoplus2",
+    },
+    Core { name: "RV32IMC", array: "6x4", target: "riscv32imc-unknown-none-elf", flags: &[], board: "virt" },
+    Core { name: "RV32IMAC", array: "6x4", target: "riscv32imac-unknown-none-elf", flags: &[], board: "virt" },
 ];
 
 impl Core {
@@ -92,8 +109,9 @@ pub fn page(choice: Choice, console: &mut Console) -> Result<String> {
         // A string takes every write.
         let _ = writeln!(
             list,
-            "{}\t{}\t{}\t{bytes}\t{}\t{}",
+            "{}\t{}\t{}\t{}\t{bytes}\t{}\t{}",
             core.name,
+            core.array,
             core.target,
             core.flags.join(" "),
             core.emulator(),

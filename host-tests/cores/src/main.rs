@@ -6,7 +6,7 @@
 #![no_main]
 
 use core::hint::black_box;
-use images::closed_loop::{FRAMES, run};
+use images::closed_loop::{Ended, FRAMES, run};
 use semihosting::{print, println, process};
 
 #[cfg(target_arch = "arm")]
@@ -17,6 +17,15 @@ use riscv_rt::entry;
 /// Instructions of the loop that measures the length of a tick.
 const LOOP_INSTRUCTIONS: u32 = 100_000;
 
+/// Rows, columns, and the distance between two taxels in um. The flags of the build choose the larger arrays.
+const ARRAY: (usize, usize, u32) = if cfg!(array = "16x16") {
+    (16, 16, 937)
+} else if cfg!(array = "10x10") {
+    (10, 10, 1_500)
+} else {
+    (6, 4, 1_900)
+};
+
 #[entry]
 fn main() -> ! {
     counter::start();
@@ -24,15 +33,15 @@ fn main() -> ! {
     let loop_ticks = u64::from(loop_ticks - empty_ticks);
     let instructions = |ticks: u64| ticks * u64::from(LOOP_INSTRUCTIONS) / loop_ticks;
     let (mut total, mut max) = (0_u64, 0);
-    let ended = run(|finger, frame, sense, command| {
+    let ended = run::<{ ARRAY.0 }, { ARRAY.1 }>(ARRAY.2, |finger, frame, sense, command| {
         let mut duty = None;
         let ticks = counter::ticks(|| duty = Some(black_box(finger.step(frame, sense, command).0))) - empty_ticks;
         total += u64::from(ticks);
         max = max.max(ticks);
         duty.unwrap_or_default()
     });
-    let Ok((digest, force_mn)) = ended else { panic!("the parameters are refused") };
-    print!("digest {:08x}{:08x}\nforce_mn {force_mn}\n", (digest >> 32) as u32, digest as u32);
+    let Ok(Ended { digest, true_mn, .. }) = ended else { panic!("the parameters are refused") };
+    print!("digest {:08x}{:08x}\ntrue_mn {true_mn}\n", (digest >> 32) as u32, digest as u32);
     println!("instructions_mean {}", instructions(total) / u64::from(FRAMES));
     println!("instructions_max {}", instructions(max.into()));
     println!("dsp {}\nfpu {}", u32::from(lanes::DSP), u32::from(lanes::FPU));

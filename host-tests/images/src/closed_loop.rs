@@ -1,7 +1,7 @@
 //! The closed loop of the crate's example in integers, so that it is the same on every core: a finger touches a plate
 //! and holds a force.
 //!
-//! The array is small enough for a microcontroller with 16 KB of RAM.
+//! The smallest array fits a microcontroller with 16 KB of RAM.
 
 use crate::record::Digest;
 use fingertip::arith::floor_sqrt;
@@ -13,40 +13,46 @@ use fingertip::pipeline::{Pipeline, Taring};
 use fingertip::shipped::CLOCKS;
 use fingertip::units::{Duty, Millimetres};
 
-/// Rows of the array.
-pub const ROWS: usize = 6;
-/// Columns of the array.
-pub const COLUMNS: usize = 4;
 /// Frames of a run: 1 s at 10 kHz.
 pub const FRAMES: u32 = 10_000;
-/// Distance between two taxels.
-const PITCH_UM: u32 = 1_900;
 /// Distance from the tip to the plate.
 const PLATE_MM: i64 = 1;
 /// Travel per millimetre. At 10 kHz a speed in nm/s is a travel per frame in this unit.
 const TRAVEL_PER_MM: i64 = 10_000_000_000;
 
-/// Runs the loop and returns its digest and the force at its end, mN. `step` makes each step of the pipeline.
+/// Results of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ended {
+    /// Digest of every duty and status.
+    pub digest: u64,
+    /// Contact force at the end as the finger reports it, mN.
+    pub force_mn: i32,
+    /// True contact force at the end, mN.
+    pub true_mn: i32,
+}
+
+/// Runs the loop with taxels `pitch_um` apart. `step` makes each step of the pipeline.
 ///
 /// # Errors
 /// The parameters are refused.
-pub fn run(
+pub fn run<const ROWS: usize, const COLUMNS: usize>(
+    pitch_um: u32,
     mut step: impl FnMut(&mut Pipeline<ROWS, COLUMNS>, &Frame<ROWS, COLUMNS>, &Sense, &Command) -> Duty,
-) -> Result<(u64, i32), &'static str> {
-    let params = Params { pitch_um: PITCH_UM as i32, ..crate::CONFIRMED };
+) -> Result<Ended, &'static str> {
+    let params = Params { pitch_um: pitch_um.cast_signed(), ..crate::CONFIRMED };
     let config = Shaped::<ROWS, COLUMNS>::new(&params, &CLOCKS).map_err(|_| "the parameters are refused")?;
     let mut finger = Pipeline::new(&config);
     let mut digest = Digest::new();
     let mut command = Command { tare_request: 1, ..Command::default() };
-    let (mut travel, mut speed_nm_per_s) = (0_i64, 0_i32);
+    let (mut travel, mut speed_nm_per_s, mut depth) = (0_i64, 0_i32, Millimetres::ZERO);
     for sequence in 1..=FRAMES {
-        let depth = depth_q24((travel - PLATE_MM * TRAVEL_PER_MM).max(0));
+        depth = depth_q24((travel - PLATE_MM * TRAVEL_PER_MM).max(0));
         let mut frame = Frame { sequence, ..Frame::EMPTY };
         for (slot, column) in (0..=ROWS).flat_map(|slot| (0..COLUMNS).map(move |column| (slot, column))) {
             let mut code = 372;
             if slot < ROWS {
                 let half_pitches = |place: usize, count: usize| (2 * place as i32 + 1 - count as i32).unsigned_abs();
-                let [x, y] = [half_pitches(column, COLUMNS), half_pitches(slot, ROWS)].map(|n| u64::from(n * PITCH_UM));
+                let [x, y] = [half_pitches(column, COLUMNS), half_pitches(slot, ROWS)].map(|n| u64::from(n * pitch_um));
                 // Twice the distance in um, with 8 bits of fraction.
                 let twice_um_q8 = floor_sqrt((x * x + y * y) << 16);
                 let distance = Millimetres::from_bits((i64::from(twice_um_q8) * (1 << 15) / 1_000) as i32);
@@ -65,8 +71,9 @@ pub fn run(
         command.torque = finger.status().tare == Taring::Done;
         command.goal = newtons(1_000);
     }
-    let force = i64::from(finger.status().contact.force.to_bits());
-    Ok((digest.value(), ((force * 1_000) >> 16) as i32))
+    let [force_mn, true_mn] = [finger.status().contact.force, config.tip.force(depth)]
+        .map(|force| ((i64::from(force.to_bits()) * 1_000) >> 16) as i32);
+    Ok(Ended { digest: digest.value(), force_mn, true_mn })
 }
 
 /// A travel in millimetres.
@@ -80,13 +87,13 @@ mod tests {
 
     #[test]
     fn it_holds_the_goal() {
-        let (digest, force_mn) = run(|finger, frame, sense, command| finger.step(frame, sense, command).0).unwrap();
-        assert!((980..1_020).contains(&force_mn), "{force_mn} mN");
-        let spoilt = run(|finger, frame, sense, command| {
+        let ended = run::<6, 4>(1_900, |finger, frame, sense, command| finger.step(frame, sense, command).0).unwrap();
+        assert!((980..1_020).contains(&ended.force_mn), "{ended:?}");
+        let spoilt = run::<6, 4>(1_900, |finger, frame, sense, command| {
             let mut frame = *frame;
             frame.set_code(0, 0, frame.code(0, 0) + u16::from(frame.sequence == 9_000));
             finger.step(&frame, sense, command).0
         });
-        assert_ne!(spoilt, Ok((digest, force_mn)), "the digest sees one bit");
+        assert_ne!(spoilt, Ok(ended), "the digest sees one bit");
     }
 }

@@ -1,11 +1,11 @@
 //! Arguments that constructors refuse: each error names the parameter, its value and its range.
 
+use crate::common::*;
 use fingertip::config::ConfigError;
 use fingertip::model::Tip;
-use fingertip::params::{ParamError, Params};
+use fingertip::params::ParamError;
 use fingertip::scan::{ScanError, ScanTiming};
-use fingertip::shipped::{CLOCKS, Config};
-use fingertip::units::{Kilopascals, Millimetres};
+use fingertip::units::Kilopascals;
 use paper::units::Ratio;
 use paper::{Relaxation, RelaxationError, RelaxationTerm};
 

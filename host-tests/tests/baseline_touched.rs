@@ -1,23 +1,10 @@
 //! An object that touches a released tip, moved by another finger for example: the baseline must not learn its force,
 //! as the next press would be too hard by that force.
 
-use fastrand::Rng;
-use fingertip::command::Command;
-use fingertip::config::newtons;
-use fingertip::frame::Sense;
-use fingertip::measure::Task;
-use fingertip::params::Params;
-use fingertip::pipeline::Taring;
-use fingertip::pressure::GAIN_ONE;
-use fingertip::shipped::{COLUMNS, Calibration, Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
-use fingertip::state::{Limits, Mode};
-use host_tests::finger::config;
+use crate::common::*;
 use sim::effects::{Named, Set};
 use sim::mechanics::pressures::Cell;
-use sim::native::bench::Bench;
-use sim::plant::Taxel;
 use sim::scene::{Scene, read};
-use sim::setup::Setup;
 
 /// Presses with 1 N and releases; after a time the object is pushed into the tip by a depth for 5 s and taken away;
 /// then the next press has a goal of 1 N. Returns the array's reading at the end of the touch, the true force then, and

@@ -1,11 +1,7 @@
 //! Commands to the bridge in each mode, and in the middle of the scan of a frame.
 
-use fingertip::config::newtons;
-use fingertip::pipeline::{Bridge, Status};
-use fingertip::shipped::Frame;
-use fingertip::state::{Fault, Mode};
-use fingertip::units::Duty;
-use sim::native::bench::Bench;
+use crate::common::*;
+use fingertip::pipeline::Bridge;
 
 /// Ends of a grip.
 type End = fn(&mut Bench);

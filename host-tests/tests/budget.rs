@@ -1,10 +1,8 @@
 //! Budget of the loop's time, for any distribution of the frames' times.
 
-use fingertip::contact::FitLevel;
+use crate::common::*;
 use fingertip::pipeline::budget::{WAIT_MAX, WINDOW};
 use fingertip::shipped::Budget;
-use fingertip::units::CoreCycles;
-use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
 /// Three quarters of a frame at 10 kHz, ticks.

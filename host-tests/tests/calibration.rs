@@ -1,11 +1,8 @@
 //! Gains and masks of single taxels.
 
-use fingertip::command::Command;
-use fingertip::pressure::{CalibrationError, GAIN_MAX, GAIN_ONE};
-use fingertip::shipped::{COLUMNS, Calibration, Frame, Pipeline, ROWS, TARE_FRAMES};
-use fingertip::state::Mode;
-use host_tests::finger::{config, tared};
-use sim::plant::{Plant, Setup};
+use crate::common::*;
+use fingertip::pressure::{CalibrationError, GAIN_MAX};
+use host_tests::finger::tared;
 
 const GAINS: [[u16; COLUMNS]; ROWS] = [[GAIN_ONE; COLUMNS]; ROWS];
 

@@ -1,24 +1,9 @@
 //! Captures in the core: kept frames come back to the bit, damage is reported, and a replay finds differences.
 
+use crate::common::*;
 use fingertip::capture::{Capture, CaptureState, Ended};
-use fingertip::command::Command;
-use fingertip::config::newtons;
-use fingertip::contact::FitLevel;
-use fingertip::frame::Sense;
-use fingertip::measure::Task;
-use fingertip::params::Params;
-use fingertip::pipeline::Status;
-use fingertip::pressure::GAIN_ONE;
-use fingertip::scan::Clocks;
-use fingertip::shipped::{CLOCKS, COLUMNS, Calibration, Frame, Gains, Pipeline, ROWS, SLOTS, TARE_FRAMES, TAXELS};
-use fingertip::state::{Fault, Mode};
-use fingertip::units::{Celsius, CoreCycles, Duty, Newtons};
-use host_tests::finger::config;
-use images::record::Record;
-use proptest::prelude::*;
+use fingertip::shipped::Gains;
 use replay::{Field, Frames, ReplayError, replay};
-use sim::native::bench::Bench;
-use sim::setup::Setup;
 
 // A finger that is captured from its tare on.
 

@@ -1,11 +1,8 @@
 //! Uncertainty of a force of which only a lower bound is known: by the sums, by a fit, and from frame to frame.
 
+use crate::common::*;
 use core::f64::consts::PI;
-use fastrand::Rng;
-use fingertip::contact::{Contact, FitLevel, from_sums};
-use fingertip::shipped::{Fit, ROWS, TactileImage};
-use fingertip::units::Millimetres;
-use host_tests::finger::config;
+use fingertip::contact::from_sums;
 use host_tests::fit_cases::{Noise, Object, Reading, Scene, Steps};
 
 const NONE: [u32; ROWS] = [0; ROWS];

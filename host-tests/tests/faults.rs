@@ -1,10 +1,7 @@
 //! Each fault natively: found in time, latched, and cleared only with torque off.
 
-use fingertip::config::newtons;
-use fingertip::pipeline::Status;
-use fingertip::state::{Fault, Limits, Mode};
-use sim::native::bench::Bench;
-use sim::plant::{Faults, Row, Setup, Taxel};
+use crate::common::*;
+use sim::plant::{Faults, Row};
 
 fn holding(goal_mn: i32) -> Bench {
     let mut board = Bench::default();

@@ -1,14 +1,10 @@
 //! The contact from pictures: the named hard cases, and small samples of what `cargo xtask fit` judges at length.
 
-use fingertip::contact::{CONFIDENCE_LEAST, Contact, FitLevel, from_sums};
-use fingertip::params::Params;
-use fingertip::shipped::{COLUMNS, Config, Fit, ROWS, TactileImage};
-use fingertip::units::{Millimetres, Newtons};
-use host_tests::finger::config;
+use crate::common::*;
+use fingertip::contact::{CONFIDENCE_LEAST, from_sums};
 use host_tests::fit_cases::{Noise, Object, Reading, Scene, Steps, picture};
 use host_tests::fit_statistics::{BAD, CUT_MIN, FRAMES, GOOD, Judged, Outcome, Series, WAYS, judge, quantile};
 use images::single::{Refined, read};
-use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
 /// A converter that gives its smallest and its largest code, in sixteenths.

@@ -1,16 +1,9 @@
 //! The work of a fit, spread over frames: begin and end of a refinement, and the force that it follows meanwhile.
 
-use fastrand::Rng;
-use fingertip::command::Command;
-use fingertip::contact::{CONFIDENCE_LEAST, Contact, FitLevel, from_sums};
-use fingertip::frame::Sense;
-use fingertip::params::Params;
-use fingertip::pipeline::Status;
-use fingertip::shipped::{Config, Fit, Frame, Pipeline, ROWS, TARE_FRAMES, TactileImage};
-use host_tests::finger::config;
+use crate::common::*;
+use fingertip::contact::{CONFIDENCE_LEAST, from_sums};
 use host_tests::fit_cases::{Noise, Object, Reading, Scene, Steps};
 use images::single::{Refined, read};
-use sim::plant::{Plant, Setup};
 
 const NONE: [u32; ROWS] = [0; ROWS];
 /// FitLevels that take the model, and the frames of a refinement.

@@ -1,12 +1,6 @@
 //! The loop natively: touch, steps, release. The same bounds hold for the flash image on the virtual board.
 
-use fingertip::config::newtons;
-use fingertip::params::Params;
-use fingertip::pipeline::Status;
-use fingertip::shipped::Config;
-use fingertip::state::{Fault, Limits, Mode};
-use sim::native::bench::Bench;
-use sim::setup::Setup;
+use crate::common::*;
 
 fn board() -> Bench {
     let mut board = Bench::default();

@@ -1,10 +1,9 @@
 //! The pass over a frame, which works on rows, against the same taxel by taxel: any codes, gains, masks and tares.
 
-use fingertip::params::Params;
+use crate::common::*;
 use fingertip::pressure::{CODE_BITS, GAIN_MAX, TARE_BITS};
-use fingertip::shipped::{Array, COLUMNS, Calibration, Config, Frame, ROWS, TARE_FRAMES, TactileImage};
+use fingertip::shipped::Array;
 use host_tests::finger::tared;
-use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
 /// Codes above the column's level, or any codes.

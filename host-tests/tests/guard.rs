@@ -1,13 +1,8 @@
 //! The guard alone, against arbitrary frames, senses and duties: its promises hold whatever the loop, the array and the
 //! host do.
 
-use fastrand::Rng;
-use fingertip::config::newtons;
-use fingertip::params::Params;
+use crate::common::*;
 use fingertip::safety::guard::{Guard, Seen};
-use fingertip::shipped::Config;
-use fingertip::state::{Fault, Limits};
-use fingertip::units::{Duty, Newtons};
 
 /// Steps over all cases of a test.
 const STEPS: u32 = 10_000_000;

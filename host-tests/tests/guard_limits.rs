@@ -1,11 +1,7 @@
 //! Limits at which the guard begins to hold back, each from both sides.
 
-use fingertip::config::newtons;
-use fingertip::params::Params;
+use crate::common::*;
 use fingertip::safety::guard::{Guard, Seen};
-use fingertip::shipped::Config;
-use fingertip::state::{Fault, Limits};
-use fingertip::units::{Duty, Newtons};
 
 /// A guard and where the tip is, moved as a motor would that just makes the speed.
 struct Finger {

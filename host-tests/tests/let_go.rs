@@ -1,13 +1,8 @@
 //! A goal of 0 releases the object, whatever happened before.
 
-use fingertip::config::newtons;
-use fingertip::measure::{MeasureState, Task};
-use fingertip::state::Mode;
-use host_tests::finger::config;
+use crate::common::*;
 use sim::effects::{Named, Set};
-use sim::native::bench::Bench;
 use sim::scene::read;
-use sim::setup::Setup;
 
 /// Speed of an object that is carried.
 const CARRIED_MM_PER_S: f64 = 5.0;

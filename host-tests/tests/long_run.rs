@@ -1,10 +1,7 @@
 //! Filters and integrators in the loop over 10^9 steps, by their cycles; `long-run` also takes the steps one by one.
 
-use fastrand::Rng;
+use crate::common::*;
 use fingertip::control::Observer;
-use fingertip::params::Params;
-use fingertip::shipped::Config;
-use fingertip::state::{Fault, Mode};
 use host_tests::long_run::{Cycle, Machine, all, cycle, hold};
 
 #[test]

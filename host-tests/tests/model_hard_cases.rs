@@ -1,8 +1,8 @@
 //! The model's hard cases, one test each.
 
+use crate::common::*;
 use fingertip::model::{MODULUS_MAX, MODULUS_MIN, RADIUS_MAX, RADIUS_MIN, Tip, TipError};
-use fingertip::units::{Kilopascals, Millimetres};
-use host_tests::finger::config;
+use fingertip::units::Kilopascals;
 use host_tests::prove::exact;
 use host_tests::prove::random::{boundary_distances, boundary_tips, mm, newtons, reference_tip};
 use host_tests::prove::reference::{Reference, error_ulp, real};

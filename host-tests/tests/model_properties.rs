@@ -1,14 +1,14 @@
 //! Properties of any tip and any input: order, inverses, energy, quadrature, totality.
 
+use crate::common::*;
 use core::num::NonZeroU16;
 use fingertip::model::{MODULUS_MAX, MODULUS_MIN, RADIUS_MAX, RADIUS_MIN, Tip};
-use fingertip::units::{Kilopascals, Millimetres, Newtons};
+use fingertip::units::Kilopascals;
 use host_tests::prove::random::{mm, newtons, reference_tip};
 use host_tests::prove::tally::Tally;
 use host_tests::prove::{beyond, exhaustive, random, reference};
 use paper::units::{NewtonMillimetres, Radians, Ratio, SquareMillimetres};
 use paper::{Displacement, Relaxation, RelaxationState, RelaxationTerm, force_on, pressure_of, strain_of};
-use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use std::io::Write;
 use std::process::{Command, Output, Stdio};

@@ -1,17 +1,9 @@
 //! The monitor by itself: each limit on both sides, and for how many frames.
 
-use fingertip::command::Command;
-use fingertip::config::newtons;
-use fingertip::contact::Contact;
-use fingertip::control::SpeedLoop;
-use fingertip::frame::Sense;
-use fingertip::pressure::GAIN_ONE;
+use crate::common::*;
 use fingertip::safety::monitor::{Monitor, MonitorInputs, array_broken, array_sound};
-use fingertip::shipped::{COLUMNS, Calibration, Frame, ROWS, TactileImage};
-use fingertip::state::Fault;
-use fingertip::units::{Millimetres, MillimetresPerSecond2, Newtons};
-use host_tests::finger::{config, tared};
-use sim::plant::{Plant, Setup};
+use fingertip::units::MillimetresPerSecond2;
+use host_tests::finger::tared;
 
 /// Readings of a sound finger that presses with 1 N.
 #[derive(Clone, Copy)]

@@ -1,6 +1,6 @@
 //! All that the pages tell a reader to run or to open exists: commands with their flags, files, links and anchors.
 
-use fingertip::units::Millimetres;
+use crate::common::*;
 use host_tests::figures::{Modulus, PITCH_MM, all, fit, readings, seen, tip};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

@@ -1,18 +1,10 @@
 //! Requests in the loop: all requests of one frame are executed, and refused ones are reported. Also the first frame
 //! with torque.
 
-use fingertip::config::newtons;
-use fingertip::contact::Contact;
-use fingertip::measure::{Ended, MeasureState, MeasureStatus, Task};
-use fingertip::params::Params;
-use fingertip::pipeline::{Bridge, Taring};
+use crate::common::*;
+use fingertip::measure::MeasureStatus;
+use fingertip::pipeline::Bridge;
 use fingertip::pressure::TARE_BITS;
-use fingertip::shipped::{Calibration, Config, TARE_FRAMES};
-use fingertip::state::{Fault, Limits, Mode};
-use host_tests::finger::config;
-use images::record::Record;
-use sim::native::bench::Bench;
-use sim::plant::{Setup, Taxel};
 
 const NOT_READY: MeasureStatus = MeasureStatus::over(Task::Press, Ended::NotReady, 0);
 const RUNNING: MeasureStatus = MeasureStatus::running(Task::Press);

@@ -1,10 +1,7 @@
 //! Functions that are compared between processors: every public function of the model, over its whole domain, and more
 //! than refusals.
 
-use fingertip::pipeline::Status;
-use fingertip::shipped::Pipeline;
-use fingertip::state::{Fault, Mode};
-use host_tests::finger::config;
+use crate::common::*;
 use host_tests::prove::random::reference_tip;
 use host_tests::stimulus;
 use host_tests::study::inputs::Inputs;

@@ -1,15 +1,12 @@
 //! From codes to contact: the plant's electrical model against the readings of the core.
 
+use crate::common::*;
 use fingertip::config::ConfigError;
-use fingertip::contact::{Contact, from_sums};
-use fingertip::params::Params;
-use fingertip::pressure::{GAIN_ONE, TARE_BITS};
-use fingertip::shipped::{Array, COLUMNS, Calibration, Config, Frame, ROWS, SLOTS, TARE_FRAMES};
+use fingertip::contact::from_sums;
+use fingertip::pressure::TARE_BITS;
+use fingertip::shipped::Array;
 use fingertip::touch::Touch;
-use fingertip::units::Newtons;
-use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use sim::plant::{Plant, Setup};
 
 struct Bench {
     world: Plant,

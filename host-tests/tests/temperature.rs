@@ -1,18 +1,9 @@
 //! Compensation of the array's drift with the microcontroller's temperature: result, bounds, and off at 0.
 
+use crate::common::*;
 use fingertip::chip::{Chip, FRAMES, Factory};
-use fingertip::command::Command;
-use fingertip::config::newtons;
 use fingertip::control::{Creep, TemperatureDrift};
-use fingertip::params::Params;
-use fingertip::shipped::{Config, TARE_FRAMES};
-use fingertip::state::{Fault, Mode};
-use fingertip::units::{Celsius, Newtons};
-use images::record::Record;
-use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use sim::native::bench::Bench;
-use sim::setup::Setup;
 
 fn config(array_gain_ppm_per_k: i32, array_zero_pa_per_k: i32) -> Config {
     Config::shipped(&Params { array_gain_ppm_per_k, array_zero_pa_per_k, ..images::CONFIRMED }).unwrap()

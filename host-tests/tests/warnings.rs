@@ -1,15 +1,10 @@
 //! Questionable configurations: the warnings, and the pitch limit, which must separate good fits from bad ones.
 
-use fingertip::command::Command;
-use fingertip::config::{Shaped, Warning, newtons};
-use fingertip::contact::FitLevel;
+use crate::common::*;
+use fingertip::config::{Shaped, Warning};
 use fingertip::fixed::types::I8F24;
-use fingertip::frame::{Frame, Sense};
-use fingertip::params::Params;
+use fingertip::frame::Frame;
 use fingertip::pipeline::Pipeline;
-use fingertip::scan::Clocks;
-use fingertip::shipped::CLOCKS;
-use fingertip::units::Millimetres;
 
 fn warned(params: Params) -> Vec<Warning> {
     Shaped::<10, 10>::new(&params, &CLOCKS).unwrap().warnings().collect()

@@ -1,15 +1,9 @@
 //! The winding's temperature as the controller has it: bounded, never lower than that of the builds it covers, and what
 //! it does to the current.
 
-use fingertip::config::newtons;
-use fingertip::control::{SpeedLoop, Winding};
-use fingertip::params::Params;
-use fingertip::shipped::Config;
-use fingertip::state::{Limits, Mode};
-use proptest::prelude::*;
+use crate::common::*;
+use fingertip::control::Winding;
 use proptest::test_runner::RngSeed;
-use sim::native::bench::Bench;
-use sim::setup::Setup;
 
 /// Parameters with the thermal lag of a winding only, of a small motor: enough for these tests.
 const QUICK: Params = Params { housing_k_per_w: 0, winding_k_per_w: 46, winding_time_ms: 2_000, ..images::CONFIRMED };

@@ -1,11 +1,10 @@
 //! Tests of the gain schedule: the gain set that it selects in each frame, and the gains of each set.
 
-use crate::config;
+use super::config;
+use crate::common::*;
 use fingertip::config::{Config, GAIN_SETS};
 use fingertip::control::GainSchedule;
-use fingertip::params::Params;
 use fingertip::shipped;
-use fingertip::units::Millimetres;
 
 /// Number of the gain set that the schedule selects.
 fn number(schedule: &GainSchedule, config: &Config) -> usize {

@@ -2,14 +2,12 @@
 
 mod touch;
 
-use crate::{config, mm};
-use fingertip::config::{Config, newtons};
-use fingertip::contact::Contact;
-use fingertip::control::{Reference, SpeedLoop};
+use super::{config, mm};
+use crate::common::*;
+use fingertip::config::Config;
+use fingertip::control::Reference;
 use fingertip::grip::{Goal, Grip};
-use fingertip::state::{Limits, Mode};
 use fingertip::touch::{Felt, Stage, Touch};
-use fingertip::units::{Millimetres, MillimetresPerSecond, Newtons};
 
 /// Position error that a calm loop accepts: 0.4 um.
 const SLACK: Millimetres = Millimetres::from_bits((1 << 24) / 2_500);

@@ -1,13 +1,11 @@
 //! Second names of registers: for drivers whose addresses or lengths have 8 bits, and for those of X-series servos.
 
-use crate::bench::Bench;
+use super::bench::Bench;
+use crate::common::*;
 use fingertip::link::packet::StatusError;
 use fingertip::link::table::indirect::{BLOCK, COUNT};
 use fingertip::link::table::{Access, READ_MAX, mirrors};
-use fingertip::params::Params;
-use fingertip::shipped::{REGISTERS, TAXELS, address};
-use fingertip::state::{Fault, Limits, Mode};
-use fingertip::units::{Duty, Millimetres, MillimetresPerSecond};
+use fingertip::shipped::{REGISTERS, address};
 
 fn busy() -> Bench {
     let mut bench = Bench::new();

@@ -1,14 +1,11 @@
 //! Recovery in one write, goals that end with torque, values before a tare, faults, watchdog and requests.
 
-use crate::bench::{Bench, ID, packet};
+use super::bench::{Bench, ID, packet};
+use crate::common::*;
 use fingertip::capture::CaptureState;
-use fingertip::command::Command;
 use fingertip::link::packet::{BROADCAST, StatusError, instruction};
-use fingertip::measure::{Ended, MeasureStatus, Task};
-use fingertip::pipeline::Taring;
-use fingertip::shipped::{TAXELS, address};
-use fingertip::state::{Fault, Limits, Mode};
-use fingertip::units::Newtons;
+use fingertip::measure::MeasureStatus;
+use fingertip::shipped::address;
 
 const RECOVER: u16 = address::RECOVER;
 
@@ -71,7 +68,7 @@ fn a_driver_that_sends_goal_and_recover_in_each_cycle_recovers() {
     let cycle = |bench: &mut Bench, mn: i16, recover: u8| {
         let [low, high] = mn.to_le_bytes();
         let [at, at_high] = address::INDIRECT_DATA_1.to_le_bytes();
-        let params = [at, at_high, 3, 0, crate::bench::ID, low, high, recover];
+        let params = [at, at_high, 3, 0, super::bench::ID, low, high, recover];
         assert_eq!(bench.ask_as(BROADCAST, instruction::SYNC_WRITE, &params), None);
     };
     bench.write(address::TORQUE_ENABLE, &[1]).expect("torque");

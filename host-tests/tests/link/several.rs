@@ -1,11 +1,10 @@
 //! Sync, Bulk, Fast Sync and Fast Bulk instructions: several devices on one bus, each hearing the other devices'
 //! packets.
 
-use crate::bench::{Answer, Bench, ID, answer, hex, packet};
-use fingertip::contact::FitLevel;
+use super::bench::{Answer, Bench, ID, answer, hex, packet};
+use crate::common::*;
 use fingertip::link::Actions;
 use fingertip::link::packet::{CRC_START, update_crc};
-use fingertip::params::Params;
 use fingertip::shipped::{Record, Settings, address};
 
 const BROADCAST: u8 = 254;

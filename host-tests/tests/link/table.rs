@@ -1,16 +1,13 @@
 //! Reading the control table.
 
-use crate::bench::{Bench, ID};
-use fingertip::contact::FitLevel;
+use super::bench::{Bench, ID};
+use crate::common::*;
 use fingertip::link::Actions;
 use fingertip::link::packet::StatusError;
 use fingertip::link::table::indirect::BLOCK;
 use fingertip::link::table::{Access, READ_MAX, Register};
-use fingertip::params::Params;
-use fingertip::shipped::{Gains, REGISTERS, TAXELS, address};
-use fingertip::state::{Fault, Limits, Mode};
+use fingertip::shipped::{Gains, REGISTERS, address};
 use fingertip::store::Record;
-use fingertip::units::{Duty, Millimetres, MillimetresPerSecond, Newtons};
 use host_tests::control_table::{COMMAND, markdown, step};
 use host_tests::model_file::{items, text};
 

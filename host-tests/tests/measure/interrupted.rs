@@ -1,13 +1,9 @@
 //! Early ends of a motion: the motor rests, the motion and its record say so, and the next one works.
 
-use crate::{Finger, params};
+use super::{Finger, params};
+use crate::common::*;
 use fingertip::capture::{CaptureState, Ended as CaptureEnded};
-use fingertip::measure::{Ended, MeasureState, Task};
-use fingertip::params::Params;
 use fingertip::pressure::Calibration;
-use fingertip::shipped::Config;
-use fingertip::state::Mode;
-use sim::native::bench::Bench;
 
 type Made = Finger<{ 44 << 10 }>;
 type Act = fn(&mut Made);
@@ -23,7 +19,7 @@ const ENDS: [(&str, Act); 6] = [
     ("fault", |finger| _ = finger.frame_with(|record| record.sense.bridge_fault = true)),
     ("stopped", |finger| finger.bench.pipeline().stop(fingertip::state::Fault::LostFrames)),
     ("parameters", |finger| {
-        let config = Config::shipped(&crate::params()).expect("allowed");
+        let config = Config::shipped(&super::params()).expect("allowed");
         finger.bench.pipeline().configure(&config);
     }),
 ];

@@ -1,9 +1,9 @@
 //! The layout of a record, read by a decoder of its own: it knows only the documentation of `fingertip::measure::series`.
 
+use crate::common::*;
+use fingertip::measure::Row;
 use fingertip::measure::press::{PARTS, Step};
 use fingertip::measure::series::{CHECK, Head, Out, step_bytes};
-use fingertip::measure::{Ended, Row};
-use fingertip::units::Celsius;
 
 /// A row of a press.
 pub struct Read {

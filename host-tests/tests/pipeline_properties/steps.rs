@@ -1,14 +1,8 @@
 //! Runs of steps, judged one by one.
 
-use crate::{Arguments, Input, any_inputs, any_params, config};
-use fingertip::measure::{Ended, MeasureState, Task};
-use fingertip::params::Params;
-use fingertip::pipeline::{Status, Taring};
-use fingertip::shipped::{Pipeline, TARE_FRAMES};
-use fingertip::state::{Fault, Limits, Mode};
-use fingertip::units::{Duty, Newtons};
+use super::{Arguments, Input, any_inputs, any_params, config};
+use crate::common::*;
 use images::record::Digest;
-use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -184,7 +178,7 @@ fn drives(mode: Mode) -> bool {
 }
 
 proptest! {
-    #![proptest_config(crate::fixed(CASES))]
+    #![proptest_config(super::fixed(CASES))]
 
     #[test]
     fn any_run_keeps_to_the_rules(params in any_params(), tared in prop::bool::weighted(0.9), inputs in any_inputs(200)) {
@@ -252,7 +246,7 @@ proptest! {
 fn the_runs_come_everywhere() {
     let all = RefCell::new(Seen::default());
     let inputs = (any_params(), any_inputs(200));
-    let outcome = TestRunner::new(crate::fixed(3 * CASES)).run(&inputs, |(params, inputs)| {
+    let outcome = TestRunner::new(super::fixed(3 * CASES)).run(&inputs, |(params, inputs)| {
         let mut run = Run::new(&params, true);
         run.take(&inputs);
         for (all, seen) in all.borrow_mut().iter_mut().zip(run.seen) {

@@ -2,13 +2,9 @@
 //! with a fault. These fingers have no friction, play, hysteresis or creep, and their object is a plane.
 
 use super::{Finger, normal};
-use fingertip::config::{Shaped, newtons};
-use fingertip::contact::FitLevel;
-use fingertip::params::Params;
+use crate::common::*;
+use fingertip::config::Shaped;
 use fingertip::pipeline::Pipeline;
-use fingertip::scan::Clocks;
-use fingertip::shipped::CLOCKS;
-use fingertip::state::Mode;
 
 /// Worst of a population: force above 1.3 times the goal and 0.15 N, distance from the goal beyond 15 % and 0.1 N, swing
 /// beyond 10 % and 50 mN, and force that is left 0.5 s after a release, N. 0 or less keeps a promise.

@@ -1,11 +1,7 @@
 //! The loop closed at chosen frame rates, with one converter and with two.
 
 use super::Finger;
-use fingertip::config::newtons;
-use fingertip::contact::FitLevel;
-use fingertip::scan::Clocks;
-use fingertip::shipped::CLOCKS;
-use fingertip::state::{Fault, Limits};
+use crate::common::*;
 
 /// Approaches a wall, and holds 1 N and 2 N, at this frame rate. Returns the largest force above the goal, N, and the
 /// largest distance from the goal at rest, N.

@@ -1,20 +1,16 @@
 //! The worst that frames can bring: every code at the top, one corner, half of them, alternating ones, and any at all.
 //! Nothing may overflow, so these are worth most with overflow checks.
 
-use fastrand::Rng;
-use fingertip::command::Command;
-use fingertip::config::{Geometry, Shaped, newtons};
+use crate::common::*;
+use fingertip::config::{Geometry, Shaped};
 use fingertip::contact::parts::{
     CENTRE_BITS, Comparison, Equations, Guess, ONE, PeakScale, Prediction, SLOPE_BITS, SQUARE_BITS, ScaledImage,
 };
-use fingertip::contact::{self, Fit, FitLevel};
-use fingertip::frame::{Frame, Sense, Shape};
-use fingertip::params::Params;
+use fingertip::contact::{self, Fit};
+use fingertip::frame::{Frame, Shape};
 use fingertip::pipeline::Pipeline;
 use fingertip::pressure::{Array, Calibration, GAIN_MAX, TactileImage};
-use fingertip::units::{Celsius, CoreCycles};
 use images::single::{self, Refined};
-use proptest::prelude::*;
 use proptest::test_runner::{Config as Cases, RngSeed};
 
 /// The highest code that is not saturated.

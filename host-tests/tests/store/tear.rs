@@ -1,10 +1,9 @@
 //! Power lost at every word of a save and of an erase, twice in a row, from every state that the sectors may be in.
 
-use crate::{OTHERS, Other};
-use fingertip::params::Params;
-use fingertip::shipped::{Loaded, Record, TAXELS};
+use super::{OTHERS, Other};
+use crate::common::*;
+use fingertip::shipped::{Loaded, Record};
 use fingertip::store::{Flash, Journal, SLOT_BYTES, SaveError, Sector};
-use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use sim::encode;
 

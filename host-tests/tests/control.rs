@@ -3,12 +3,11 @@
 mod gain_schedule;
 mod grip;
 
+use crate::common::*;
 use fingertip::config::Config;
-use fingertip::control::{Drive, Observer, Reference, SpeedLoop};
-use fingertip::params::Params;
+use fingertip::control::{Drive, Observer, Reference};
 use fingertip::shipped;
-use fingertip::state::Limits;
-use fingertip::units::{Duty, Millimetres, MillimetresPerSecond, MillimetresPerSecond2};
+use fingertip::units::MillimetresPerSecond2;
 use std::ops::Deref;
 
 /// The reference finger's.

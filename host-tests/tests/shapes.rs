@@ -5,22 +5,15 @@ mod drawn;
 mod rates;
 mod worst;
 
-use fingertip::command::Command;
-use fingertip::config::{Shaped, newtons};
-use fingertip::contact::FitLevel;
-use fingertip::frame::{Frame, Sense, Shape};
-use fingertip::params::Params;
-use fingertip::pipeline::{Pipeline, Status};
-use fingertip::scan::Clocks;
-use fingertip::shipped::CLOCKS;
-use fingertip::state::Mode;
-use fingertip::units::CoreCycles;
+use crate::common::*;
+use fingertip::config::Shaped;
+use fingertip::frame::{Frame, Shape};
+use fingertip::pipeline::Pipeline;
 use images::record::Digest;
 use sim::bridge::Bridge;
 use sim::mechanics::pressures::Cell;
 use sim::mechanics::rotor::{Dynamics, Shaft, Source};
 use sim::native::DUTY_DELAY_SLOTS;
-use sim::setup::Setup;
 
 // A finger with an array of any shape: an ideal hemisphere on a plane by the paper's model, the reference front end
 // and motor.

@@ -4,13 +4,8 @@
 
 mod steps;
 
-use fingertip::command::Command;
+use crate::common::*;
 use fingertip::config::{ConfigError, Gains};
-use fingertip::frame::Sense;
-use fingertip::params::Params;
-use fingertip::shipped::{COLUMNS, Config, Frame, ROWS, SLOTS};
-use fingertip::units::Newtons;
-use proptest::prelude::*;
 use proptest::test_runner::{Config as Cases, RngSeed};
 
 /// The same cases on every run.
@@ -343,7 +338,7 @@ fn every_corner_of_the_parameters_makes_a_configuration() {
 }
 
 proptest! {
-    #![proptest_config(crate::fixed(4_000))]
+    #![proptest_config(self::fixed(4_000))]
 
     #[test]
     fn any_allowed_parameters_make_a_configuration(params in any_params()) {

@@ -2,9 +2,10 @@
 
 mod tear;
 
-use crate::tear::{Nor, bits, record, with_gains};
-use fingertip::params::{ParamError, Params};
-use fingertip::shipped::{Config, Gains, Loaded, Record};
+use self::tear::{Nor, bits, record, with_gains};
+use crate::common::*;
+use fingertip::params::ParamError;
+use fingertip::shipped::{Gains, Loaded, Record};
 use fingertip::store::{Flash as _, Journal, Remark, SLOT_BYTES, SaveError, Sector, number, settle};
 use host_tests::page::{PAGE, table};
 use sim::encode;

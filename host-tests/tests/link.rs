@@ -6,15 +6,14 @@ mod recover;
 mod several;
 mod table;
 
-use crate::bench::{Bench, ID, answer, hex, packet, receive};
+use self::bench::{Bench, ID, answer, hex, packet, receive};
+use crate::common::*;
 use dynamixel2::instructions::{FactoryResetKind, SyncWriteData};
 use dynamixel2::serial2::SerialPort;
 use dynamixel2::{Bus, MotorError, ReadError, TransferError};
 use fingertip::link::Actions;
 use fingertip::link::packet::{CRC_START, Event, LENGTH_MAX, Receiver, update_crc};
 use fingertip::shipped::{REGISTERS, address};
-use fingertip::state::Fault;
-use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
 // Packets on the wire: the examples that the protocol's manual prints, stuffing, and any slicing of any bytes.

@@ -3,21 +3,12 @@
 mod interrupted;
 mod series;
 
-use crate::series::{Record, decode};
+use self::series::{Record, decode};
+use crate::common::*;
 use fingertip::capture::{Capture, CaptureState, Ended as CaptureEnded};
-use fingertip::config::newtons;
-use fingertip::contact::Contact;
-use fingertip::control::SpeedLoop;
+use fingertip::measure::MeasureStatus;
 use fingertip::measure::press::{HOLDS_MS, PARTS, Press, PressInputs, ROWS_MAX, Step};
-use fingertip::measure::{Ended, MeasureState, MeasureStatus, Task};
-use fingertip::params::Params;
-use fingertip::pipeline::Status;
-use fingertip::shipped::{COLUMNS, Config, ROWS, TARE_FRAMES, TactileImage};
-use fingertip::units::Celsius;
-use host_tests::finger::config;
 use images::record::Record as Given;
-use sim::native::bench::Bench;
-use sim::setup::Setup;
 
 // A finger whose motions are recorded as on the board.
 

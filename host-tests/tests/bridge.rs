@@ -6,20 +6,7 @@ use fingertip::pipeline::Bridge;
 /// Ends of a grip.
 type End = fn(&mut Bench);
 
-/// Holds 1 N, with the duty that this takes.
-fn holding() -> Bench {
-    let mut board = Bench::default();
-    board.tare();
-    board.command().goal = newtons(1_000);
-    for _ in 0..5_000 {
-        board.step();
-    }
-    let status = board.step();
-    assert!(status.mode == Mode::Force && status.duty.0 > 0, "{status:?}");
-    board
-}
-
-/// Configuration with the given number of dead taxels.
+/// Frame with the given number of dead taxels.
 fn dead(frame: &Frame, count: usize) -> Frame {
     let mut frame = *frame;
     (0..count).for_each(|place| frame.set_code(place, place, 0));
@@ -28,7 +15,7 @@ fn dead(frame: &Frame, count: usize) -> Frame {
 
 #[test]
 fn a_sound_frame_changes_nothing() {
-    let mut board = holding();
+    let mut board = holding(1_000);
     let before = *board.status();
     let allowed = board.pipeline().config().params.bad_taxels_max as usize;
     for frame in [*board.frame(), dead(board.frame(), allowed)] {
@@ -39,7 +26,7 @@ fn a_sound_frame_changes_nothing() {
 
 #[test]
 fn a_broken_frame_shorts_the_motor_and_leaves_the_verdict_to_the_step() {
-    let mut board = holding();
+    let mut board = holding(1_000);
     let before = *board.status();
     let broken = board.pipeline().config().params.bad_taxels_max as usize + 1;
     let frame = dead(board.frame(), broken);
@@ -51,7 +38,7 @@ fn a_broken_frame_shorts_the_motor_and_leaves_the_verdict_to_the_step() {
 
 #[test]
 fn nothing_is_looked_at_while_the_bridge_is_off() {
-    let mut board = holding();
+    let mut board = holding(1_000);
     board.command().torque = false;
     assert_eq!(board.step().mode, Mode::Off);
     let frame = dead(board.frame(), 10);
@@ -96,7 +83,7 @@ fn a_motor_that_was_driven_brakes_until_the_tip_rests() {
         }),
     ];
     for (name, end) in endings {
-        let mut board = holding();
+        let mut board = holding(1_000);
         end(&mut board);
         let mut travel_mm = vec![board.truth().travel_mm];
         while board.step().bridge() == Bridge::Brakes {
@@ -127,15 +114,11 @@ fn a_motor_that_was_driven_brakes_until_the_tip_rests() {
 /// A stop between two steps shorts the motor before the next step.
 #[test]
 fn a_stop_and_new_parameters_brake_at_once() {
-    let mut board = holding();
+    let mut board = holding(1_000);
     let config = board.pipeline().config().clone();
     board.pipeline().configure(&config);
     assert_eq!((board.status().mode, board.status().bridge()), (Mode::Off, Bridge::Brakes));
-    let mut board = holding();
+    let mut board = holding(1_000);
     board.pipeline().stop(Fault::LostFrames);
     assert_eq!((board.status().mode, board.status().bridge()), (Mode::Fault, Bridge::Brakes));
-}
-
-fn drives(mode: Mode) -> bool {
-    !matches!(mode, Mode::Off | Mode::Tare | Mode::Fault)
 }

@@ -3,7 +3,6 @@
 use crate::common::*;
 use core::f64::consts::PI;
 use fingertip::contact::from_sums;
-use host_tests::fit_cases::{Noise, Object, Reading, Scene, Steps};
 
 const NONE: [u32; ROWS] = [0; ROWS];
 /// The reference array's.
@@ -15,9 +14,9 @@ fn mm(length: Millimetres) -> f64 {
 
 /// Tactile image of a plane contact with a spread of the taxel gains.
 fn plane(d_mm: f64, [x_mm, y_mm]: [f64; 2], spread: f64, bad: [u32; ROWS], rng: &mut Rng) -> TactileImage {
-    let scene = Scene { pitch_mm: PITCH_MM, d_mm, x_mm, y_mm, object: Object::Plane };
     let noise = if spread > 0.0 { Noise::OfReading(spread) } else { Noise::None };
-    Reading { steps: Steps::Sixteenths, noise, dead: 0 }.picture(&scene.pressures(), bad, rng).0
+    let pressures = crate::common::plane(PITCH_MM, d_mm, x_mm, y_mm).pressures();
+    Reading { steps: Steps::Sixteenths, noise, dead: 0 }.picture(&pressures, bad, rng).0
 }
 
 /// 0 up to `from`, 255 from `to` on.
@@ -105,8 +104,7 @@ fn sums_are_doubted_by_what_reaches_over_the_edge_or_is_hidden() {
 #[test]
 fn the_share_that_a_bad_taxel_hides_is_that_of_the_models_pressure() {
     let mut rng = Rng::with_seed(4);
-    let scene = Scene { pitch_mm: PITCH_MM, d_mm: 1.5, x_mm: 0.0, y_mm: 0.0, object: Object::Plane };
-    let pressures = scene.pressures();
+    let pressures = crate::common::plane(PITCH_MM, 1.5, 0.0, 0.0).pressures();
     let all: f64 = pressures.iter().flatten().sum();
     let whole = plane(1.5, [0.0, 0.0], 0.0, NONE, &mut rng);
     // The sums stay those of the whole contact: its radius is right.
@@ -164,7 +162,7 @@ fn the_share_that_one_bad_taxel_hides_of_a_light_contact_is_right() {
         let (row, column) = (3 + rng.usize(..4), 3 + rng.usize(..4));
         let near = |index: usize, rng: &mut Rng| (index as f64 - 4.5 + 1.4 * (rng.f64() - 0.5)) * PITCH_MM;
         let (x_mm, y_mm) = (near(column, &mut rng), near(row, &mut rng));
-        let scene = Scene { pitch_mm: PITCH_MM, d_mm: 0.23 + 0.47 * rng.f64(), x_mm, y_mm, object: Object::Plane };
+        let scene = crate::common::plane(PITCH_MM, 0.23 + 0.47 * rng.f64(), x_mm, y_mm);
         let pressures = scene.pressures();
         let right = pressures[row][column] / pressures.iter().flatten().sum::<f64>();
         let mut bad = NONE;

@@ -2,12 +2,6 @@
 
 use crate::common::*;
 
-fn board() -> Bench {
-    let mut board = Bench::default();
-    board.tare();
-    board
-}
-
 /// True force after each frame of a stretch of time.
 fn run(board: &mut Bench, goal_mn: i32, seconds: f64) -> (Vec<(f64, f64)>, Status) {
     board.command().goal = newtons(goal_mn);
@@ -27,7 +21,7 @@ fn time_at_share(trace: &[(f64, f64)], from: f64, to: f64, share: f64) -> f64 {
 
 #[test]
 fn first_touch_from_five_millimetres_does_not_overshoot() {
-    let mut board = board();
+    let mut board = ready();
     let (trace, status) = run(&mut board, 1_000, 0.5);
     let peak = trace.iter().map(|(_, force)| *force).fold(0.0, f64::max);
     assert!((0.995..=1.10).contains(&peak), "peak {peak} N");
@@ -39,7 +33,7 @@ fn first_touch_from_five_millimetres_does_not_overshoot() {
 
 #[test]
 fn force_steps_are_quick_and_true() {
-    let mut board = board();
+    let mut board = ready();
     run(&mut board, 200, 0.5);
     for (from_mn, to_mn) in [(200, 2_000), (2_000, 5_000), (5_000, 1_000), (1_000, 200), (200, 7_000), (7_000, 50)] {
         let from = f64::from(from_mn) / 1e3;
@@ -62,7 +56,7 @@ fn force_steps_are_quick_and_true() {
 
 #[test]
 fn a_zero_goal_lets_go_and_stands_clear() {
-    let mut board = board();
+    let mut board = ready();
     run(&mut board, 2_000, 0.5);
     let (trace, status) = run(&mut board, 0, 0.5);
     assert_eq!((status.mode, status.fault), (Mode::Release, None));
@@ -76,7 +70,7 @@ fn a_zero_goal_lets_go_and_stands_clear() {
 
 #[test]
 fn a_goal_beyond_the_limit_is_cut_and_said() {
-    let mut board = board();
+    let mut board = ready();
     let (trace, status) = run(&mut board, 8_500, 0.6);
     let last = trace.last().unwrap().1;
     assert!((6.9..=7.1).contains(&last), "{last} N");
@@ -85,7 +79,7 @@ fn a_goal_beyond_the_limit_is_cut_and_said() {
 
 #[test]
 fn an_object_that_goes_away_is_not_chased() {
-    let mut board = board();
+    let mut board = ready();
     run(&mut board, 2_000, 0.5);
     // 10 mm away, at half a metre in a second.
     board.carry_object(5.0, 15.0, 500.0, |_| {});
@@ -100,7 +94,7 @@ fn an_object_that_goes_away_is_not_chased() {
 
 #[test]
 fn the_end_of_the_travel_stops_an_approach() {
-    let mut board = board();
+    let mut board = ready();
     board.place_object(40.0);
     let (_, status) = run(&mut board, 1_000, 1.0);
     assert!(status.limits.has(Limits::TRAVEL));
@@ -113,25 +107,22 @@ fn the_end_of_the_travel_stops_an_approach() {
 #[test]
 fn a_reading_that_vanishes_at_once_does_not_make_it_press_harder() {
     for goal_mn in [200, 1_000, 5_000] {
-        let mut board = board();
+        let mut board = ready();
         run(&mut board, goal_mn, 0.5);
-        let blank = {
-            let mut free = Bench::default();
-            free.step();
-            free.frame().codes
-        };
+        let mut free = Bench::default();
+        free.step();
+        let blank = free.frame().codes;
         let (mut largest_n, mut modes) = (0.0_f64, Vec::new());
         for _ in 0..20_000 {
             let mode = board.step_with(|record| record.frame.codes = blank).mode;
             largest_n = largest_n.max(board.truth().force_n);
-            if modes.last() != Some(&mode) {
-                modes.push(mode);
-            }
+            modes.push(mode);
             if mode == Mode::Approach {
                 break;
             }
         }
         assert!(largest_n < 1.02e-3 * f64::from(goal_mn) + 0.005, "{goal_mn} mN: {largest_n} N");
+        modes.dedup();
         assert_eq!(modes, [Mode::Force, Mode::Release, Mode::Approach], "{goal_mn} mN");
         assert_eq!((board.truth().force_n, board.status().fault), (0.0, None), "{goal_mn} mN");
     }
@@ -143,7 +134,7 @@ fn a_motor_that_is_shorted_on_the_way_stops_within_its_bound() {
     for (from_mn, goal_mn) in [(0, 100), (0, 1_000), (0, 7_000), (100, 500), (200, 2_000), (200, 7_000), (2_000, 5_000)]
     {
         for stopped_after in (1..40).map(|step| 5 * step) {
-            let mut board = board();
+            let mut board = ready();
             let goal_n = f64::from(goal_mn) * 1e-3;
             if from_mn > 0 {
                 run(&mut board, from_mn, 0.4);
@@ -157,10 +148,8 @@ fn a_motor_that_is_shorted_on_the_way_stops_within_its_bound() {
             }
             board.pipeline().stop(Fault::LostFrames);
             let largest_n = board.run(0.1);
-            assert!(
-                largest_n < 1.3 * goal_n + 0.4,
-                "{from_mn} to {goal_mn} mN, shorted after {stopped_after} frames: {largest_n} N"
-            );
+            let name = format!("{from_mn} to {goal_mn} mN, shorted after {stopped_after} frames");
+            assert!(largest_n < 1.3 * goal_n + 0.4, "{name}: {largest_n} N");
         }
     }
 }
@@ -168,7 +157,7 @@ fn a_motor_that_is_shorted_on_the_way_stops_within_its_bound() {
 #[test]
 fn a_goal_below_the_least_contact_is_held_as_that() {
     for goal_mn in [1, 5, 14, 15, 39] {
-        let mut board = board();
+        let mut board = ready();
         let (_, status) = run(&mut board, goal_mn, 0.5);
         assert!(status.mode == Mode::Force && status.limits.has(Limits::GOAL), "{goal_mn} mN: {:?}", status.mode);
         let mut lost = 0;
@@ -180,7 +169,7 @@ fn a_goal_below_the_least_contact_is_held_as_that() {
         }
         assert_eq!(lost, 0, "{goal_mn} mN");
     }
-    let mut board = board();
+    let mut board = ready();
     let (_, status) = run(&mut board, 40, 0.5);
     assert!(!status.limits.has(Limits::GOAL), "the smallest force needs no motion");
 }

@@ -4,7 +4,6 @@ use crate::common::*;
 use fingertip::pressure::{CODE_BITS, GAIN_MAX, TARE_BITS};
 use fingertip::shipped::Array;
 use host_tests::finger::tared;
-use proptest::test_runner::RngSeed;
 
 /// Codes above the column's level, or any codes.
 #[derive(Clone, Debug)]
@@ -59,9 +58,7 @@ fn bad(frame: &Frame, row: usize, config: &Config) -> u32 {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig {
-        rng_seed: RngSeed::Fixed(21), failure_persistence: None, ..ProptestConfig::default()
-    })]
+    #![proptest_config(seeded(256, 21))]
 
     #[test]
     fn the_sums_are_those_of_the_taxels(

@@ -20,6 +20,11 @@ fn config(rng: &mut Rng) -> Config {
     Config::shipped(&params).expect("allowed")
 }
 
+/// Inputs of the guard while the host requests no force.
+pub fn seen(encoder: i32, force: Newtons, pressing: bool, given_q8_mm_per_s2: i32) -> Seen {
+    Seen { encoder, force, pressing, goal: Newtons::ZERO, given_q8_mm_per_s2 }
+}
+
 fn started(encoder: i32, config: &Config) -> Guard {
     let mut guard = Guard::default();
     guard.start(encoder, encoder, config);
@@ -136,14 +141,8 @@ fn only_a_push_takes_the_rear_end_along() {
     for rises in [true, false] {
         let mut guard = started(0, &config);
         let mut at = |travel_mm: f64, force_mn: i32| {
-            let force = newtons(force_mn);
-            let encoder = counts(travel_mm, &config);
-            let fault = guard.check(
-                &Seen { encoder, force, pressing: false, goal: Newtons::ZERO, given_q8_mm_per_s2: 0 },
-                true,
-                &config,
-            );
-            (fault, lets_through(&guard)[1])
+            let seen = seen(counts(travel_mm, &config), newtons(force_mn), false, 0);
+            (guard.check(&seen, true, &config), lets_through(&guard)[1])
         };
         // The tip moves back slowly. The force appears once the tip is back, or is constant from the start.
         let mut travel_mm = 0.0;
@@ -208,8 +207,7 @@ fn no_duty_makes_it_fast_in_the_air() {
         for _ in 0..STEPS / 1_000 {
             let encoder = (finger.travel_mm / count_mm(&config)).floor() as i32;
             let force = newtons(offset_mn).max(newtons(rng.i32(-20..20)));
-            let seen = Seen { encoder, force, pressing: rng.bool(), goal: Newtons::ZERO, given_q8_mm_per_s2: voltage };
-            if guard.check(&seen, true, &config).is_some() {
+            if guard.check(&seen(encoder, force, rng.bool(), voltage), true, &config).is_some() {
                 stopped += 1;
                 break;
             }
@@ -250,14 +248,7 @@ fn a_sound_finger_is_never_stopped_for_its_direction() {
             }
             let sensed = force_n * (0.8 + 0.4 * strength / 1.3) + rng.f64() * 0.01;
             let encoder = (finger.travel_mm / count_mm(&config)).floor() as i32;
-            let seen = Seen {
-                encoder,
-                force: newtons((1e3 * sensed) as i32),
-                pressing: true,
-                goal: Newtons::ZERO,
-                given_q8_mm_per_s2: voltage,
-            };
-            match guard.check(&seen, true, &config) {
+            match guard.check(&seen(encoder, newtons((1e3 * sensed) as i32), true, voltage), true, &config) {
                 Some(Fault::Runaway) => break,
                 None => {}
                 fault => panic!("{fault:?} at {} mm, {} mm/s", finger.travel_mm, finger.speed_mm_per_s),
@@ -281,17 +272,7 @@ fn the_wrong_way_ends_within_half_a_millimetre() {
             let mut voltage = 0;
             let frames = (1..200).find(|_| {
                 let encoder = (turns * finger.travel_mm / count_mm(&config)).floor() as i32;
-                let fault = guard.check(
-                    &Seen {
-                        encoder,
-                        force: Newtons::ZERO,
-                        pressing: true,
-                        goal: Newtons::ZERO,
-                        given_q8_mm_per_s2: voltage,
-                    },
-                    true,
-                    &config,
-                );
+                let fault = guard.check(&seen(encoder, Newtons::ZERO, true, voltage), true, &config);
                 voltage = finger.frame(&guard, &config, 1.0, 0.0, &mut rng);
                 assert!(fault.is_none_or(|fault| fault == expected), "{fault:?}");
                 fault.is_some()
@@ -315,32 +296,23 @@ fn a_touch_bounds_the_retreat() {
     let config = Config::shipped(&Params { clearance_um: 2_000, ..Params::DEFAULT }).expect("allowed");
     for (pressing, floor_mm) in [(true, 10.0 - 2.0 - 1.0), (false, -f64::from(config.bounds.back.0.to_num::<f32>()))] {
         let mut guard = started(0, &config);
-        let at = |travel_mm: f64, force: Newtons, guard: &mut Guard| {
-            let seen = Seen {
-                encoder: counts(travel_mm, &config),
-                force,
-                pressing,
-                goal: Newtons::ZERO,
-                given_q8_mm_per_s2: 0,
-            };
-            guard.check(&seen, true, &config)
+        let mut at = |travel_mm: f64, force: Newtons| {
+            let fault = guard.check(&seen(counts(travel_mm, &config), force, pressing, 0), true, &config);
+            (fault, lets_through(&guard)[1])
         };
         // Forward slowly, then 1 N at 10 mm and its indentation, then back into the air.
         let depth_mm: f64 = config.tip.indentation(newtons(1_000)).0.to_num();
         for step in 0..10_000 {
             let travel_mm = (10.0 + depth_mm) * f64::from(step) / 1e4;
             let force = newtons(((travel_mm - 10.0).max(0.0).powi(2) * 785.0) as i32);
-            assert_eq!(at(travel_mm, force, &mut guard), None);
+            assert_eq!(at(travel_mm, force).0, None);
         }
         let mut travel_mm = 10.0 + depth_mm;
         let mut cut_mm = None;
         let fault = loop {
             travel_mm -= 0.002;
-            let fault = at(travel_mm, Newtons::ZERO, &mut guard);
-            let [_, backward] = lets_through(&guard);
-            if !backward && cut_mm.is_none() {
-                cut_mm = Some(travel_mm);
-            }
+            let (fault, backward) = at(travel_mm, Newtons::ZERO);
+            cut_mm = cut_mm.or((!backward).then_some(travel_mm));
             if fault.is_some() {
                 break fault;
             }

@@ -1,7 +1,8 @@
 //! Limits at which the guard begins to hold back, each from both sides.
 
 use crate::common::*;
-use fingertip::safety::guard::{Guard, Seen};
+use crate::guard::seen;
+use fingertip::safety::guard::Guard;
 
 /// A guard and where the tip is, moved as a motor would that just makes the speed.
 struct Finger {
@@ -10,7 +11,6 @@ struct Finger {
     travel_mm: f64,
     speed_mm_per_s: f64,
     force: Newtons,
-    pressing: bool,
 }
 
 impl Finger {
@@ -20,7 +20,7 @@ impl Finger {
         let config = Config::shipped(&params).expect("allowed");
         let mut guard = Guard::default();
         guard.start(0, 0, &config);
-        Self { guard, config, travel_mm: 0.0, speed_mm_per_s: 0.0, force: Newtons::ZERO, pressing: true }
+        Self { guard, config, travel_mm: 0.0, speed_mm_per_s: 0.0, force: Newtons::ZERO }
     }
 
     fn frame_s(&self) -> f64 {
@@ -34,14 +34,7 @@ impl Finger {
         let damping = f64::from(self.config.damping_q17_per_s) / 131_072.0;
         let voltage = (damping * self.speed_mm_per_s * 256.0) as i32 + beyond;
         let encoder = (self.travel_mm / count_mm).round() as i32;
-        let seen = Seen {
-            encoder,
-            force: self.force,
-            pressing: self.pressing,
-            goal: Newtons::ZERO,
-            given_q8_mm_per_s2: voltage,
-        };
-        self.guard.check(&seen, true, &self.config)
+        self.guard.check(&seen(encoder, self.force, true, voltage), true, &self.config)
     }
 
     fn frame(&mut self) -> Option<Fault> {
@@ -75,10 +68,10 @@ impl Finger {
     fn placed(&mut self, travel_mm: f64) -> Option<Fault> {
         let way = travel_mm - self.travel_mm;
         self.speed_mm_per_s = 10.0_f64.copysign(way);
-        for _ in 0..(way.abs() / 10.0 / self.frame_s()) as u32 {
-            if let Some(fault) = self.frame() {
-                return Some(fault);
-            }
+        let frames = (way.abs() / 10.0 / self.frame_s()) as u32;
+        let fault = (0..frames).find_map(|_| self.frame());
+        if fault.is_some() {
+            return fault;
         }
         (self.travel_mm, self.speed_mm_per_s) = (travel_mm, 0.0);
         (0..3_000).find_map(|_| self.frame())
@@ -131,12 +124,11 @@ fn in_the_air_one_and_a_half_times_the_approach_is_allowed_and_no_more() {
         assert_eq!(finger.lets(), [true; 2]);
         let forward = usize::from(sign < 0.0);
         let mut cut_s = None;
-        let start_s = 0.0;
         let frames = (0.1 / finger.frame_s()) as u32;
         finger.speed_mm_per_s = sign * 46.0;
         let stopped_s = (0..frames).find_map(|frame| {
             let fault = finger.frame();
-            let time_s = start_s + f64::from(frame) * finger.frame_s();
+            let time_s = f64::from(frame) * finger.frame_s();
             if !finger.lets()[forward] && cut_s.is_none() {
                 cut_s = Some(time_s);
                 assert!(finger.lets()[1 - forward], "it may brake");
@@ -255,14 +247,6 @@ fn a_jump_is_fast() {
     }
 }
 
-#[test]
-fn the_travel_is_that_of_the_encoder() {
-    let mut finger = Finger::new();
-    finger.placed(3.0);
-    let travel: f64 = finger.guard.travel().0.to_num();
-    assert!((travel - 3.0).abs() < 1e-3, "{travel} mm");
-}
-
 /// A jump of the encoder before torque (an encoder that is reconnected, a finger that is moved by hand) does not count
 /// as motion against the drive.
 #[test]
@@ -272,7 +256,7 @@ fn a_jump_before_torque_is_forgotten() {
         finger.travel_mm = jump_mm;
         let count_mm = finger.config.mm_per_count_q40 as f64 / 2_f64.powi(40);
         let encoder = (jump_mm / count_mm).round() as i32;
-        let seen = Seen { encoder, force: Newtons::ZERO, pressing: true, goal: Newtons::ZERO, given_q8_mm_per_s2: 0 };
+        let seen = seen(encoder, Newtons::ZERO, true, 0);
         // 1 ms at rest.
         for _ in 0..10 {
             finger.guard.check(&seen, false, &finger.config);

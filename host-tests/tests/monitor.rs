@@ -239,11 +239,7 @@ fn an_array_that_reads_much_more_within_a_frame_is_broken() {
 #[test]
 fn an_array_without_some_of_its_taxels_does_not_read_less() {
     let config = config();
-    let mut world = Plant::new(&Setup::default());
-    let [mut blank, mut pressed] = [Frame::EMPTY; 2];
-    world.fill_frame(&mut blank);
-    world.place(world.setup().wall.distance_mm + 1.5);
-    world.fill_frame(&mut pressed);
+    let [pressed, blank] = crate::calibration::frames();
     let most = config.params.bad_taxels_max as usize;
     for masked in 0..=ROWS {
         let mask = core::array::from_fn(|row| if row < masked { (1 << COLUMNS) - 1 } else { 0 });
@@ -264,9 +260,7 @@ fn an_array_without_some_of_its_taxels_does_not_read_less() {
     // An array that lost a tenth of its codes, as by its supply, does.
     let mut array = tared(&Calibration::NONE, &blank, &config);
     let mut frame = blank;
-    for (row, column) in (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column))) {
-        frame.set_code(row, column, blank.code(row, column) / 10 * 9);
-    }
+    recode(&mut frame, |_, _, code| code / 10 * 9);
     let shown = Shown { picture: *array.read(&frame, &config), ..Shown::sound() };
     let mut monitor = Monitor::default();
     let faults = [(); 3].map(|()| monitor.check(&shown.view(), &config));

@@ -3,10 +3,9 @@
 use crate::common::*;
 use fingertip::chip::{Chip, FRAMES, Factory};
 use fingertip::control::{Creep, TemperatureDrift};
-use proptest::test_runner::RngSeed;
 
 fn config(array_gain_ppm_per_k: i32, array_zero_pa_per_k: i32) -> Config {
-    Config::shipped(&Params { array_gain_ppm_per_k, array_zero_pa_per_k, ..images::CONFIRMED }).unwrap()
+    allowed(Params { array_gain_ppm_per_k, array_zero_pa_per_k, ..images::CONFIRMED })
 }
 
 fn celsius(degrees: i32) -> Option<Celsius> {
@@ -125,7 +124,7 @@ fn it_follows_slowly() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(7), failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(seeded(256, 7))]
 
     #[test]
     fn it_stays_within_half_of_what_is_held(
@@ -136,7 +135,7 @@ proptest! {
             array_gain_ppm_per_k: gain, array_gain_at_c: gain_at, array_zero_pa_per_k: zero, pitch_um: pitch,
             ..images::CONFIRMED
         };
-        let config = Config::shipped(&params).unwrap();
+        let config = allowed(params);
         let mut drift = TemperatureDrift::default();
         for (chip, frames, zeroes) in chips {
             for _ in 0..frames {
@@ -201,11 +200,7 @@ proptest! {
 // Compensation of the creep of a held force: result, bounds, and parts that must not depend on it.
 
 fn creeping(creep_permille: i32, creep_time_ms: i32) -> Config {
-    Config::shipped(&Params { creep_permille, creep_time_ms, ..images::CONFIRMED }).unwrap()
-}
-
-fn frame_s(config: &Config) -> f64 {
-    f64::from(config.timing.frame_ns) * 1e-9
+    allowed(Params { creep_permille, creep_time_ms, ..images::CONFIRMED })
 }
 
 #[test]
@@ -242,7 +237,7 @@ fn at_rate_zero_and_where_nothing_is_held_there_is_none() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(3), failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(seeded(256, 3))]
 
     #[test]
     fn it_stays_between_none_and_its_share_of_the_largest_reading(
@@ -268,9 +263,7 @@ fn hold(config: &Config, goal_mn: i32, seconds: f64) -> (f64, Bench) {
     let mut board = Bench::of(&Setup::default(), config);
     board.tare();
     board.command().goal = newtons(goal_mn);
-    while board.time_s() < seconds {
-        board.step();
-    }
+    board.run(seconds - board.time_s());
     (board.truth().force_n, board)
 }
 
@@ -290,7 +283,7 @@ fn what_is_held_grows_by_the_rate_and_no_more_than_that() {
 #[test]
 fn it_never_leads_beyond_the_largest_force() {
     let params = Params { creep_permille: 300, creep_time_ms: 50, force_max_mn: 3_000, ..images::CONFIRMED };
-    let (force, board) = hold(&Config::shipped(&params).unwrap(), 3_000, 3.0);
+    let (force, board) = hold(&allowed(params), 3_000, 3.0);
     assert!((2.98..3.02).contains(&force), "{force}");
     assert_eq!(board.status().fault, None);
 }
@@ -298,19 +291,11 @@ fn it_never_leads_beyond_the_largest_force() {
 #[test]
 fn over_force_is_judged_by_the_reading() {
     // 2.6 N are read; 2 N are taken for true.
-    let params = Params {
-        creep_permille: 300,
-        creep_time_ms: 50,
-        force_max_mn: 2_650,
-        force_fault_mn: 2_700,
-        ..images::CONFIRMED
-    };
-    let (_, mut board) = hold(&Config::shipped(&params).unwrap(), 2_000, 4.0);
+    let params = Params { force_max_mn: 2_650, force_fault_mn: 2_700, ..creeping(300, 50).params };
+    let (_, mut board) = hold(&allowed(params), 2_000, 4.0);
     assert_eq!(board.status().fault, None);
     let travel = board.truth().travel_mm;
     board.place(travel + 0.2);
-    for _ in 0..50 {
-        board.step();
-    }
+    (0..50).for_each(|_| _ = board.step());
     assert_eq!(board.status().fault, Some(Fault::OverForce));
 }

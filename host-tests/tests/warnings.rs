@@ -83,18 +83,10 @@ fn each_doubt_has_its_warning_and_the_reference_finger_has_none() {
     assert!(weak[0].contains("the motor presses 5750 mN at most"), "{weak:?}");
     // Without a gear a motor is a small mass at the tip: enough for quick frames, too little for slow ones.
     let direct = Params { reduction_mrad_per_mm: 250, inertia_ug_m2: 300, force_max_mn: 2_000, ..Params::DEFAULT };
-    let at = |frame_ns| {
-        let clocks = Clocks { frame_ns, ..CLOCKS };
-        Shaped::<10, 10>::new(&direct, &clocks)
-            .unwrap()
-            .warnings()
-            .map(|warning| warning.to_string())
-            .collect::<Vec<_>>()
-    };
-    assert_eq!(at(None), [""; 0]);
-    let light = at(Some(500_000));
-    assert!(light[0].starts_with("reduction_mrad_per_mm: the motor is a mass of 18 g at the tip"), "{light:?}");
-    let clocks = Clocks { frame_ns: Some(10_000_000), ..CLOCKS };
-    let slow = Shaped::<10, 10>::new(&Params::DEFAULT, &clocks).unwrap();
-    assert!(slow.warnings().eq([Warning::SlowFrames { frame_ns: 10_000_000 }]));
+    let at =
+        |params, frame_ns| Config::new(params, &Clocks { frame_ns, ..CLOCKS }).unwrap().warnings().collect::<Vec<_>>();
+    assert_eq!(at(&direct, None), []);
+    let light = at(&direct, Some(500_000))[0].to_string();
+    assert!(light.starts_with("reduction_mrad_per_mm: the motor is a mass of 18 g at the tip"), "{light}");
+    assert_eq!(at(&Params::DEFAULT, Some(10_000_000)), [Warning::SlowFrames { frame_ns: 10_000_000 }]);
 }

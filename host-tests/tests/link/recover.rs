@@ -1,6 +1,6 @@
 //! Recovery in one write, goals that end with torque, values before a tare, faults, watchdog and requests.
 
-use super::bench::{Bench, ID, packet};
+use super::bench::{Bench, ID, packet, param};
 use crate::common::*;
 use fingertip::capture::CaptureState;
 use fingertip::link::packet::{BROADCAST, StatusError, instruction};
@@ -13,10 +13,16 @@ fn goal(bench: &mut Bench, mn: i32) -> Result<(), u8> {
     bench.write(address::GOAL_FORCE_MN, &mn.to_le_bytes())
 }
 
-fn running() -> Bench {
+/// Torque and a goal of 1 N.
+fn ordered() -> Bench {
     let mut bench = Bench::new();
     bench.write(address::TORQUE_ENABLE, &[1]).expect("torque");
     goal(&mut bench, 1_000).expect("a goal");
+    bench
+}
+
+fn running() -> Bench {
+    let mut bench = ordered();
     bench.write(address::BUS_WATCHDOG, &[5]).expect("a watchdog");
     bench
 }
@@ -104,10 +110,6 @@ fn where_nothing_is_wrong_recover_does_nothing() {
 
 #[test]
 fn what_stands_in_the_way_is_told_and_refused() {
-    let param = |name: &str| {
-        let found = fingertip::shipped::REGISTERS.iter().find(|register| register.name == name);
-        found.expect("a parameter").address
-    };
     let refused = |bench: &mut Bench, hindrance: u32| {
         bench.set_fault(Some(Fault::SupplyLow));
         assert_eq!(bench.number(address::RECOVER_HINDRANCE, 1), hindrance);
@@ -206,13 +208,6 @@ fn before_the_first_tare_no_pressure_is_reported() {
 }
 
 // Faults and the bus watchdog as the host sees them.
-
-fn ordered() -> Bench {
-    let mut bench = Bench::new();
-    bench.write(address::GOAL_FORCE_MN, &1000i32.to_le_bytes()).expect("a goal");
-    bench.write(address::TORQUE_ENABLE, &[1]).expect("torque");
-    bench
-}
 
 #[test]
 fn a_fault_lets_go_and_raises_the_alert() {

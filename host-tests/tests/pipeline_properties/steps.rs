@@ -1,6 +1,6 @@
 //! Runs of steps, judged one by one.
 
-use super::{Arguments, Input, any_inputs, any_params, config};
+use super::{Input, any_inputs, any_params, at_rest, config, next};
 use crate::common::*;
 use images::record::Digest;
 use proptest::test_runner::TestRunner;
@@ -13,7 +13,7 @@ const CASES: u32 = 500;
 /// A pipeline and its last inputs.
 struct Run {
     pipeline: Pipeline,
-    arguments: Arguments,
+    arguments: Record,
     before: Status,
     clear_seen: u8,
     /// A force of at least a contact's was read since the last tare began.
@@ -31,7 +31,7 @@ impl Run {
         let pipeline = Pipeline::new(&config(params));
         let mut run = Self {
             pipeline,
-            arguments: Arguments::new(),
+            arguments: at_rest(),
             before: Status::default(),
             clear_seen: 0,
             touched: false,
@@ -50,7 +50,7 @@ impl Run {
 
     fn take(&mut self, inputs: &[Input]) {
         for input in inputs {
-            self.arguments.next(input);
+            next(&mut self.arguments, input);
             self.step();
         }
     }
@@ -62,7 +62,7 @@ impl Run {
         let measures = self.arguments.command.measure_request != self.before.taken.measure;
         let task = Task::of(self.arguments.command.measure_request);
         let strokes = measures && matches!(task, Task::Jog | Task::Strokes);
-        let Arguments { frame, sense, command } = &self.arguments;
+        let Record { frame, sense, command } = &self.arguments;
         let (duty, &status) = self.pipeline.step(frame, sense, command);
         self.digest.add(duty, &status);
 
@@ -95,10 +95,7 @@ impl Run {
             // What is pressed refuses a tare; the zero before remains.
             let tared = !self.before.limits.has(Limits::NOT_TARED) && !status.limits.has(Limits::NOT_TARED);
             let pressed = tared && self.touched && !command.tare_forced;
-            let expected = match status.mode {
-                Mode::Tare => Taring::Running,
-                _ => Taring::Refused,
-            };
+            let expected = if status.mode == Mode::Tare { Taring::Running } else { Taring::Refused };
             assert_eq!(status.tare, expected, "{:?}", status.mode);
             assert!(status.mode == Mode::Tare || faulted || pressed, "{:?} refuses a tare", status.mode);
             if self.before.mode == Mode::Force && !command.tare_forced {
@@ -121,21 +118,14 @@ impl Run {
             // Accepted or refused; a fault may end it in its first frame.
             assert!(runs || status.measure.state == MeasureState::Ended, "{status:?}");
         }
-        assert!(
-            !runs || status.measure.task == if status.mode == Mode::Press { Task::Press } else { status.measure.task }
-        );
+        assert!(!runs || status.mode != Mode::Press || status.measure.task == Task::Press);
         assert!(!runs || matches!(status.mode, Mode::Press | Mode::Strokes), "{status:?}");
         assert!(runs || status.mode != Mode::Strokes);
-        assert_eq!(
-            status.measure.value != 0 || status.measure.ended != Ended::Complete,
-            status.measure.state == MeasureState::Ended
-        );
+        let early = status.measure.value != 0 || status.measure.ended != Ended::Complete;
+        assert_eq!(early, status.measure.state == MeasureState::Ended);
         if was_running && runs {
-            assert_eq!(
-                (status.mode, status.measure.task),
-                (self.before.mode, self.before.measure.task),
-                "another began"
-            );
+            let before = (self.before.mode, self.before.measure.task);
+            assert_eq!((status.mode, status.measure.task), before, "another began");
         }
         if status.mode == Mode::Press && !measures {
             assert!(was_running, "a press goes on after its answer: {status:?}");
@@ -167,13 +157,6 @@ impl Run {
         }
         self.before = status;
         status
-    }
-}
-
-fn drives(mode: Mode) -> bool {
-    match mode {
-        Mode::Off | Mode::Tare | Mode::Fault => false,
-        Mode::Approach | Mode::Force | Mode::Release | Mode::Press | Mode::Strokes => true,
     }
 }
 

@@ -4,7 +4,6 @@ use super::{OTHERS, Other};
 use crate::common::*;
 use fingertip::shipped::{Loaded, Record};
 use fingertip::store::{Flash, Journal, SLOT_BYTES, SaveError, Sector};
-use proptest::test_runner::RngSeed;
 use sim::encode;
 
 /// Slots of a small sector.
@@ -285,9 +284,7 @@ fn step(words: usize) -> impl Strategy<Value = Step> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig {
-        cases: 2000, rng_seed: RngSeed::Fixed(22), failure_persistence: None, ..ProptestConfig::default()
-    })]
+    #![proptest_config(seeded(2000, 22))]
 
     #[test]
     fn a_board_has_the_old_values_or_the_new_ones(

@@ -70,10 +70,6 @@ struct Hand {
     touch: Touch,
 }
 
-fn asked(force: Newtons) -> Goal {
-    Goal { force, drift: Newtons::ZERO }
-}
-
 impl Hand {
     /// Nothing touches.
     fn free(config: &Config) -> Self {
@@ -82,7 +78,6 @@ impl Hand {
         hand
     }
 
-    /// Presses with 1 N on a surface that it found at 5 mm; the contact and the travel.
     fn pressing(config: &Config) -> (Self, Contact, Millimetres) {
         Self::pressing_with(1_000, config)
     }
@@ -105,12 +100,8 @@ impl Hand {
     }
 
     fn see(&mut self, contact: &Contact, motion: SpeedLoop, config: &Config) {
-        let felt = Felt {
-            contact,
-            summed: contact.force,
-            travel: motion.observer.travel,
-            presses: self.grip.mode(&self.touch) != Mode::Release,
-        };
+        let presses = self.grip.mode(&self.touch) != Mode::Release;
+        let felt = Felt { contact, summed: contact.force, travel: motion.observer.travel, presses };
         self.touch.observe(&felt, || Millimetres::ZERO, config);
     }
 
@@ -121,20 +112,19 @@ impl Hand {
 
     fn frame_of(&mut self, goal: Newtons, contact: &Contact, motion: SpeedLoop, config: &Config) -> (Reference, u16) {
         self.see(contact, motion, config);
-        let mut limits = Limits::default();
-        let Self { grip, touch } = self;
-        let reference = grip.reference(&asked(goal), contact, touch, &mut { motion }, config, &mut limits);
+        self.reference(goal, contact, motion, config)
+    }
+
+    fn reference(&mut self, force: Newtons, contact: &Contact, motion: SpeedLoop, config: &Config) -> (Reference, u16) {
+        let (goal, mut limits) = (Goal { force, drift: Newtons::ZERO }, Limits::default());
+        let reference = self.grip.reference(&goal, contact, &mut self.touch, &mut { motion }, config, &mut limits);
         (reference, limits.0)
     }
 
     /// The travel at which a release rests: there the reference changes its sign.
     fn rest_mm(&self, contact: &Contact, config: &Config) -> f64 {
         let forward = |travel_mm: f64| {
-            let mut hand = *self;
-            let mut limits = Limits::default();
-            let mut motion = at(mm(travel_mm));
-            let Self { grip, touch } = &mut hand;
-            let reference = grip.reference(&asked(Newtons::ZERO), contact, touch, &mut motion, config, &mut limits);
+            let (reference, _) = { *self }.reference(Newtons::ZERO, contact, at(mm(travel_mm)), config);
             reference.speed > MillimetresPerSecond::ZERO
         };
         let (mut back_mm, mut front_mm) = (-60.0, 20.0);

@@ -39,10 +39,8 @@ fn cuts(done: &[Done], words: usize, few: usize, thorough: bool) -> Vec<Cut> {
             }
             Done::Erase => {
                 let rests = if thorough { &RESTS[..] } else { &RESTS[2..] };
-                for (place, &rest) in
-                    (0..=words).step_by(few).flat_map(|place| rests.iter().map(move |rest| (place, rest)))
-                {
-                    cuts.push(Cut { words: place, rest, ..cut });
+                for words in (0..=words).step_by(few) {
+                    cuts.extend(rests.iter().map(|&rest| Cut { words, rest, ..cut }));
                 }
             }
         }
@@ -184,20 +182,12 @@ fn tear_layouts(few: usize) {
 fn sectors_of_the_real_size_are_torn_too() {
     const SIZE: usize = 128 << 10;
     let slots = SIZE / SLOT_BYTES;
-    let fill = |count: usize, first: u32| {
-        let mut bytes: Vec<u8> =
-            (0..count as u32).flat_map(|place| encode(&record((first + place) as i32), first + place)).collect();
-        bytes.resize(SIZE, 0xFF);
-        bytes
-    };
     let mut cases = 0;
     // The newest is nearly full, then full, with the other one older.
     for count in [slots - 1, slots] {
-        let first = 1_000;
-        let board = Board::new(
-            Nor::new([fill(slots, first - slots as u32), fill(count, first)]),
-            Some(record((first as usize + count - 1) as i32)),
-        );
+        let (older, _) = sector(SIZE, slots, 1_000 - slots as i32, Other::None);
+        let (newer, newest) = sector(SIZE, count, 1_000, Other::None);
+        let board = Board::new(Nor::new([older, newer]), newest);
         let ops = ops(&board);
         assert!(ops.contains(&Done::Erase), "room for less than a quarter is made");
         for cut in cuts(&ops, SIZE / 4, 501, true) {
@@ -255,10 +245,8 @@ fn nobody_erases_the_newest_record_while_a_board_lives() {
         erases += board.nor.done.iter().filter(|done| **done == Done::Erase).count();
         assert_eq!(board.save(record(number)), Ok(()));
         let newest = encode(&record(number), number as u32 + 1);
-        let held = [Sector::A, Sector::B]
-            .iter()
-            .any(|&sector| board.nor.sector(sector).windows(SLOT_BYTES).step_by(16).any(|place| place == newest));
-        assert!(held);
+        let holds = |sector: &Vec<u8>| sector.windows(SLOT_BYTES).step_by(16).any(|place| place == newest);
+        assert!(board.nor.sectors.iter().any(holds));
     }
     println!("{erases} erases in 200 saves");
     assert!((30..=45).contains(&erases), "one in {SLOTS} saves");

@@ -24,6 +24,14 @@ fn a_force_that_falls_by_a_quarter_in_a_frame_is_withheld() {
     }
 }
 
+/// Expects that this much force is withheld after these frames. Returns the stage of the touch.
+fn withholds(mut hand: Hand, frames: impl Iterator<Item = Contact>, travel: Millimetres, withheld_mn: i32) -> Stage {
+    frames.for_each(|seen| _ = hand.frame(1_000, &seen, at(travel), &config()));
+    let withheld_n: f64 = hand.touch.withheld().0.to_num();
+    assert!((1e3 * withheld_n - f64::from(withheld_mn)).abs() < 0.1, "{withheld_n} N, not {withheld_mn} mN");
+    hand.touch.stage()
+}
+
 /// The lesser of the last two frames counts: interference that adds to one frame leaves no step behind.
 #[test]
 fn a_frame_that_reads_too_much_is_no_reference() {
@@ -39,13 +47,8 @@ fn a_frame_that_reads_too_much_is_no_reference() {
         (&[5_000, 1_000, 700], 300),
         (&[5_000, 1_000, 720], 0),
     ] {
-        let mut hand = hand;
-        for force_mn in frames_mn {
-            hand.frame(1_000, &contact(*force_mn, &config), at(travel), &config);
-        }
-        let withheld_n: f64 = hand.touch.withheld().0.to_num();
-        assert!((1e3 * withheld_n - f64::from(withheld_mn)).abs() < 0.1, "{frames_mn:?} mN: {withheld_n} N");
-        assert_eq!(hand.touch.stage(), Stage::Held, "{frames_mn:?} mN");
+        let frames = frames_mn.iter().map(|force_mn| contact(*force_mn, &config));
+        assert_eq!(withholds(hand, frames, travel, withheld_mn), Stage::Held, "{frames_mn:?} mN");
     }
     // One frame of a contact is no reference either.
     let mut hand = Hand::free(&config);
@@ -59,7 +62,6 @@ fn a_frame_that_reads_too_much_is_no_reference() {
 fn a_step_with_other_bad_taxels_is_not_withheld() {
     let config = config();
     let (hand, _, travel) = Hand::pressing(&config);
-    let seen = |force_mn, bad_taxels| Contact { bad_taxels, ..contact(force_mn, &config) };
     for (frames, withheld_mn) in [
         (&[(500, 1)][..], 0),
         (&[(500, 1), (500, 1), (500, 1)], 0),
@@ -68,12 +70,9 @@ fn a_step_with_other_bad_taxels_is_not_withheld() {
         (&[(500, 1), (200, 2)], 0),
         (&[(500, 0)], 500),
     ] {
-        let mut hand = hand;
-        for (force_mn, bad_taxels) in frames {
-            hand.frame(1_000, &seen(*force_mn, *bad_taxels), at(travel), &config);
-        }
-        let withheld_n: f64 = hand.touch.withheld().0.to_num();
-        assert!((1e3 * withheld_n - f64::from(withheld_mn)).abs() < 0.1, "{frames:?}: {withheld_n} N");
+        let seen =
+            |(force_mn, bad_taxels): &(i32, u8)| Contact { bad_taxels: *bad_taxels, ..contact(*force_mn, &config) };
+        withholds(hand, frames.iter().map(seen), travel, withheld_mn);
     }
 }
 
@@ -139,12 +138,10 @@ fn a_residue_after_a_step_is_doubtful_until_the_force_rises() {
             hand.frame(1_000, &contact(force_mn, &config), at(travel), &config);
         }
     };
-    for (left_mn, stage) in
-        [(0, Stage::Doubtful), (14, Stage::Doubtful), (249, Stage::Doubtful), (251, Stage::Held), (600, Stage::Held)]
-    {
+    for (left_mn, doubtful) in [(0, true), (14, true), (249, true), (251, false), (600, false)] {
         let mut hand = pressing;
         frames(&mut hand, 4_000_000, left_mn);
-        assert_eq!(hand.touch.stage(), stage, "{left_mn} mN");
+        assert_eq!(hand.touch.stage(), if doubtful { Stage::Doubtful } else { Stage::Held }, "{left_mn} mN");
     }
     let mut hand = pressing;
     frames(&mut hand, 4_000_000, 200);

@@ -198,8 +198,7 @@ fn another_object_at_the_edge_is_taken_hold_of() {
     }
 }
 
-/// A contact at the edge was fitted before a measuring press touches in the middle: the force at the end of the press
-/// must not contain the force ratio of the earlier contact.
+/// A contact at the edge was fitted before a press: its ratio must not be in the force at the end of the press.
 #[test]
 fn a_press_that_measures_loses_the_fit() {
     let mut board: Bench<Named> = Bench::new(&scene(1, 6.8, "")).unwrap();
@@ -276,8 +275,7 @@ fn taxels_that_are_masked_are_no_fault_any_more() {
     }
 }
 
-// A tare while something touches is distinguished from one on a free tip, over drawn arrays. The tare is never
-// refused; torque after it is.
+// A tare on a free tip and one while something touches are told apart, over drawn arrays; torque is refused after it.
 
 /// Arrays of each test.
 const ARRAYS: u64 = 120;
@@ -307,8 +305,7 @@ impl Finger {
         let mut rng = Rng::with_seed(seed);
         let mut setup = Setup::default();
         setup.tip.modulus_kpa = modulus_kpa;
-        // The frames are made without the row's sag; what little preload a few taxels have here is more than few may
-        // lack.
+        // Frames have no sag of the row; a few taxels here have less preload than `bad_taxels_max` may lack.
         let params = Params {
             modulus_pa: (modulus_kpa * 1e3) as i32,
             row_sag_ppb_per_code: 0,
@@ -422,8 +419,7 @@ fn a_later_tare_under_two_tenths_of_a_newton_and_more_is_flagged_and_a_clean_one
     }
 }
 
-/// An unusually uneven array, by a patch of high readings without a touch: the tare is flagged, so torque is refused
-/// until the host forces it.
+/// A patch of high readings without a touch is flagged at the tare: torque is refused until the host forces it.
 #[test]
 fn torque_after_a_flagged_tare_is_refused_unless_it_was_forced() {
     let mut finger = Finger::new(1, 250.0);

@@ -63,8 +63,7 @@ fn each_mode_has_its_command_for_the_bridge() {
     }
 }
 
-/// Torque off, a tare, new parameters and a cleared fault short the motor of a pressed tip until it has been at rest for
-/// 20 ms; then the bridge opens and stays open.
+/// However a drive ends, the motor is shorted until the tip was at rest for 20 ms. Then the bridge opens for good.
 #[test]
 fn a_motor_that_was_driven_brakes_until_the_tip_rests() {
     let endings: [(&str, End); 4] = [

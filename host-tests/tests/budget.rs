@@ -10,8 +10,7 @@ const DEADLINE: u32 = 12_568;
 /// Frames of the longest refinement, of which only one is the dearest, and one more.
 const REFINEMENT: u32 = 12;
 
-/// Frame times: `rest`, up to `spread` more, and with a contact the time of the fit level, from its minimum at a
-/// `model_q8` of 0 to its maximum at 256.
+/// Frame time: `rest`, up to `spread` more, and with a contact that of the level, from least to most at `model_q8` of 256.
 #[derive(Clone, Copy, Debug)]
 struct Stretch {
     frames: u32,
@@ -113,8 +112,7 @@ proptest! {
         }
         prop_assert_eq!(changes, 0, "it hunts");
         let last = last.expect("there were frames");
-        // With a contact the rest is less certain: by the difference of the model's maximum and minimum in the longest
-        // frame of a window.
+        // With a contact the rest is less certain by the difference of the model's maximum and minimum.
         let sure = |fit_level: FitLevel| {
             let blur = if contact { Budget::model_cycles(fit_level.lower()) } else { [0, 0] };
             fits(fit_level, rest + 100 + blur[0] - blur[1])
@@ -220,8 +218,7 @@ fn it_rises_where_the_next_effort_fits_with_room() {
     }
 }
 
-/// With a contact the measured frames include at least the model's minimum, so the rest is at most the frame time less
-/// that minimum.
+/// Measured frames with a contact include at least the model's minimum, so the rest is shorter by it.
 #[test]
 fn with_a_contact_the_models_least_is_taken_off() {
     let (fit_level, next) = (FitLevel::OneRow, FitLevel::TwoRows);

@@ -250,8 +250,7 @@ fn the_law_is_the_documented_one() {
     }
 }
 
-/// The contact force brakes a motion into the object and drives a release. The brake includes 85 % of it, within a
-/// quarter and twice the motor's own deceleration.
+/// The brake includes 85 % of the contact force, within a quarter and twice the motor's own deceleration.
 #[test]
 fn the_brake_counts_on_the_force_where_it_helps() {
     let config = config();
@@ -273,8 +272,7 @@ fn the_brake_counts_on_the_force_where_it_helps() {
     }
 }
 
-/// The fastest gain set corrects every position error. The calmest one ignores an error within the slack; of a larger
-/// error it corrects the part beyond the slack.
+/// The fastest gain set corrects every position error, the calmest one only the part of it beyond the slack.
 #[test]
 fn a_calm_loop_ignores_an_error_within_the_slack() {
     let config = config();

@@ -133,8 +133,7 @@ fn the_share_that_a_bad_taxel_hides_is_that_of_the_models_pressure() {
     }
 }
 
-/// Half of the rows are bad under a contact in the middle of the array: half of its force is hidden, whatever its size. Each
-/// row more hides no less.
+/// Half of the rows are bad under a centred contact: half of its force is hidden. Each row more hides no less.
 #[test]
 fn half_of_a_contact_is_hidden_by_half_of_the_rows() {
     let mut rng = Rng::with_seed(7);
@@ -182,8 +181,7 @@ fn the_share_that_one_bad_taxel_hides_of_a_light_contact_is_right() {
     assert!(kinds.iter().all(|kind| *kind > 500), "{kinds:?}");
 }
 
-/// A flickering taxel under a contact of 2 mm hides at most a twentieth of it: the uncertainty stays 0 at every fit
-/// level, for a taxel in the middle as for one at the rim.
+/// A flickering taxel hides at most a twentieth of a contact of 2 mm: the uncertainty stays 0 at every fit level.
 #[test]
 fn a_taxel_that_flickers_under_a_contact_makes_no_doubt() {
     let config = config();

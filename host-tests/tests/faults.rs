@@ -86,8 +86,7 @@ fn a_frame_that_reads_too_much_or_too_little_is_forgotten() {
     }
 }
 
-/// As many dead taxels as allowed in the middle of the contact: the fit estimates the force without them, and the true
-/// force stays at the goal.
+/// As many dead taxels as allowed in the middle of the contact: the fit estimates the force, which stays at the goal.
 #[test]
 fn taxels_that_die_within_the_contact_do_not_change_the_force() {
     for goal_mn in [200, 1_000, 4_000] {
@@ -132,8 +131,7 @@ fn noise_at_no_force_is_not_a_frozen_encoder() {
     }
 }
 
-/// Swapped encoder channels or motor leads: stopped within 5 ms of the first drive, 0.5 mm on. (It pressed to 8.6 N,
-/// and then flew back.)
+/// Swapped encoder channels or motor leads: stopped within 5 ms of the first drive, 0.5 mm on.
 #[test]
 fn a_motor_that_runs_the_wrong_way() {
     for (encoder_reversed, leads_swapped) in [(true, false), (false, true)] {

@@ -37,8 +37,7 @@ fn mm(length: Millimetres) -> f64 {
     length.0.to_num()
 }
 
-/// Checks the bounds of force and centre for two refinements of one tactile image, and for each fit level after many
-/// frames.
+/// Checks force and centre of a tactile image for two refinements, and for each fit level after many frames.
 fn holds(scene: &Scene, bad: [u32; ROWS]) {
     let (picture, seen) = still(scene, bad);
     assert!(seen >= 12, "{seen} taxels see {scene:?}");

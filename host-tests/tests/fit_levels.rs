@@ -119,8 +119,7 @@ fn the_model_is_at_work_where_there_is_a_contact_and_an_effort_for_it() {
     }
 }
 
-/// During a refinement the indentation scales with the root of the force, so a change of force is not taken for another
-/// contact.
+/// The indentation scales with the root of the force, so a change of force is not taken for another contact.
 #[test]
 fn a_force_that_changes_within_a_refinement_is_followed() {
     let config = config();
@@ -206,8 +205,7 @@ fn other_parameters_begin_the_fit_anew() {
     }
 }
 
-/// A fit that is handed another geometry in the middle of a refinement takes it as a new one, by itself: its sums would
-/// overflow.
+/// A fit that is given another geometry during a refinement begins again by itself: its sums would overflow.
 #[test]
 fn a_fit_that_is_handed_another_geometry_begins_anew() {
     let mut rng = fastrand::Rng::with_seed(7);
@@ -230,8 +228,7 @@ fn a_fit_that_is_handed_another_geometry_begins_anew() {
     }
 }
 
-/// A contact that jumps from place to place, farther than a refinement goes, is found again: a guess that leads nowhere
-/// is given up.
+/// A contact that jumps farther than a refinement goes is found again: a guess that leads nowhere is given up.
 #[test]
 fn a_contact_elsewhere_is_found_again() {
     let config = config();

@@ -16,12 +16,8 @@ struct Codes {
 impl Codes {
     fn frame(&self) -> Frame {
         let mut frame = Frame::EMPTY;
-        for column in 0..COLUMNS {
-            frame.set_code(ROWS, column, self.levels[column]);
-            for row in 0..ROWS {
-                frame.set_code(row, column, self.levels[column] + self.above[row][column]);
-            }
-        }
+        recode(&mut frame, |row, column, _| self.levels[column] + self.above[row][column]);
+        (0..COLUMNS).for_each(|column| frame.set_code(ROWS, column, self.levels[column]));
         for (slot, column, code) in &self.wild {
             frame.set_code(*slot, *column, *code);
         }
@@ -43,9 +39,8 @@ fn calibration() -> impl Strategy<Value = Calibration> {
     (gains, mask).prop_map(|(gains, mask)| Calibration::new(&gains, &mask).unwrap())
 }
 
-fn config(sag_ppb: i32, dead_codes: i32) -> Config {
-    let params = Params { row_sag_ppb_per_code: sag_ppb, dead_codes, ..Params::DEFAULT };
-    Config::shipped(&params).unwrap()
+fn config(row_sag_ppb_per_code: i32, dead_codes: i32) -> Config {
+    allowed(Params { row_sag_ppb_per_code, dead_codes, ..Params::DEFAULT })
 }
 
 /// The bad columns of a row by their definition.

@@ -60,8 +60,7 @@ struct RearEnd {
     mm: f64,
     /// Mean force as the guard measures it, Q16 N.
     force: i32,
-    /// Earlier frames at a larger travel than all later ones: travel, and smallest mean force up to that frame. The
-    /// farthest comes first.
+    /// Frames at a larger travel than all later ones, farthest first: travel, and smallest mean force up to that frame.
     earlier: Vec<(f64, i32)>,
     pushes: u32,
 }
@@ -130,8 +129,7 @@ fn no_input_opens_an_end() {
     assert!(runs.iter().all(|count| *count > 300) && behind > 1_000, "{runs:?}, {behind} frames behind a moved end");
 }
 
-/// An object that pushes the tip back is released: the rear end moves to the clearance and 1 mm behind where it pushed
-/// last. A force that only remains moves no end.
+/// The rear end moves to the clearance and 1 mm behind the last push. A force that only remains moves no end.
 #[test]
 fn only_a_push_takes_the_rear_end_along() {
     let config = Config::shipped(&Params::DEFAULT).expect("allowed");
@@ -226,8 +224,7 @@ fn no_duty_makes_it_fast_in_the_air() {
     assert!(fast > 0 && stopped > 100, "the adversary never tried");
 }
 
-/// A finger that is as strong as its parameters say, give or take 30 %, with friction and contacts, is never taken for
-/// a broken one.
+/// A finger as strong as its parameters say, within 30 %, with friction and contacts, is never taken for a broken one.
 #[test]
 fn a_sound_finger_is_never_stopped_for_its_direction() {
     let mut rng = Rng::with_seed(3);
@@ -259,8 +256,7 @@ fn a_sound_finger_is_never_stopped_for_its_direction() {
     }
 }
 
-/// Swapped channels or leads: stopped within 5 ms and 0.5 mm of full drive, in either direction. A blocked motor or a
-/// dead encoder too.
+/// Swapped leads, a blocked motor or a dead encoder: stopped within 5 ms and 0.5 mm of full drive, in either direction.
 #[test]
 fn the_wrong_way_ends_within_half_a_millimetre() {
     let config = Config::shipped(&Params::DEFAULT).expect("the defaults are allowed");

@@ -41,8 +41,7 @@ impl Finger {
         self.pushed(0)
     }
 
-    /// Accelerates over 50 ms, so that no change of the speed is large, and moves on for a time. Returns the first
-    /// fault and its time.
+    /// Accelerates over 50 ms, so no change of speed is large, and moves on. Returns the first fault and its time.
     fn goes(&mut self, speed_mm_per_s: f64, seconds: f64) -> Option<(Fault, f64)> {
         let from = self.speed_mm_per_s;
         let frames = (seconds / self.frame_s()) as u32;
@@ -78,8 +77,7 @@ impl Finger {
     }
 }
 
-/// At rest every duty passes up to the end of the travel; just beyond the end only duty back; 1 mm beyond it is a
-/// fault.
+/// At rest every duty passes up to the end of the travel, beyond it only duty back; 1 mm beyond it is a fault.
 #[test]
 fn an_end_is_where_it_is_said_to_be() {
     let back_mm: f64 = Finger::new().config.bounds.back.0.to_num();
@@ -161,8 +159,7 @@ fn after_a_contact_it_may_be_fast_for_a_while() {
     }
 }
 
-/// Pressed is from half a millimetre behind where it touched to two indentations forward, or five back, and half a
-/// millimetre more.
+/// Pressed: from 0.5 mm behind the touch to two indentations forward, or five back, and 0.5 mm more.
 #[test]
 fn a_tip_is_pressed_as_deep_as_its_force_bears_out() {
     let mut finger = Finger::new();
@@ -247,8 +244,7 @@ fn a_jump_is_fast() {
     }
 }
 
-/// A jump of the encoder before torque (an encoder that is reconnected, a finger that is moved by hand) does not count
-/// as motion against the drive.
+/// A jump of the encoder before torque does not count as motion against the drive.
 #[test]
 fn a_jump_before_torque_is_forgotten() {
     for jump_mm in [0.0, 0.5, -0.5, 5.0, -5.0] {

@@ -21,8 +21,7 @@ fn moved_while_held<E: Set>(board: &mut Bench<E>, goal_mn: i32, moved_mm: f64) {
     lets_go(board, 2.0, &format!("goal {goal_mn} mN, {moved_mm} mm, held {held:.3} N"));
 }
 
-/// Another finger pushes a held object towards this one: the loop follows and holds the force, but the stored surface
-/// stays at the travel of the first touch. A release to that surface once left the object in contact.
+/// The loop follows a held object that is pushed towards it; a release to the surface of the first touch would hold it.
 #[test]
 fn an_object_that_came_along_while_it_was_held_is_let_go() {
     for goal_mn in [300, 1_000, 3_000] {
@@ -52,8 +51,7 @@ fn a_press_that_measures_is_let_go() {
     (0..4).for_each(|seed| goal_0_during_a_press(&mut ordinary(seed, 1.0, 4, 2)));
 }
 
-/// The sequence of `docs/commissioning.md`: tare, torque, goal 0, a press. The tip rests at the clearance behind the
-/// surface that the press touched, not where the guard cuts the motor off.
+/// As in `docs/commissioning.md`: the tip rests at the clearance behind the surface that the press touched.
 #[test]
 fn a_press_from_a_released_tip_ends_at_the_clearance() {
     let mut board = ready();
@@ -76,8 +74,7 @@ fn a_press_from_a_released_tip_ends_at_the_clearance() {
     assert!(board.truth().force_n <= 0.0, "nearer: {}", told(&mut board));
 }
 
-/// A residue of an earlier contact is not released like an object. Here parameters are written with torque off, so the
-/// touch is forgotten, and the object is taken away.
+/// A residue of an earlier contact is not an object. Parameters that are written with torque off forget the touch.
 #[test]
 fn a_residue_from_before_torque_does_not_make_the_tip_go_back() {
     for seed in 0..4 {

@@ -30,8 +30,7 @@ fn the_pipeline_comes_to_rest_under_what_does_not_change() {
     }
 }
 
-/// The observer comes to rest once the encoder rests, whatever happened before: also after jumps, and from impossible
-/// speeds.
+/// The observer comes to rest once the encoder rests, also after jumps and from impossible speeds.
 #[test]
 fn the_observer_recovers_from_anything() {
     for (settle_ns, sample_cycles, speed_max_um_per_s) in

@@ -102,8 +102,7 @@ fn load(mn: i32) -> i32 {
     (i64::from(config().bounds.acceleration_per_n) * i64::from(mn) / 1_000) as i32
 }
 
-/// Moves the tip forward by `um_per_frame` in each frame with a constant tactile image, while the motor's load grows by
-/// `load_mn` per 0.1 mm. Returns the travel at which the monitor stops it.
+/// Moves the tip forward under a constant image and a load that grows per 0.1 mm. Returns the travel at its stop.
 fn stopped_um(um_per_frame: i32, load_mn: i32, force_mn: i32, goal_mn: i32) -> Option<i32> {
     let config = config();
     let mut monitor = restarted(5_000);
@@ -139,8 +138,7 @@ fn a_force_that_is_held_may_stay_the_same() {
     }
 }
 
-/// No fault if the tactile image changes at all, or if an unchanged one is plausible: the tip does not press, the force
-/// is small, or the tip moves back.
+/// No fault if the image changes at all, the tip does not press or moves back, or the force is small.
 #[test]
 fn an_array_that_shows_any_change_or_no_contact_does_not() {
     let config = config();
@@ -215,8 +213,7 @@ fn stopped_by_sums(goal_mn: i32, sums: impl Iterator<Item = (i32, u16)>) -> Opti
     sums.into_iter().position(|frame| fault(frame).is_some())
 }
 
-/// A step of the sum that no contact can cause stops the motor after 8 ms: not where it goes back before, not where taxels
-/// recover.
+/// A step of the sum that no contact makes stops the motor after 8 ms, unless it goes back or taxels recover.
 #[test]
 fn an_array_that_reads_much_more_within_a_frame_is_broken() {
     let config = config();
@@ -234,8 +231,7 @@ fn an_array_that_reads_much_more_within_a_frame_is_broken() {
     assert_eq!(stopped_by_sums(1_000, grows), None);
 }
 
-/// Taxels that are masked, or that fail after the tare, lose their baseline, too: the sum of the others stays above
-/// that of an array without contact.
+/// Taxels that are masked or fail after the tare lose their baseline, too: the sum of the others is no fault.
 #[test]
 fn an_array_without_some_of_its_taxels_does_not_read_less() {
     let config = config();

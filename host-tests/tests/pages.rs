@@ -277,8 +277,7 @@ fn every_page_that_a_source_names_exists() {
     }
 }
 
-/// The schematic's labels are names and values of its page, and each net begins at the pin of the netlist, which the
-/// image uses.
+/// The labels of the schematic are names and values of its page; each net begins at a pin that the image uses.
 #[test]
 fn the_schematic_is_that_of_the_netlist() {
     let read = |path: &str| fs::read_to_string(root().join(path)).expect("a file of the repository");

@@ -240,9 +240,7 @@ fn place() -> impl Strategy<Value = Place> {
     prop_oneof![Just(Place::Least), Just(Place::Largest), Just(Place::Default), (0.0..=1.0).prop_map(Place::Between),]
 }
 
-/// Any valid parameters, with the limits of the ranges more often than values in between.
-///
-/// The direction is confirmed in nine of ten, because nothing drives the motor otherwise.
+/// Valid parameters, more often at the ends of their ranges; the direction is confirmed in nine of ten, to drive at all.
 fn any_params() -> impl Strategy<Value = Params> {
     let params = prop_oneof![
         1 => Just(Params::DEFAULT),

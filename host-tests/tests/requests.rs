@@ -216,15 +216,6 @@ fn a_press_that_waits_is_refused_once_torque_is_off() {
     assert_eq!((status.mode, status.measure), (Mode::Tare, NOT_READY));
 }
 
-#[test]
-fn a_press_without_a_tare_is_refused() {
-    let mut board = Bench::default();
-    board.command().torque = true;
-    board.step();
-    board.request(Task::Press);
-    assert_eq!(board.step().measure, NOT_READY);
-}
-
 /// A request while a measurement runs is answered by its outcome, also in its last frame; the next one begins another.
 #[test]
 fn a_press_in_the_frame_in_which_another_ends_has_its_outcome() {
@@ -316,8 +307,7 @@ fn torque_is_refused_before_the_direction_is_confirmed() {
     }
 }
 
-/// Torque and a goal that were set before the tare request do not start an approach after the tare; torque must be
-/// turned off first.
+/// Torque and a goal from before a tare request start no approach after the tare: torque must be off first.
 #[test]
 fn torque_that_was_on_before_the_tare_drives_nothing_until_it_was_off() {
     for (off_first, frames) in [(0, 0), (0, 1), (0, 100), (1, 1), (1, 100)] {
@@ -404,8 +394,7 @@ fn torque_at_a_wrong_supply_is_a_fault_before_it_drives() {
     }
 }
 
-/// Before a tare the offsets of the array look like a contact. So no contact is reported, whatever presses; only
-/// defects of the array are.
+/// Before a tare the array's offsets look like a contact: none is reported, only defects of the array are.
 #[test]
 fn before_a_tare_no_contact_is_reported() {
     let mut board = at(-2.0);

@@ -42,8 +42,7 @@ fn without_an_error_each_gain_set_lasts_twice_as_long_as_the_one_before() {
     assert_eq!(run(&mut schedule, 0, 1_000, &config), [GAIN_SETS - 1; 1_000], "no gain set is calmer");
 }
 
-/// The largest mean error of a gain set is two bands for the calmest set and doubles with each faster set. The mean
-/// converges to a constant error from above to the last bit.
+/// The largest mean error of a set: two bands for the calmest, twice as much for each faster one. The mean is exact.
 #[test]
 fn a_gain_set_is_kept_up_to_its_largest_error() {
     let config = config();

@@ -166,8 +166,7 @@ fn a_hold_goes_quickly_over_what_is_left() {
     assert!(is_fast({ hand }.frame(7_000, &held, at(travel), &config).0));
 }
 
-/// Indentation at which a shorted motor stops that goes into a contact with this speed: by the motor's damping, its
-/// friction and the contact.
+/// Indentation at which a shorted motor stops: by its damping, its friction and the contact.
 fn stops_mm(from_mm: f64, speed: MillimetresPerSecond, config: &Config) -> f64 {
     let c_per_s = f64::from(config.damping_q17_per_s) / 131_072.0;
     let mm_per_s2_per_n = f64::from(config.bounds.acceleration_per_n) / 256.0;
@@ -238,8 +237,7 @@ fn the_motion_since_the_scan_counts() {
     }
 }
 
-/// Of the distance that the tip moved beyond the indentation since the touch, the share of the uncertainty counts as
-/// indentation.
+/// The share of the uncertainty of the way beyond the indentation since the touch counts as indentation.
 #[test]
 fn an_uncertain_force_takes_the_tip_to_be_as_deep_as_it_moved() {
     let config = config();

@@ -316,8 +316,7 @@ fn the_watchdog_hears_only_good_instructions_for_this_device() {
     }
 }
 
-// Requests on the bus: one that cannot be executed is answered with error 1, an accepted one is passed on, and its
-// result can be read.
+// A request that cannot be executed is answered with error 1; an accepted one is passed on, and its result can be read.
 
 const RESULT: Result<(), u8> = Err(1);
 

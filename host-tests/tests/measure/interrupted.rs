@@ -78,8 +78,7 @@ fn end_and_go_on(parts: &[u32]) {
     }
 }
 
-/// Torque off and strokes in one write, while a press moves: the press ends with its own record, the strokes are not
-/// rows of it.
+/// Torque off and strokes in one write during a press: the press ends with its own record, without rows of the strokes.
 #[test]
 fn a_motion_that_replaces_another_is_one_of_its_own() {
     let mut finger = Made::begun(Task::Press);
@@ -130,9 +129,16 @@ fn a_record_ended_by_the_host_is_whole() {
 // A request that cannot be served has its reason at once.
 
 /// The array with the object pressed in.
-fn pressed(finger: &mut Made) {
+fn pressed(mut finger: Made) -> Made {
     finger.bench.place_object(-0.8);
     finger.frames(20);
+    finger
+}
+
+fn with_torque(mut finger: Made) -> Made {
+    finger.bench.command().torque = true;
+    finger.frame();
+    finger
 }
 
 /// A state, how it is made, and how a jog, strokes and a press end in it.
@@ -142,8 +148,9 @@ type Case = (&'static str, fn() -> Made, [Option<Ended>; 3]);
 #[test]
 fn every_state_has_its_answer() {
     const NO: Option<Ended> = Some(Ended::NotReady);
-    let states: [Case; 9] = [
+    let states: [Case; 10] = [
         ("not tared", Made::untared, [NO; 3]),
+        ("not tared, torque on", || with_torque(Made::untared()), [NO; 3]),
         ("tared", Made::tared, [None, None, NO]),
         (
             "unconfirmed",
@@ -155,16 +162,7 @@ fn every_state_has_its_answer() {
             },
             [None, Some(Ended::Unconfirmed), NO],
         ),
-        (
-            "torque on",
-            || {
-                let mut finger = Made::tared();
-                finger.bench.command().torque = true;
-                finger.frame();
-                finger
-            },
-            [NO, NO, None],
-        ),
+        ("torque on", || with_torque(Made::tared()), [NO, NO, None]),
         (
             "taring",
             || {
@@ -175,20 +173,11 @@ fn every_state_has_its_answer() {
             },
             [NO; 3],
         ),
-        (
-            "touching",
-            || {
-                let mut finger = Made::tared();
-                pressed(&mut finger);
-                finger
-            },
-            [NO; 3],
-        ),
+        ("touching", || pressed(Made::tared()), [NO; 3]),
         (
             "tared while touching",
             || {
-                let mut finger = Made::untared();
-                pressed(&mut finger);
+                let mut finger = pressed(Made::untared());
                 finger.bench.command().tare_request += 1;
                 finger.frames(700);
                 finger
@@ -207,9 +196,7 @@ fn every_state_has_its_answer() {
         (
             "fault",
             || {
-                let mut finger = Made::tared();
-                finger.bench.command().torque = true;
-                finger.frame();
+                let mut finger = with_torque(Made::tared());
                 finger.frame_with(|record| record.sense.bridge_fault = true);
                 finger.bench.command().torque = false;
                 finger.frame();

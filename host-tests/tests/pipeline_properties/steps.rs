@@ -130,8 +130,7 @@ impl Run {
         if status.mode == Mode::Press && !measures {
             assert!(was_running, "a press goes on after its answer: {status:?}");
         }
-        // Enabling torque starts from the present goal and touch, whatever was requested before; a measurement
-        // begins only with its request.
+        // Torque starts from the present goal and touch; a measurement begins only with its request.
         if drives(status.mode) && !drives(self.before.mode) && status.mode != Mode::Strokes {
             let sound = match status.mode {
                 Mode::Approach | Mode::Force => command.goal > Newtons::ZERO,
@@ -178,8 +177,7 @@ proptest! {
         prop_assert_eq!(digest(), digest());
     }
 
-    /// Whatever was commanded before: with torque off nothing drives, and with torque on again the old goal is
-    /// forgotten.
+    /// Whatever was commanded before: nothing drives without torque, and torque on again forgets the old goal.
     #[test]
     fn nothing_commanded_acts_after_torque_off(params in any_params(), inputs in any_inputs(100)) {
         let mut run = Run::new(&params, true);
@@ -242,7 +240,6 @@ fn the_runs_come_everywhere() {
     assert_eq!(Vec::from_iter(modes), [0, 1, 2, 3, 4, 5, 6, 7]);
     assert_eq!(Vec::from_iter(tasks), [0, 1, 2, 3]);
     assert!([0, 1, 2, 3].iter().all(|number| ends.contains(number)), "{ends:?}");
-    // A repeated frame gives fault 1. Missing frames, damaged parameters, late steps and crashes are detected outside of
-    // the step.
+    // Fault 1 is a repeated frame. The others are detected outside of the step.
     assert_eq!(Vec::from_iter(faults), [0, 1, 2, 3, 4, 5, 6, 7, 9, 10, 11, 14, 15]);
 }

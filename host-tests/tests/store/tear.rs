@@ -61,8 +61,7 @@ fn ops(board: &Board) -> Vec<Done> {
     board.nor.done
 }
 
-/// Two power cuts in a row: the first at every operation, the second at one operation in `few` of the following start
-/// and save, at other ones each time.
+/// Cuts the power at every operation, and again at one operation in `few` of the next start and save, others each time.
 fn tear_twice(board: &Board, words: usize, few: usize) -> [usize; 2] {
     let (mut cases, mut alarms) = (0, 0);
     for first in cuts(&ops(board), words, 1, true) {
@@ -203,8 +202,7 @@ fn sectors_of_the_real_size_are_torn_too() {
     assert!(cases > 1_000);
 }
 
-/// Records with gains are longer than records without. Wherever power is cut, the next start loads one complete record,
-/// the old or the new one.
+/// Wherever power is cut, the next start loads one complete record with or without gains, the old or the new one.
 #[test]
 fn gains_torn_anywhere_are_the_old_ones_or_the_new_ones() {
     let size = 4 * Record::SLOT_MAX;
@@ -514,8 +512,7 @@ impl Board {
         }
     }
 
-    /// Starts like the board and checks the result: the old or the new values, and a fault if the new ones were begun
-    /// but are missing.
+    /// Starts like the board: it has the old or the new values, and a fault if the new ones were begun but are missing.
     pub fn start(&mut self, cut: Option<Cut>) {
         self.nor.power_on(cut);
         self.journal = Journal::new(&self.nor);

@@ -2,8 +2,7 @@
 
 use super::*;
 
-/// A force that vanishes in one frame is implausible, as no object moves at metres per second: the loop keeps the
-/// earlier force and does not press harder.
+/// No object moves at metres per second: of a force that vanishes in a frame the loop keeps the earlier value.
 #[test]
 fn a_force_that_falls_by_a_quarter_in_a_frame_is_withheld() {
     let config = config();
@@ -89,8 +88,7 @@ fn a_step_in_a_slow_frame_is_not_withheld() {
     }
 }
 
-/// A doubtful touch whose force rises above its least by that of a contact is held again. It keeps its place and its
-/// largest force until the force rises further, and lasts for longer than noise.
+/// A doubtful touch is held again from a rise by a contact's force. It keeps place and peak until a further rise.
 #[test]
 fn a_force_that_returns_is_held_again() {
     let config = config();
@@ -267,8 +265,7 @@ fn a_touch_from_before_torque_has_no_place_until_its_force_rises() {
         assert_eq!(hand.touch.surface(), Some(minus(mm(3.0), more.indentation)));
         let mut released = hand;
         assert!(!is_fast(released.frame(0, &more, at(mm(3.0)), &config).0));
-        // Above it by the force of a contact: from here on the surface stays. What this force presses deeper than the
-        // last one does not move it back.
+        // Above it by the force of a contact the surface stays, however much deeper this force presses.
         let surface = hand.touch.surface();
         for travel_mm in [3.0, 3.1] {
             hand.frame(7_000, &contact(force_mn + 41, &config), at(mm(travel_mm)), &config);

@@ -9,10 +9,8 @@ use sim::mechanics::pressures::Cell;
 /// the largest force of the second press.
 fn next_press(torque: bool, after_s: f64, depth_mm: f64) -> [f64; 3] {
     let mut board = ready();
-    board.command().goal = newtons(1_000);
-    board.run(1.0);
-    board.command().goal = newtons(0);
-    board.run(after_s);
+    board.hold(1_000, 1.0);
+    board.hold(0, after_s);
     board.command().torque = torque;
     let travel = board.truth().travel_mm;
     board.carry_object(5.0, travel - depth_mm, 100.0, |_| {});
@@ -58,20 +56,17 @@ fn bench(params: &Params) -> Bench {
 fn after_a_curve(touching: bool, off_s: f64, goal_mn: i32) -> f64 {
     let mut board = bench(&Params { curve_permille: 500, ..Params::DEFAULT });
     if touching {
-        board.command().goal = newtons(1_000);
-        board.run(0.5);
+        board.hold(1_000, 0.5);
     }
     board.command().torque = false;
-    board.command().goal = newtons(0);
-    board.run(0.01);
+    board.hold(0, 0.01);
     board.pipeline().configure(&config());
     board.place_object(50.0);
     board.place(0.0);
     board.run(off_s);
     board.place_object(5.0);
     board.command().torque = true;
-    board.command().goal = newtons(goal_mn);
-    board.run(2.0)
+    board.hold(goal_mn, 2.0)
 }
 
 /// `curve_permille` to 0 while the tip touches: the baseline learns the last bent frame's row for ever.
@@ -115,8 +110,7 @@ fn clear(board: &mut Bench, clear_mm: f64) {
 fn what_presses_for_seconds_is_not_left_of_what_was_held() {
     for (goal_mn, first_mm, then_mm) in [(2_000, 0.95, 0.75), (6_000, 1.6, 1.3)] {
         let mut board = bench(&Params::DEFAULT);
-        board.command().goal = newtons(goal_mn);
-        board.run(1.0);
+        board.hold(goal_mn, 1.0);
         board.command().goal = newtons(0);
         clear(&mut board, 4.1);
         let travel = board.truth().travel_mm;
@@ -127,11 +121,21 @@ fn what_presses_for_seconds_is_not_left_of_what_was_held() {
         let (held, read) = (board.truth().force_n, board.status().contact.force.0.to_num::<f64>());
         board.place_object(5.0);
         board.run(0.05);
-        board.command().goal = newtons(1_000);
-        let largest = board.run(1.0);
+        let largest = board.hold(1_000, 1.0);
         let name = format!("after {goal_mn} mN: {held:.3} N read {read:.3} N; goal 1 N then has {largest:.3} N");
         assert!((held - read).abs() <= 0.02 && largest <= 1.02, "{name}");
     }
+}
+
+/// Holds 6 N, switches torque off, takes the object away, and puts it back; each after a time, s.
+fn lose<E: Set>(board: &mut Bench<E>, [held_s, off_s, gone_s]: [f64; 3]) {
+    board.hold(6_000, held_s);
+    board.command().torque = false;
+    board.hold(0, off_s);
+    board.place_object(50.0);
+    board.place(0.0);
+    board.run(gone_s);
+    board.place_object(5.0);
 }
 
 /// A tare forgets the force that was held before it, so a later touch is not compared with it; torque is off for 5 s.
@@ -141,27 +145,17 @@ fn a_tare_forgets_what_was_held() {
     for (history, largest) in [false, true].into_iter().zip(&mut largest) {
         let mut board = bench(&Params::DEFAULT);
         if history {
-            board.command().goal = newtons(6_000);
-            board.run(1.0);
-            board.command().torque = false;
-            board.command().goal = newtons(0);
-            board.run(0.2);
-            board.place_object(50.0);
-            board.place(0.0);
-            board.run(5.0);
-            board.place_object(5.0);
+            lose(&mut board, [1.0, 0.2, 5.0]);
             board.tare();
         }
-        board.command().goal = newtons(200);
-        board.run(1.0);
+        board.hold(200, 1.0);
         board.command().goal = newtons(0);
         clear(&mut board, 4.2);
         board.place_object(3.0);
         board.run(3.0);
         board.place_object(5.0);
         board.run(0.05);
-        board.command().goal = newtons(1_000);
-        *largest = board.run(1.0);
+        *largest = board.hold(1_000, 1.0);
     }
     assert!(largest[1] < largest[0] + 0.02, "goal 1 N has {largest:?} N without and with a history");
 }
@@ -180,16 +174,13 @@ fn another_object_at_the_edge_is_taken_hold_of() {
                 board.place_object(4.0);
                 board.tare();
                 if history != "none" {
-                    board.command().goal = newtons(goal_mn);
-                    board.run(0.7);
+                    board.hold(goal_mn, 0.7);
                 }
                 if history == "let go" {
-                    board.command().goal = newtons(0);
-                    board.run(0.7);
+                    board.hold(0, 0.7);
                 }
                 board.place_object(13.0);
-                board.command().goal = newtons(goal_mn);
-                board.run(2.0);
+                board.hold(goal_mn, 2.0);
                 let off = (board.truth().force_n - 1e-3 * f64::from(goal_mn)).abs();
                 let held = off <= 0.02 && board.status().mode == Mode::Force;
                 assert!(held, "{history}, {x_mm} mm, goal {goal_mn} mN: {}", told(&mut board));
@@ -203,8 +194,7 @@ fn another_object_at_the_edge_is_taken_hold_of() {
 fn a_press_that_measures_loses_the_fit() {
     let mut board: Bench<Named> = Bench::new(&scene(1, 6.8, "")).unwrap();
     board.tare();
-    board.command().goal = newtons(2_000);
-    board.run(1.0);
+    board.hold(2_000, 1.0);
     board.request(Task::Press);
     board.step();
     while board.step().contact.force >= newtons(15) {}
@@ -228,19 +218,10 @@ fn what_is_left_of_a_contact_in_the_air_is_no_surface() {
         for (history, swing) in [false, true].into_iter().zip(&mut swings) {
             let mut board = ordinary(seed, 6.5, 6, 3);
             if history {
-                board.command().goal = newtons(6_000);
-                board.run(3.0);
-                board.command().torque = false;
-                board.command().goal = newtons(0);
-                board.run(0.3);
-                board.place_object(60.0);
-                board.place(0.0);
-                board.run(0.01);
-                board.place_object(5.0);
+                lose(&mut board, [3.0, 0.3, 0.01]);
                 board.command().torque = true;
             }
-            board.command().goal = newtons(1_000);
-            board.run(2.0);
+            board.hold(1_000, 2.0);
             let (mut least, mut most) = (f64::MAX, 0.0_f64);
             for _ in 0..10_000 {
                 board.step();
@@ -263,9 +244,7 @@ fn taxels_that_are_masked_are_no_fault_any_more() {
     for frames_before in [0, 5] {
         let mut board = Bench::default();
         board.harm(|faults| (2..8).for_each(|column| faults.array.taxels[4][column] = Taxel::Dead));
-        for _ in 0..frames_before {
-            board.step();
-        }
+        board.frames(frames_before);
         board.pipeline().calibrate(&calibration);
         board.tare();
         board.step();

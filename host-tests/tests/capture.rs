@@ -1,7 +1,7 @@
 //! Captures in the core: kept frames come back to the bit, damage is reported, and a replay finds differences.
 
 use crate::common::*;
-use fingertip::capture::Ended;
+use fingertip::capture::{Ended, Head};
 use fingertip::shipped::Gains;
 use replay::{Field, Frames, ReplayError, replay};
 
@@ -30,6 +30,14 @@ impl<const BYTES: usize> Recorded<BYTES> {
             self.frame();
         }
         assert_eq!(self.capture.standing().ended, Ended::Full);
+    }
+
+    /// A fresh finger that records from its tare on.
+    fn armed() -> Self {
+        let mut finger = Self::new();
+        finger.capture.arm();
+        finger.bench.command().tare_request += 1;
+        finger
     }
 
     /// A press of a fresh finger.
@@ -283,29 +291,26 @@ fn others_are_told_apart() {
 
 const BYTES: usize = 44 << 10;
 
-fn agrees<const BYTES: usize>(finger: &Recorded<BYTES>) -> u32 {
-    let mut last = Status::default();
-    let replayed = replay::<ROWS, COLUMNS>(finger.capture.data(), &CLOCKS, |_, status| last = *status);
-    let replayed = replayed.expect("a capture");
+/// Replays a capture without a difference; its head.
+fn agrees<const BYTES: usize>(finger: &Recorded<BYTES>, mut each: impl FnMut(&Status)) -> Head<ROWS, COLUMNS> {
+    let replayed = replay(finger.capture.data(), &CLOCKS, |_, status| each(status)).expect("a capture");
     assert_eq!(replayed.difference, None);
-    replayed.head.frames
+    replayed.head
 }
 
 #[test]
 fn a_press_replays_to_the_bit_also_with_gains() {
     let finger = Recorded::<BYTES>::pressed();
     let (mut modes, mut force_n) = (Vec::new(), 0.0);
-    let replayed = replay::<ROWS, COLUMNS>(finger.capture.data(), &CLOCKS, |_, status| {
+    let head = agrees(&finger, |status| {
         modes.push(status.mode);
         force_n = status.contact.force.0.to_num::<f64>();
     });
-    let replayed = replayed.expect("a capture");
-    assert_eq!(replayed.difference, None);
-    assert_eq!((replayed.head.ended, replayed.head.gains), (Ended::Full, gains()));
+    assert_eq!((head.ended, head.gains), (Ended::Full, gains()));
     modes.dedup();
     assert_eq!(modes, [Mode::Tare, Mode::Off, Mode::Approach, Mode::Force], "a press is in it");
     assert!((force_n - 0.8).abs() < 0.1, "{force_n} N");
-    assert!(replayed.head.frames > TARE_FRAMES + 600, "{} frames", replayed.head.frames);
+    assert!(head.frames > TARE_FRAMES + 600, "{} frames", head.frames);
 }
 
 #[test]
@@ -313,18 +318,18 @@ fn what_the_finger_did_before_does_not_matter() {
     let mut finger = Recorded::<{ 8 << 10 }>::new();
     finger.bench.tare();
     finger.bench.command().goal = newtons(1_500);
-    (0..3_000).for_each(|_| _ = finger.bench.step());
+    finger.bench.frames(3_000);
     finger.bench.request(Task::Press);
-    (0..3_000).for_each(|_| _ = finger.bench.step());
+    finger.bench.frames(3_000);
     finger.bench.command().goal = newtons(0);
-    (0..3_000).for_each(|_| _ = finger.bench.step());
+    finger.bench.frames(3_000);
     finger.bench.step_with(|record| record.sense.bridge_fault = true);
     assert_eq!(finger.bench.status().fault, Some(Fault::Bridge));
     *finger.bench.command() = Command { torque: false, clear_request: 1, ..*finger.bench.command() };
-    (0..500).for_each(|_| _ = finger.bench.step());
+    finger.bench.frames(500);
     for _ in 0..2 {
         finger.press();
-        agrees(&finger);
+        agrees(&finger, |_| {});
         *finger.bench.command() = Command { torque: false, goal: newtons(0), ..*finger.bench.command() };
         finger.frames(300);
     }
@@ -344,18 +349,13 @@ fn the_motor_stays_as_warm_as_it_is() {
     assert!(before > 88.5, "{before} C: it is warmer than after a reset");
     finger.press();
     let mut coldest = f64::MAX;
-    let replayed = replay::<ROWS, COLUMNS>(finger.capture.data(), &CLOCKS, |_, status| {
-        coldest = coldest.min(status.winding.0.to_num());
-    });
-    assert_eq!(replayed.expect("a capture").difference, None);
+    agrees(&finger, |status| coldest = coldest.min(status.winding.0.to_num()));
     assert!(coldest > before - 0.1, "{coldest} C after {before} C");
 }
 
 #[test]
 fn a_fault_is_in_it_and_what_comes_after() {
-    let mut finger = Recorded::<BYTES>::new();
-    finger.capture.arm();
-    finger.bench.command().tare_request += 1;
+    let mut finger = Recorded::<BYTES>::armed();
     finger.frames(300);
     finger.bench.command().torque = true;
     finger.bench.command().goal = newtons(500);
@@ -364,35 +364,34 @@ fn a_fault_is_in_it_and_what_comes_after() {
     finger.frames(20);
     assert_eq!(finger.bench.status().fault, Some(Fault::SupplyLow));
     finger.capture.end(Ended::Asked);
-    assert_eq!(agrees(&finger), 425);
+    assert_eq!(agrees(&finger, |_| {}).frames, 425);
     // An action on the loop between steps ends the capture; the frames before it replay.
-    let mut finger = Recorded::<BYTES>::new();
-    finger.capture.arm();
-    finger.bench.command().tare_request += 1;
+    let mut finger = Recorded::<BYTES>::armed();
     finger.frames(200);
     finger.bench.pipeline().stop(Fault::LostFrames);
     finger.capture.end(Ended::Stopped);
     finger.frames(20);
     assert_eq!(finger.capture.standing().state, CaptureState::Done);
-    assert_eq!(agrees(&finger), 200);
+    assert_eq!(agrees(&finger, |_| {}).frames, 200);
 }
 
 #[test]
 fn another_parameter_or_a_step_that_answers_otherwise_is_found_where_it_is() {
-    let finger = Recorded::<BYTES>::pressed();
-    let mut bytes = finger.capture.data().to_vec();
-    // A creep's share more, though its effect comes late.
+    let difference = |bytes: &[u8]| {
+        let replayed = replay::<ROWS, COLUMNS>(bytes, &CLOCKS, |_, _| {}).expect("a capture");
+        replayed.difference.expect("a difference")
+    };
+    let mut bytes = Recorded::<BYTES>::pressed().capture.data().to_vec();
+    // A parameter whose effect comes late.
     let place = Params::RANGES.iter().position(|(name, ..)| *name == "modulus_pa").expect("a parameter");
     bytes[72 + 4 * place] ^= 1;
-    let replayed = replay::<ROWS, COLUMNS>(&bytes, &CLOCKS, |_, _| {}).expect("a capture");
-    assert_eq!(replayed.difference.map(|difference| (difference.frame, difference.field)), Some((0, Field::Digest)));
-    let told = replayed.difference.map(|difference| difference.to_string()).unwrap_or_default();
+    let found = difference(&bytes);
+    assert_eq!((found.frame, found.field), (0, Field::Digest));
+    let told = found.to_string();
     assert!(told.contains("frame 0: digest captured") && told.contains("replayed"), "{told}");
 
     // A duty that is one more than the core's.
-    let mut finger = Recorded::<BYTES>::new();
-    finger.capture.arm();
-    finger.bench.command().tare_request += 1;
+    let mut finger = Recorded::<BYTES>::armed();
     finger.bench.command().fit_level = FitLevel::TwoRows;
     finger.frames(20);
     let mut status = *finger.bench.status();
@@ -400,6 +399,6 @@ fn another_parameter_or_a_step_that_answers_otherwise_is_found_where_it_is() {
     let given = finger.bench.record();
     finger.capture.record(&given.frame, &given.sense, &given.command, &status);
     finger.capture.end(Ended::Asked);
-    let replayed = replay::<ROWS, COLUMNS>(finger.capture.data(), &CLOCKS, |_, _| {}).expect("a capture");
-    assert_eq!(replayed.difference.map(|difference| (difference.frame, difference.field)), Some((20, Field::Duty)));
+    let found = difference(finger.capture.data());
+    assert_eq!((found.frame, found.field), (20, Field::Duty));
 }

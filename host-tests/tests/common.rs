@@ -73,9 +73,35 @@ pub fn ready() -> Bench {
 pub fn holding(goal_mn: i32) -> Bench {
     let mut board = ready();
     board.command().goal = newtons(goal_mn);
-    (0..5_000).for_each(|_| _ = board.step());
+    board.frames(5_000);
     assert_eq!(board.step().mode, Mode::Force);
     board
+}
+
+/// Several frames of a bench.
+pub trait InFrames {
+    /// Steps these frames. Returns the status after the last one.
+    fn frames(&mut self, count: u32) -> Status;
+
+    /// Sets a goal and steps for a time. Returns the largest true force, N.
+    fn hold(&mut self, goal_mn: i32, seconds: f64) -> f64;
+}
+
+impl<E: Set> InFrames for Bench<E> {
+    fn frames(&mut self, count: u32) -> Status {
+        (0..count).for_each(|_| _ = self.step());
+        *self.status()
+    }
+
+    fn hold(&mut self, goal_mn: i32, seconds: f64) -> f64 {
+        self.command().goal = newtons(goal_mn);
+        self.run(seconds)
+    }
+}
+
+/// Contact after a number of frames with the same image.
+pub fn read_often(fit: &mut Fit, picture: &TactileImage, frames: usize, config: &Config) -> Contact {
+    (0..frames).map(|_| fit.read(picture, config)).last().unwrap_or_default()
 }
 
 /// A finger whose frames and motions are recorded as on the board.

@@ -214,10 +214,7 @@ fn a_fit_is_doubted_by_what_is_hidden_and_how_unlike_it_is() {
         let spread = 0.06 * rng.f64();
         let picture = plane(1.0 + 2.0 * rng.f64(), [along, rng.f64() * 2.0], spread, NONE, &mut rng);
         let mut fit = Fit::new(FitLevel::AllRows);
-        let mut contact = Contact::default();
-        for _ in 0..700 {
-            contact = fit.read(&picture, &config);
-        }
+        let contact = read_often(&mut fit, &picture, 700, &config);
         let force = |contact: &Contact| contact.force.0.to_num::<f64>();
         let ratio = force(&contact) / force(&from_sums(&picture, &config));
         if ratio < 1.000_1 {
@@ -269,13 +266,9 @@ fn doubt_comes_in_some_eight_frames_and_goes_in_some_sixty() {
         let found = f64::from(fit.read(&seen, &config).doubt);
         assert!((found - doubt).abs() <= 1.5, "{found}, {doubt} expected in frame {frame}");
     }
-    for _ in 0..400 {
-        fit.read(&seen, &config);
-    }
+    read_often(&mut fit, &seen, 400, &config);
     assert_eq!(fit.read(&seen, &config).doubt, 0, "it goes to the last bit");
     // Without a contact the uncertainty is 0 from the first frame on.
-    for _ in 0..10 {
-        fit.read(&doubtful, &config);
-    }
+    read_often(&mut fit, &doubtful, 10, &config);
     assert_eq!(fit.read(&TactileImage::EMPTY, &config).doubt, 0);
 }

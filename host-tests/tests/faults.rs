@@ -142,9 +142,7 @@ fn a_motor_that_runs_the_wrong_way() {
             let (_, status) = frames_to_fault(&mut board, 200);
             assert!(matches!(status.fault, Some(Fault::Reversed)), "{:?}", status.fault);
             assert!(board.truth().travel_mm.abs() <= 0.5, "{} mm", board.truth().travel_mm);
-            for _ in 0..5_000 {
-                board.step();
-            }
+            board.frames(5_000);
             assert!(board.truth().travel_mm.abs() <= 1.5, "{} mm", board.truth().travel_mm);
         }
     }

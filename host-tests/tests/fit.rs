@@ -18,10 +18,7 @@ type Taxels = [[i32; COLUMNS]; ROWS];
 
 /// Contacts of a tactile image by each fit level once it has settled, and by each single-frame method; the sums first.
 fn all_ways(picture: &TactileImage, config: &Config) -> Vec<Contact> {
-    let followed = |fit_level| {
-        let mut fit = Fit::new(fit_level);
-        (0..FRAMES).map(|_| fit.read(picture, config)).last().expect("there are frames")
-    };
+    let followed = |fit_level| read_often(&mut Fit::new(fit_level), picture, FRAMES, config);
     let looks = Refined::ALL.map(|refined| read(picture, refined, config));
     FitLevel::ALL.map(followed).into_iter().chain(looks).collect()
 }

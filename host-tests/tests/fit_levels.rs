@@ -46,9 +46,7 @@ fn another_effort_begins_anew_and_the_same_does_not() {
     for before in 1..11 {
         for (fit_level, frames) in BY_MODEL {
             let mut fit = Fit::new(FitLevel::OneRow);
-            for _ in 0..before {
-                fit.read(&picture, &config);
-            }
+            read_often(&mut fit, &picture, before, &config);
             fit.set_fit_level(fit_level);
             let expected = if fit_level == FitLevel::OneRow { 11 - before } else { frames };
             assert_eq!(first_refined(&mut fit, &picture, &config), expected, "{fit_level:?} after {before} frames");
@@ -61,9 +59,7 @@ fn another_effort_begins_anew_and_the_same_does_not() {
 fn another_effort_keeps_what_was_found() {
     let (config, picture) = (config(), image(&cut_off(1.5)));
     let mut fit = Fit::new(FitLevel::AllRows);
-    for _ in 0..20 {
-        fit.read(&picture, &config);
-    }
+    read_often(&mut fit, &picture, 20, &config);
     let found = fit.read(&picture, &config);
     assert!(found.force > from_sums(&picture, &config).force);
     fit.set_fit_level(FitLevel::OneRow);
@@ -77,9 +73,7 @@ fn another_effort_keeps_what_was_found() {
 fn what_was_found_goes_with_the_contact() {
     let (config, picture) = (config(), image(&cut_off(1.5)));
     let mut fit = Fit::new(FitLevel::OneRow);
-    for _ in 0..100 {
-        fit.read(&picture, &config);
-    }
+    read_often(&mut fit, &picture, 100, &config);
     assert!(fit.read(&picture, &config).force > from_sums(&picture, &config).force);
     fit.read(&TactileImage::EMPTY, &config);
     for _ in 0..10 {
@@ -94,12 +88,8 @@ fn a_contact_that_comes_into_sight_is_its_sum() {
     let config = config();
     let seen = image(&Scene { x_mm: 0.5, ..cut_off(1.0) });
     let mut fit = Fit::new(FitLevel::AllRows);
-    for _ in 0..40 {
-        fit.read(&image(&cut_off(1.0)), &config);
-    }
-    for _ in 0..40 {
-        fit.read(&seen, &config);
-    }
+    read_often(&mut fit, &image(&cut_off(1.0)), 40, &config);
+    read_often(&mut fit, &seen, 40, &config);
     let (contact, sums) = (fit.read(&seen, &config), from_sums(&seen, &config));
     assert_eq!((contact.force, contact.centre_x, contact.centre_y), (sums.force, sums.centre_x, sums.centre_y));
 }
@@ -125,9 +115,7 @@ fn a_force_that_changes_within_a_refinement_is_followed() {
     let config = config();
     for (from_mm, to_mm) in [(1.2, 2.0), (2.0, 1.2)] {
         let mut fit = Fit::new(FitLevel::OneRow);
-        for _ in 0..200 {
-            fit.read(&image(&cut_off(from_mm)), &config);
-        }
+        read_often(&mut fit, &image(&cut_off(from_mm)), 200, &config);
         let (frames, mut worst) = (120, 0.0_f64);
         for frame in 0..=frames {
             let scene = cut_off(from_mm + (to_mm - from_mm) * f64::from(frame) / f64::from(frames));
@@ -237,9 +225,7 @@ fn a_contact_elsewhere_is_found_again() {
         for (d_mm, x_mm) in [(1.0, -7.0), (0.5, 6.5), (2.5, -6.0), (0.6, 6.0), (0.4, -6.5)] {
             let picture = image(&Scene { x_mm, ..cut_off(d_mm) });
             let frames = if fit_level == FitLevel::AllRows { 60 } else { 660 };
-            for _ in 0..frames {
-                fit.read(&picture, &config);
-            }
+            read_often(&mut fit, &picture, frames, &config);
             let contact = fit.read(&picture, &config);
             let fresh = read(&picture, Refined::Full, &config);
             let share = contact.force.0.to_num::<f64>() / fresh.force.0.to_num::<f64>();

@@ -143,9 +143,7 @@ fn a_motor_that_is_shorted_on_the_way_stops_within_its_bound() {
                 run(&mut board, goal_mn, 0.16);
             }
             board.command().goal = newtons(goal_mn);
-            for _ in 0..stopped_after {
-                board.step();
-            }
+            board.frames(stopped_after);
             board.pipeline().stop(Fault::LostFrames);
             let largest_n = board.run(0.1);
             let name = format!("{from_mn} to {goal_mn} mN, shorted after {stopped_after} frames");

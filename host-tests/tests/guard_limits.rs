@@ -41,6 +41,11 @@ impl Finger {
         self.pushed(0)
     }
 
+    /// Advances frames without a fault.
+    fn frames(&mut self, count: u32) {
+        assert_eq!((0..count).find_map(|_| self.frame()), None);
+    }
+
     /// Accelerates over 50 ms, so no change of speed is large, and moves on. Returns the first fault and its time.
     fn goes(&mut self, speed_mm_per_s: f64, seconds: f64) -> Option<(Fault, f64)> {
         let from = self.speed_mm_per_s;
@@ -147,14 +152,10 @@ fn after_a_contact_it_may_be_fast_for_a_while() {
         // 1 N at 15 mm, touched there: the force gives the place of the touch.
         assert_eq!(finger.placed(15.0), None);
         finger.force = newtons(1_000);
-        for _ in 0..2_000 {
-            assert_eq!(finger.frame(), None);
-        }
+        finger.frames(2_000);
         assert!(finger.guard.presses());
         finger.speed_mm_per_s = speed_mm_per_s;
-        for _ in 0..100 {
-            finger.frame();
-        }
+        (0..100).for_each(|_| _ = finger.frame());
         assert_eq!(!finger.lets()[1], cut, "{speed_mm_per_s} mm/s");
     }
 }
@@ -166,9 +167,7 @@ fn a_tip_is_pressed_as_deep_as_its_force_bears_out() {
     assert_eq!(finger.placed(10.0), None);
     for force_mn in [41, 500] {
         finger.force = newtons(force_mn);
-        for _ in 0..300 {
-            assert_eq!(finger.frame(), None);
-        }
+        finger.frames(300);
     }
     let depth_mm: f64 = finger.config.tip.indentation(newtons(500)).0.to_num();
     // Where it was noticed, at 40 mN, less the indentation of that.
@@ -194,17 +193,13 @@ fn a_touch_begins_and_ends_with_the_mean_force() {
         [(39, false), (41, true), (16, true), (14, false), (39, false), (-500, false), (41, true)]
     {
         finger.force = newtons(force_mn);
-        for _ in 0..200 {
-            assert_eq!(finger.frame(), None);
-        }
+        finger.frames(200);
         assert_eq!(finger.guard.presses(), presses, "{force_mn} mN");
     }
     // The mean moves by 1/16 of its distance to the input in a frame: 3 frames of 0 leave 82 % of it, 17 leave a third.
     finger.force = Newtons::ZERO;
     for (frames, presses) in [(3, true), (10, true), (10, false)] {
-        for _ in 0..frames {
-            finger.frame();
-        }
+        (0..frames).for_each(|_| _ = finger.frame());
         assert_eq!(finger.guard.presses(), presses);
     }
 }

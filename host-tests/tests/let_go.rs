@@ -7,14 +7,12 @@ const CARRIED_MM_PER_S: f64 = 5.0;
 
 /// Requests a release, and expects no force after the given time, s.
 fn lets_go<E: Set>(board: &mut Bench<E>, seconds: f64, name: &str) {
-    board.command().goal = newtons(0);
-    board.run(seconds);
+    board.hold(0, seconds);
     assert!(board.truth().force_n <= 0.0, "{name}: {}", told(board));
 }
 
 fn moved_while_held<E: Set>(board: &mut Bench<E>, goal_mn: i32, moved_mm: f64) {
-    board.command().goal = newtons(goal_mn);
-    board.run(0.7);
+    board.hold(goal_mn, 0.7);
     board.carry_object(5.0, 5.0 - moved_mm, CARRIED_MM_PER_S, |_| {});
     board.run(0.3);
     let held = board.truth().force_n;
@@ -64,10 +62,8 @@ fn a_press_from_a_released_tip_ends_at_the_clearance() {
     // The press touches a nearer surface than the touch before.
     let mut board = ready();
     board.place_object(10.0);
-    board.command().goal = newtons(1_000);
-    board.run(1.0);
-    board.command().goal = newtons(0);
-    board.run(0.7);
+    board.hold(1_000, 1.0);
+    board.hold(0, 0.7);
     board.carry_object(10.0, 7.5, CARRIED_MM_PER_S, |_| {});
     board.request(Task::Press);
     board.run(16.0);
@@ -79,11 +75,9 @@ fn a_press_from_a_released_tip_ends_at_the_clearance() {
 fn a_residue_from_before_torque_does_not_make_the_tip_go_back() {
     for seed in 0..4 {
         let mut board = ordinary(seed, 1.0, 4, 2);
-        board.command().goal = newtons(6_000);
-        board.run(3.0);
+        board.hold(6_000, 3.0);
         board.command().torque = false;
-        board.command().goal = newtons(0);
-        board.run(0.3);
+        board.hold(0, 0.3);
         let config = board.pipeline().config().clone();
         board.pipeline().configure(&config);
         board.carry_object(5.0, 15.0, CARRIED_MM_PER_S, |_| {});
@@ -103,14 +97,11 @@ fn a_residue_from_before_torque_does_not_make_the_tip_go_back() {
 fn what_came_to_a_released_tip_is_held_and_let_go() {
     for (to_mm, goal_mn) in [(3.0, 1_000), (2.5, 1_000), (2.0, 1_000), (1.5, 200), (0.8, 200)] {
         let mut board = ready();
-        board.command().goal = newtons(1_000);
-        board.run(0.7);
-        board.command().goal = newtons(0);
-        board.run(0.7);
+        board.hold(1_000, 0.7);
+        board.hold(0, 0.7);
         board.carry_object(5.0, to_mm, CARRIED_MM_PER_S, |_| {});
         board.run(0.3);
-        board.command().goal = newtons(goal_mn);
-        board.run(1.0);
+        board.hold(goal_mn, 1.0);
         let off = (board.truth().force_n - f64::from(goal_mn) * 1e-3).abs();
         let held = off <= 0.05 && board.status().mode == Mode::Force;
         assert!(held, "to {to_mm} mm, goal {goal_mn} mN: {}", told(&mut board));

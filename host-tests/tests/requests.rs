@@ -59,10 +59,11 @@ fn pressed(record: &mut Record) {
     record.frame.codes = board.frame().codes;
 }
 
-fn tares(board: &mut Bench) {
-    for _ in 1..=TARE_FRAMES {
-        let status = board.step();
-        assert_eq!((status.mode, status.tare), (Mode::Tare, Taring::Running));
+/// A tare lasts for these frames.
+fn tares(board: &mut Bench, frames: u32) {
+    for _ in 0..frames {
+        let Status { mode, tare, duty, .. } = board.step();
+        assert_eq!((mode, tare, duty), (Mode::Tare, Taring::Running, Duty::ZERO));
     }
     assert_eq!(board.step().tare, Taring::Done);
 }
@@ -73,7 +74,7 @@ fn a_tare_that_comes_with_torque_off_is_done() {
     assert_eq!(board.step().mode, Mode::Release);
     board.command().torque = false;
     board.command().tare_request += 1;
-    tares(&mut board);
+    tares(&mut board, TARE_FRAMES);
     assert_eq!(board.step().mode, Mode::Off);
 }
 
@@ -82,12 +83,8 @@ fn a_tare_that_comes_with_torque_off_is_done() {
 fn a_tare_between_torque_off_and_on_is_done() {
     let mut board = ready();
     board.command().tare_request += 1;
-    assert_eq!(board.step().duty.0, 0);
-    for _ in 1..TARE_FRAMES {
-        assert_eq!(board.step().mode, Mode::Tare);
-    }
-    assert_eq!(board.step().mode, Mode::Off);
-    assert_eq!(board.step().mode, Mode::Release);
+    tares(&mut board, TARE_FRAMES);
+    assert_eq!((board.status().mode, board.step().mode), (Mode::Off, Mode::Release));
 }
 
 #[test]
@@ -95,7 +92,7 @@ fn a_tare_that_comes_with_the_clearing_of_a_fault_is_done() {
     let mut board = faulted();
     board.command().clear_request += 1;
     board.command().tare_request += 1;
-    tares(&mut board);
+    tares(&mut board, TARE_FRAMES);
     assert_eq!(board.step().fault, None);
 }
 
@@ -117,7 +114,7 @@ fn a_fault_ends_a_tare_for_all_to_see() {
     for ((spoil, fault), frames_before) in EARLY_AND_LATE.into_iter().flat_map(|case| [(case, 0), (case, 1)]) {
         let mut board = Bench::default();
         board.command().tare_request += 1;
-        (0..frames_before).for_each(|_| _ = board.step());
+        board.frames(frames_before);
         let status = board.step_with(spoil);
         assert_eq!((status.mode, status.fault, status.tare), (Mode::Fault, Some(fault), Taring::Refused));
     }
@@ -132,11 +129,9 @@ fn a_fault_ends_a_tare_for_all_to_see() {
 fn a_second_tare_during_a_tare_begins_anew() {
     let mut board = Bench::default();
     board.command().tare_request += 1;
-    for _ in 0..100 {
-        board.step();
-    }
+    board.frames(100);
     board.command().tare_request += 1;
-    tares(&mut board);
+    tares(&mut board, TARE_FRAMES);
 }
 
 /// The array is the same, so is its tare, to the rounding of its means.
@@ -159,14 +154,9 @@ fn a_tare_does_not_depend_on_the_one_before() {
 fn new_parameters_during_a_tare_begin_it_anew() {
     let mut board = Bench::default();
     board.command().tare_request += 1;
-    for _ in 0..100 {
-        board.step();
-    }
+    board.frames(100);
     board.pipeline().configure(&config());
-    for _ in 1..TARE_FRAMES {
-        assert_eq!(board.step().mode, Mode::Tare);
-    }
-    assert_eq!(board.step().tare, Taring::Done);
+    tares(&mut board, TARE_FRAMES - 1);
 }
 
 #[test]
@@ -313,13 +303,9 @@ fn torque_that_was_on_before_the_tare_drives_nothing_until_it_was_off() {
     for (off_first, frames) in [(0, 0), (0, 1), (0, 100), (1, 1), (1, 100)] {
         let mut board = at(5.0);
         board.command().goal = newtons(1_000);
-        for _ in 0..off_first {
-            board.step();
-        }
+        board.frames(off_first);
         board.command().torque = true;
-        for _ in 0..frames {
-            board.step();
-        }
+        board.frames(frames);
         board.command().tare_request += 1;
         for _ in 0..2 * TARE_FRAMES {
             let status = board.step();
@@ -341,9 +327,7 @@ fn torque_that_comes_with_a_tare_or_during_it_waits_for_its_end() {
         board.command().goal = newtons(1_000);
         board.step();
         board.command().tare_request += 1;
-        for _ in 0..after {
-            board.step();
-        }
+        board.frames(after);
         board.command().torque = true;
         for _ in after..=TARE_FRAMES {
             assert_eq!(board.step().duty.0, 0);

@@ -262,8 +262,7 @@ proptest! {
 fn hold(config: &Config, goal_mn: i32, seconds: f64) -> (f64, Bench) {
     let mut board = Bench::of(&Setup::default(), config);
     board.tare();
-    board.command().goal = newtons(goal_mn);
-    board.run(seconds - board.time_s());
+    board.hold(goal_mn, seconds - board.time_s());
     (board.truth().force_n, board)
 }
 
@@ -296,6 +295,6 @@ fn over_force_is_judged_by_the_reading() {
     assert_eq!(board.status().fault, None);
     let travel = board.truth().travel_mm;
     board.place(travel + 0.2);
-    (0..50).for_each(|_| _ = board.step());
+    board.frames(50);
     assert_eq!(board.status().fault, Some(Fault::OverForce));
 }

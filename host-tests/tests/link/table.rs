@@ -184,18 +184,14 @@ fn refusals_are_counted_by_their_number() {
 }
 
 #[test]
-fn the_page_is_fresh() {
-    let path = concat!(env!("FINGERTIP_ROOT"), "/docs/control-table.md");
-    let page = std::fs::read_to_string(path).expect("docs/control-table.md can be read");
-    assert!(page == markdown(), "docs/control-table.md is stale: renew it with `{COMMAND}`");
-}
-
-#[test]
-fn the_model_files_are_fresh() {
-    for (path, direct) in [("fingertip.model", false), ("fingertip_direct.model", true)] {
-        let path = format!("{}/examples/dynamixel/{path}", env!("FINGERTIP_ROOT"));
-        let file = std::fs::read_to_string(&path).expect("the model file can be read");
-        assert!(file == text(direct), "{path} is stale: renew it with `{COMMAND}`");
+fn the_page_and_the_model_files_are_fresh() {
+    for (path, fresh) in [
+        ("docs/control-table.md", markdown()),
+        ("examples/dynamixel/fingertip.model", text(false)),
+        ("examples/dynamixel/fingertip_direct.model", text(true)),
+    ] {
+        let file = std::fs::read_to_string(format!("{}/{path}", env!("FINGERTIP_ROOT"))).expect("it can be read");
+        assert!(file == fresh, "{path} is stale: renew it with `{COMMAND}`");
     }
 }
 

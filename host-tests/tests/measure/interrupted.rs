@@ -141,6 +141,13 @@ fn with_torque(mut finger: Made) -> Made {
     finger
 }
 
+/// During a tare, or after it.
+fn taring(mut finger: Made, frames: u32) -> Made {
+    finger.bench.command().tare_request += 1;
+    finger.frames(frames);
+    finger
+}
+
 /// A state, how it is made, and how a jog, strokes and a press end in it.
 type Case = (&'static str, fn() -> Made, [Option<Ended>; 3]);
 
@@ -163,27 +170,9 @@ fn every_state_has_its_answer() {
             [None, Some(Ended::Unconfirmed), NO],
         ),
         ("torque on", || with_torque(Made::tared()), [NO, NO, None]),
-        (
-            "taring",
-            || {
-                let mut finger = Made::tared();
-                finger.bench.command().tare_request += 1;
-                finger.frame();
-                finger
-            },
-            [NO; 3],
-        ),
+        ("taring", || taring(Made::tared(), 1), [NO; 3]),
         ("touching", || pressed(Made::tared()), [NO; 3]),
-        (
-            "tared while touching",
-            || {
-                let mut finger = pressed(Made::untared());
-                finger.bench.command().tare_request += 1;
-                finger.frames(700);
-                finger
-            },
-            [NO; 3],
-        ),
+        ("tared while touching", || taring(pressed(Made::untared()), 700), [NO; 3]),
         (
             "gains changed",
             || {

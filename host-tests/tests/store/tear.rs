@@ -85,14 +85,18 @@ fn tear_twice(board: &Board, words: usize, few: usize) -> [usize; 2] {
 }
 
 #[test]
-fn a_save_torn_twice_leaves_the_old_or_the_new_values() {
+fn what_is_torn_twice_leaves_the_old_or_the_new_values() {
     tear_saves(24);
+    tear_erases(240);
+    tear_layouts(72);
 }
 
 #[test]
 #[ignore = "long: cargo xtask test --long"]
-fn long_a_save_torn_twice_leaves_the_old_or_the_new_values() {
+fn long_what_is_torn_twice_leaves_the_old_or_the_new_values() {
     tear_saves(4);
+    tear_erases(40);
+    tear_layouts(12);
 }
 
 fn tear_saves(few: usize) {
@@ -106,17 +110,6 @@ fn tear_saves(few: usize) {
     }
     println!("{sum} cases of a save torn twice");
     assert!(sum > 80_000 / few.min(40));
-}
-
-#[test]
-fn an_erase_torn_twice_leaves_the_old_or_the_new_values() {
-    tear_erases(240);
-}
-
-#[test]
-#[ignore = "long: cargo xtask test --long"]
-fn long_an_erase_torn_twice_leaves_the_old_or_the_new_values() {
-    tear_erases(40);
 }
 
 fn tear_erases(few: usize) {
@@ -136,17 +129,6 @@ fn tear_erases(few: usize) {
     }
     println!("{sum} cases of an erase and a save torn twice; {alarms} faults with nothing lost");
     assert!(sum > 80_000 / few.min(40));
-}
-
-#[test]
-fn a_changed_layout_torn_twice_leaves_the_old_or_the_new_values() {
-    tear_layouts(72);
-}
-
-#[test]
-#[ignore = "long: cargo xtask test --long"]
-fn long_a_changed_layout_torn_twice_leaves_the_old_or_the_new_values() {
-    tear_layouts(12);
 }
 
 fn tear_layouts(few: usize) {

@@ -1,12 +1,10 @@
-//! An object that touches a released tip, moved by another finger for example: the baseline must not learn its force,
-//! as the next press would be too hard by that force.
+//! The baseline must not learn the force of an object that touches a released tip: the next press would be too hard.
 
 use crate::common::*;
 use sim::mechanics::pressures::Cell;
 
-/// Presses with 1 N and releases; after a time the object is pushed into the tip by a depth for 5 s and taken away;
-/// then the next press has a goal of 1 N. Returns the array's reading at the end of the touch, the true force then, and
-/// the largest force of the second press.
+/// Presses with 1 N and releases; after a time the object is pushed into the tip for 5 s and taken away; then a press
+/// with 1 N. Returns the reading and the true force of that touch, and the largest force of the second press.
 fn next_press(torque: bool, after_s: f64, depth_mm: f64) -> [f64; 3] {
     let mut board = ready();
     board.hold(1_000, 1.0);
@@ -39,7 +37,6 @@ fn what_comes_to_a_released_tip_is_not_learnt() {
     }
 }
 
-/// Less than the force of a contact is taken for a residue.
 #[test]
 fn no_more_than_the_force_of_a_contact_is_learnt() {
     let [read, held, largest] = next_press(true, 0.05, 0.2);
@@ -47,7 +44,7 @@ fn no_more_than_the_force_of_a_contact_is_learnt() {
 }
 
 fn bench(params: &Params) -> Bench {
-    let mut board = Bench::of(&Setup::default(), &Config::shipped(params).unwrap());
+    let mut board = Bench::of(&Setup::default(), &allowed(*params));
     board.tare();
     board
 }
@@ -138,7 +135,6 @@ fn lose<E: Set>(board: &mut Bench<E>, [held_s, off_s, gone_s]: [f64; 3]) {
     board.place_object(5.0);
 }
 
-/// A tare forgets the force that was held before it, so a later touch is not compared with it; torque is off for 5 s.
 #[test]
 fn a_tare_forgets_what_was_held() {
     let mut largest = [0.0; 2];
@@ -208,9 +204,8 @@ fn a_press_that_measures_loses_the_fit() {
     }
 }
 
-/// A finger holds an object, is switched off, the object is taken away, and it is switched on before another, at the
-/// array's edge. What hysteresis and creep left of the first one reads as a contact in the air, which is where the surface
-/// is taken to be.
+/// The object is taken away with torque off; torque is on before another object. What hysteresis and creep left of the
+/// first one reads as a contact in the air, which must not be taken for a surface.
 #[test]
 fn what_is_left_of_a_contact_in_the_air_is_no_surface() {
     for seed in 0..4 {
@@ -285,13 +280,9 @@ impl Finger {
         let mut setup = Setup::default();
         setup.tip.modulus_kpa = modulus_kpa;
         // Frames have no sag of the row; a few taxels here have less preload than `bad_taxels_max` may lack.
-        let params = Params {
-            modulus_pa: (modulus_kpa * 1e3) as i32,
-            row_sag_ppb_per_code: 0,
-            bad_taxels_max: 20,
-            ..images::CONFIRMED
-        };
-        let mut pipeline = Pipeline::new(&Config::shipped(&params).unwrap());
+        let modulus_pa = (modulus_kpa * 1e3) as i32;
+        let params = Params { modulus_pa, row_sag_ppb_per_code: 0, bad_taxels_max: 20, ..images::CONFIRMED };
+        let mut pipeline = Pipeline::new(&allowed(params));
         let mut mask = [0u32; ROWS];
         for _ in 0..rng.usize(..4) {
             mask[rng.usize(..ROWS)] |= 1 << rng.usize(..COLUMNS);
@@ -419,7 +410,6 @@ fn torque_after_a_flagged_tare_is_refused_unless_it_was_forced() {
     }
 }
 
-/// A tare is void after a change of the calibration.
 #[test]
 fn a_new_calibration_forgets_the_flag() {
     let mut finger = Finger::new(2, 250.0);

@@ -110,7 +110,6 @@ fn a_motor_that_was_driven_brakes_until_the_tip_rests() {
     }
 }
 
-/// A stop between two steps shorts the motor before the next step.
 #[test]
 fn a_stop_and_new_parameters_brake_at_once() {
     let mut board = holding(1_000);

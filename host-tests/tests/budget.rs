@@ -10,7 +10,7 @@ const DEADLINE: u32 = 12_568;
 /// Frames of the longest refinement, of which only one is the dearest, and one more.
 const REFINEMENT: u32 = 12;
 
-/// Frame time: `rest`, up to `spread` more, and with a contact that of the level, from least to most at `model_q8` of 256.
+/// Frame time: `rest`, up to `spread` more, and with a contact that of the level, the largest at a `model_q8` of 256.
 #[derive(Clone, Copy, Debug)]
 struct Stretch {
     frames: u32,
@@ -230,7 +230,6 @@ fn with_a_contact_the_models_least_is_taken_off() {
     }
 }
 
-/// It is the longest frame of the window that counts, and that of this window alone.
 #[test]
 fn one_long_frame_holds_it_back_for_its_window() {
     for long_frame in [1, 7, WINDOW - 1, WINDOW] {
@@ -264,7 +263,6 @@ fn after_each_fall_it_waits_twice_as_long() {
     assert_eq!(rises, Some((WINDOW, FitLevel::AllRows)));
 }
 
-/// The begin or the end of a contact invalidates the frames before.
 #[test]
 fn a_contact_that_comes_or_goes_begins_the_window_anew() {
     for before in [1, 10, WINDOW - 1] {
@@ -300,9 +298,7 @@ fn the_dearest_frame_is_the_start_and_the_rows_of_an_effort() {
 #[test]
 fn there_is_no_fall_below_the_sum() {
     let mut budget = at(FitLevel::Sum);
-    for _ in 0..10 {
-        assert_eq!(budget.next(FitLevel::AllRows, CoreCycles(TICKS), CoreCycles(TICKS)), FitLevel::Sum);
-    }
+    (0..10).for_each(|_| assert_eq!(next(&mut budget, FitLevel::AllRows, TICKS), FitLevel::Sum));
     // The window that they were in, and the next.
     let rises = frames_to_change(&mut budget, FitLevel::AllRows, 10, 10 * WINDOW);
     assert_eq!(rises, Some((2 * WINDOW - 10, FitLevel::Moments)));

@@ -62,15 +62,7 @@ fn gains() -> Gains {
 const CODED_BYTES: usize = 8 << 10;
 
 /// A step's arguments and answer, by how far they may stray from frame to frame.
-#[derive(Clone, Debug)]
-struct Step {
-    frame: Frame,
-    sense: Sense,
-    command: Command,
-    status: Status,
-}
-
-fn step(spread: u16) -> impl Strategy<Value = Step> {
+fn step(spread: u16) -> impl Strategy<Value = (Record, Status)> {
     let codes = prop::collection::vec(0..=spread, SLOTS * COLUMNS);
     let bytes = prop::collection::vec(any::<u8>(), Record::BYTES);
     let wild = (any::<bool>(), any::<bool>(), any::<bool>(), any::<bool>());
@@ -91,17 +83,14 @@ fn step(spread: u16) -> impl Strategy<Value = Step> {
         };
         let fit_level = FitLevel::from_number(command.tare_request % 6);
         let command = Command { torque, fit_level, tare_forced, ..command };
-        let status = Status {
-            duty: Duty(duty),
-            mode: if force { Mode::Force } else { Mode::Fault },
-            fault: faulted.then_some(Fault::BrownOutLevel),
-            ..Status::default()
-        };
-        Step { frame, sense, command: if wild { command } else { Command::default() }, status }
+        let mode = if force { Mode::Force } else { Mode::Fault };
+        let fault = faulted.then_some(Fault::BrownOutLevel);
+        let status = Status { duty: Duty(duty), mode, fault, ..Status::default() };
+        (Record { frame, sense, command: if wild { command } else { Command::default() } }, status)
     })
 }
 
-fn steps() -> impl Strategy<Value = Vec<Step>> {
+fn steps() -> impl Strategy<Value = Vec<(Record, Status)>> {
     let spread = prop_oneof![Just(2_u16), Just(40), Just(4_095), Just(u16::MAX)];
     prop::collection::vec(spread.prop_flat_map(step), 1..30)
 }
@@ -116,8 +105,8 @@ proptest! {
         capture.arm();
         capture.begin(&mut pipeline);
         let mut kept = 0;
-        for step in &steps {
-            capture.record(&step.frame, &step.sense, &step.command, &step.status);
+        for (Record { frame, sense, command }, status) in &steps {
+            capture.record(frame, sense, command, status);
             kept += usize::from(capture.standing().state == CaptureState::Recording);
         }
         capture.end(Ended::Asked);
@@ -126,13 +115,10 @@ proptest! {
         prop_assert!(kept == steps.len() || head.ended == Ended::Full);
         let frames: Vec<_> = frames.collect::<Result<_, _>>().expect("every frame");
         prop_assert_eq!(frames.len(), kept);
-        for (taken, step) in frames.iter().zip(&steps) {
-            prop_assert_eq!(&taken.frame, &step.frame);
-            prop_assert_eq!(taken.sense, step.sense);
-            prop_assert_eq!(taken.command, step.command);
-            prop_assert_eq!(taken.duty, step.status.duty);
-            let fault = step.status.fault.map_or(0, |fault| fault as u8);
-            prop_assert_eq!((taken.mode, taken.fault), (step.status.mode as u8, fault));
+        for (taken, (record, status)) in frames.iter().zip(&steps) {
+            prop_assert_eq!(Record { frame: taken.frame, sense: taken.sense, command: taken.command }, *record);
+            let fault = status.fault.map_or(0, |fault| fault as u8);
+            prop_assert_eq!((taken.duty, taken.mode, taken.fault), (status.duty, status.mode as u8, fault));
         }
     }
 
@@ -336,7 +322,6 @@ fn what_the_finger_did_before_does_not_matter() {
     assert_eq!(finger.capture.standing().count, 2);
 }
 
-/// The current limit keeps its state when a record begins.
 #[test]
 fn the_motor_stays_as_warm_as_it_is() {
     let mut finger = Recorded::<BYTES>::new();

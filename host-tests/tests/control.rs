@@ -41,15 +41,6 @@ fn apply(drive: &mut Drive, wanted: i32, back_emf: i32, config: &Config) -> (i32
 }
 
 #[test]
-fn what_is_within_all_limits_is_let_through_and_nothing_told() {
-    let config = free();
-    let mut drive = Drive::new();
-    for wanted in [0, 1, -1, MOST, 0, -MOST, 12_345] {
-        assert_eq!(apply(&mut drive, wanted, 77, &config), (wanted, 0));
-    }
-}
-
-#[test]
 fn the_slew_limit_is_a_step_from_the_last_voltage() {
     let config = Config { slew_max_q8_mm_per_s2: 1_000, ..free() };
     let mut drive = Drive::new();
@@ -143,7 +134,6 @@ fn the_duty_is_the_voltages_share_of_the_supply() {
     }
 }
 
-/// After a cut the bridge applies no voltage, but the motor still turns: the back-EMF remains.
 #[test]
 fn a_cut_takes_the_voltage_and_leaves_the_back_emf() {
     let config = free();
@@ -200,7 +190,6 @@ fn the_profile_is_the_line_near_the_goal_and_the_root_beyond() {
     assert!((5_000..15_000).contains(&near), "{near} near the goal");
 }
 
-/// At any speed the curve requests at most 1.25 times the deceleration of the brake.
 #[test]
 fn no_speed_asks_for_more_than_a_quarter_beyond_the_brake() {
     let config = config();

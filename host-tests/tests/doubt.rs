@@ -98,9 +98,9 @@ fn sums_are_doubted_by_what_reaches_over_the_edge_or_is_hidden() {
     assert!(both > 10, "{kinds:?}");
 }
 
-/// The parabola's share of a taxel against the model's pressure over that taxel: a centred contact of 1.5 mm, one place
-/// after the other, from the middle to near the rim. A taxel alone hides less than counts: all those that are equally
-/// far from the middle are marked bad, and the four in the middle where these hide too little.
+/// The parabola's share of a taxel against the model's pressure over it, for a centred contact of 1.5 mm. A taxel alone
+/// hides too little: all at the same distance are marked bad, and the four in the middle where these still hide too
+/// little.
 #[test]
 fn the_share_that_a_bad_taxel_hides_is_that_of_the_models_pressure() {
     let mut rng = Rng::with_seed(4);
@@ -149,10 +149,9 @@ fn half_of_a_contact_is_hidden_by_half_of_the_rows() {
     }
 }
 
-/// One bad taxel anywhere under a contact of 42 to 380 mN. The sums miss the hidden share h, so they estimate a squared
-/// radius that is too small by the root of 1 - h, and a share that is too large by the same factor; apart from that the
-/// share is right to a tenth. If the taxel is not in the middle, the estimated centre moves away from it, and the share
-/// is too small by up to a quarter.
+/// One bad taxel under a contact of 42 to 380 mN. The sums miss the hidden share h: their squared radius is too small,
+/// and their share too large, by the root of 1 - h; apart from that it is right to a tenth. A taxel that is not in the
+/// middle moves the estimated centre away, which makes the share smaller by up to a quarter.
 #[test]
 fn the_share_that_one_bad_taxel_hides_of_a_light_contact_is_right() {
     let mut rng = Rng::with_seed(5);

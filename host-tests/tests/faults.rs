@@ -86,7 +86,6 @@ fn a_frame_that_reads_too_much_or_too_little_is_forgotten() {
     }
 }
 
-/// As many dead taxels as allowed in the middle of the contact: the fit estimates the force, which stays at the goal.
 #[test]
 fn taxels_that_die_within_the_contact_do_not_change_the_force() {
     for goal_mn in [200, 1_000, 4_000] {
@@ -148,7 +147,6 @@ fn a_motor_that_runs_the_wrong_way() {
     }
 }
 
-/// An end stop in front without a touch, and one behind on letting go: stopped, not pressed against for ever.
 #[test]
 fn an_end_stop_on_either_side_stops_the_motor() {
     let mut board = ready();

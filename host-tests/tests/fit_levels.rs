@@ -33,19 +33,11 @@ fn efforts_are_counted_without_a_gap() {
 }
 
 #[test]
-fn a_refinement_ends_in_the_frame_that_the_effort_says() {
+fn a_refinement_ends_in_its_frame_and_another_effort_begins_anew() {
     let (config, picture) = (config(), image(&cut_off(1.5)));
-    for (fit_level, frames) in BY_MODEL {
-        assert_eq!(first_refined(&mut Fit::new(fit_level), &picture, &config), frames, "{fit_level:?}");
-    }
-}
-
-#[test]
-fn another_effort_begins_anew_and_the_same_does_not() {
-    let (config, picture) = (config(), image(&cut_off(1.5)));
-    for before in 1..11 {
+    for before in 0..11 {
         for (fit_level, frames) in BY_MODEL {
-            let mut fit = Fit::new(FitLevel::OneRow);
+            let mut fit = Fit::new(if before == 0 { fit_level } else { FitLevel::OneRow });
             read_often(&mut fit, &picture, before, &config);
             fit.set_fit_level(fit_level);
             let expected = if fit_level == FitLevel::OneRow { 11 - before } else { frames };
@@ -54,7 +46,6 @@ fn another_effort_begins_anew_and_the_same_does_not() {
     }
 }
 
-/// The result of the fit stays: the force does not fall back to the sums.
 #[test]
 fn another_effort_keeps_what_was_found() {
     let (config, picture) = (config(), image(&cut_off(1.5)));
@@ -68,7 +59,6 @@ fn another_effort_keeps_what_was_found() {
     }
 }
 
-/// The next contact is no part of the last one: until a refinement of its own it is its sum.
 #[test]
 fn what_was_found_goes_with_the_contact() {
     let (config, picture) = (config(), image(&cut_off(1.5)));
@@ -82,7 +72,6 @@ fn what_was_found_goes_with_the_contact() {
     }
 }
 
-/// Once the array sees all of the contact, its sum counts again, to the last bit.
 #[test]
 fn a_contact_that_comes_into_sight_is_its_sum() {
     let config = config();
@@ -161,7 +150,6 @@ fn with(pitch_um: i32, tip_radius_um: i32) -> Config {
     allowed(Params { pitch_um, tip_radius_um, ..Params::DEFAULT })
 }
 
-/// The fit of one geometry is void for another.
 #[test]
 fn other_parameters_begin_the_fit_anew() {
     let last = with(4_000, 4_000);
@@ -216,7 +204,6 @@ fn a_fit_that_is_handed_another_geometry_begins_anew() {
     }
 }
 
-/// A contact that jumps farther than a refinement goes is found again: a guess that leads nowhere is given up.
 #[test]
 fn a_contact_elsewhere_is_found_again() {
     let config = config();

@@ -152,7 +152,6 @@ proptest! {
     }
 }
 
-/// Codes exactly at the limits, in each column, with one column higher than the others.
 #[test]
 fn a_taxel_is_bad_from_the_very_limit_on() {
     let config = config(1_667, 12);
@@ -176,7 +175,6 @@ fn a_taxel_is_bad_from_the_very_limit_on() {
     }
 }
 
-/// As many bad taxels as are allowed are left out; of more than that nothing is shown.
 #[test]
 fn a_broken_array_shows_nothing() {
     let config = config(1_667, 12);

@@ -1,5 +1,4 @@
-//! The guard alone, against arbitrary frames, senses and duties: its promises hold whatever the loop, the array and the
-//! host do.
+//! The guard alone, against arbitrary inputs: its promises hold whatever the loop, the array and the host do.
 
 use crate::common::*;
 use fingertip::safety::guard::{Guard, Seen};
@@ -17,7 +16,7 @@ fn config(rng: &mut Rng) -> Config {
         inertia_ug_m2: rng.i32(40..120),
         ..Params::DEFAULT
     };
-    Config::shipped(&params).expect("allowed")
+    allowed(params)
 }
 
 /// Inputs of the guard while the host requests no force.
@@ -54,8 +53,8 @@ fn lets_through(guard: &Guard) -> [bool; 2] {
     })
 }
 
-/// The rear end that promise 1 allows, from the frames alone. It moves back only behind a push: the mean force rises by the
-/// least contact over an earlier frame, and the tip was not farther forward since that frame.
+/// The rear end that promise 1 allows, from the frames alone. It moves back only behind a push: the mean force rises by
+/// the least contact over an earlier frame, and the tip was not farther forward since that frame.
 struct RearEnd {
     mm: f64,
     /// Mean force as the guard measures it, Q16 N.
@@ -83,9 +82,9 @@ impl RearEnd {
     }
 }
 
-/// Beyond an end of the travel no duty drives the tip farther out, and 1 mm beyond it is stopped: for any counts, forces
-/// and voltages, jumps included. The front end never moves outwards. The rear end moves back only behind an object that pushes,
-/// at most by the indentation, the clearance and 1 mm behind the place of the push.
+/// For any input no duty drives the tip farther beyond an end of the travel, and 1 mm beyond it is stopped. The rear
+/// end moves back only behind an object that pushes: to the indentation, the clearance and 1 mm behind the place of the
+/// push.
 #[test]
 fn no_input_opens_an_end() {
     let mut rng = Rng::with_seed(1);
@@ -132,7 +131,7 @@ fn no_input_opens_an_end() {
 /// The rear end moves to the clearance and 1 mm behind the last push. A force that only remains moves no end.
 #[test]
 fn only_a_push_takes_the_rear_end_along() {
-    let config = Config::shipped(&Params::DEFAULT).expect("allowed");
+    let config = allowed(Params::DEFAULT);
     let back_mm: f64 = config.bounds.back.0.to_num();
     let behind_mm = config.clearance.0.to_num::<f64>() + 1.0;
     let from_mm = 0.5 - back_mm;
@@ -224,7 +223,6 @@ fn no_duty_makes_it_fast_in_the_air() {
     assert!(fast > 0 && stopped > 100, "the adversary never tried");
 }
 
-/// A finger as strong as its parameters say, within 30 %, with friction and contacts, is never taken for a broken one.
 #[test]
 fn a_sound_finger_is_never_stopped_for_its_direction() {
     let mut rng = Rng::with_seed(3);
@@ -259,7 +257,7 @@ fn a_sound_finger_is_never_stopped_for_its_direction() {
 /// Swapped leads, a blocked motor or a dead encoder: stopped within 5 ms and 0.5 mm of full drive, in either direction.
 #[test]
 fn the_wrong_way_ends_within_half_a_millimetre() {
-    let config = Config::shipped(&Params::DEFAULT).expect("the defaults are allowed");
+    let config = allowed(Params::DEFAULT);
     for (turns, expected) in [(-1.0, Fault::Reversed), (0.0, Fault::EncoderFrozen)] {
         for duty in [Duty::FULL, -Duty::FULL] {
             let mut guard = started(0, &config);
@@ -289,7 +287,7 @@ fn counts(travel_mm: f64, config: &Config) -> i32 {
 /// a touch moves nothing while the host requests none.
 #[test]
 fn a_touch_bounds_the_retreat() {
-    let config = Config::shipped(&Params { clearance_um: 2_000, ..Params::DEFAULT }).expect("allowed");
+    let config = allowed(Params { clearance_um: 2_000, ..Params::DEFAULT });
     for (pressing, floor_mm) in [(true, 10.0 - 2.0 - 1.0), (false, -f64::from(config.bounds.back.0.to_num::<f32>()))] {
         let mut guard = started(0, &config);
         let mut at = |travel_mm: f64, force: Newtons| {

@@ -92,7 +92,6 @@ fn a_residue_from_before_torque_does_not_make_the_tip_go_back() {
     }
 }
 
-/// An object is moved to a released tip, is held, and is released again.
 #[test]
 fn what_came_to_a_released_tip_is_held_and_let_go() {
     for (to_mm, goal_mn) in [(3.0, 1_000), (2.5, 1_000), (2.0, 1_000), (1.5, 200), (0.8, 200)] {
@@ -109,7 +108,6 @@ fn what_came_to_a_released_tip_is_held_and_let_go() {
     }
 }
 
-/// Torque off and on again does not move the zero of the travel, so the finger goes no farther than without it.
 #[test]
 fn torque_off_does_not_extend_the_travel() {
     let mut board = ready();

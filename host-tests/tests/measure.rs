@@ -166,15 +166,9 @@ fn a_press_has_no_more_rows_than_stated() {
             encoder = encoder.wrapping_add(random.i32(-stride..=stride));
             motion.observe(encoder, &config);
             let chip = random.bool().then(|| Celsius::from_bits(random.i32(..)));
-            let view = PressInputs {
-                sequence,
-                picture: &picture,
-                contact: &contact,
-                encoder,
-                motion: &motion,
-                applied_mv: random.i32(-20_000..20_000),
-                chip,
-            };
+            let (picture, contact, motion) = (&picture, &contact, &motion);
+            let applied_mv = random.i32(-20_000..20_000);
+            let view = PressInputs { sequence, picture, contact, encoder, motion, applied_mv, chip };
             press.observe(&view, &mut step, &mut standing, &config);
             rows += usize::from(press.part() == Some(0));
         }
@@ -185,7 +179,6 @@ fn a_press_has_no_more_rows_than_stated() {
     assert!(most > ROWS_MAX / 2, "{most} rows at most: the inputs show nothing");
 }
 
-/// Arbitrary codes, counts and supplies during a motion.
 #[test]
 fn a_motion_takes_anything_and_closes_its_record() {
     for seed in 0..60 {

@@ -45,10 +45,9 @@ impl Shown {
     }
 }
 
-fn restarted(um: i32) -> Monitor {
-    let Shown { picture, motion, .. } = Shown::sound().at(um);
+fn restarted(Shown { picture, motion, .. }: &Shown) -> Monitor {
     let mut monitor = Monitor::default();
-    monitor.restart(&picture, &motion);
+    monitor.restart(picture, motion);
     monitor
 }
 
@@ -105,7 +104,7 @@ fn load(mn: i32) -> i32 {
 /// Moves the tip forward under a constant image and a load that grows per 0.1 mm. Returns the travel at its stop.
 fn stopped_um(um_per_frame: i32, load_mn: i32, force_mn: i32, goal_mn: i32) -> Option<i32> {
     let config = config();
-    let mut monitor = restarted(5_000);
+    let mut monitor = restarted(&Shown::sound().at(5_000));
     (1..=6_000 / um_per_frame).map(|frame| frame * um_per_frame).find(|um| {
         let mut shown = Shown::sound().at(5_000 + um).loaded(load_mn * (um - 100).clamp(0, 100) / 100);
         (shown.contact.force, shown.command.goal) = (newtons(force_mn), newtons(goal_mn));
@@ -151,7 +150,7 @@ fn an_array_that_shows_any_change_or_no_contact_does_not() {
         |shown, frame| *shown = shown.at(5_000 - frame),
     ];
     for (number, change) in changes.into_iter().enumerate() {
-        let mut monitor = restarted(5_000);
+        let mut monitor = restarted(&Shown::sound().at(5_000));
         for frame in 1..5_000 {
             let mut shown = Shown::sound().at(5_000 + frame).loaded(frame);
             change(&mut shown, frame);
@@ -174,9 +173,7 @@ fn an_array_that_reads_less_than_at_its_tare_is_broken() {
     let of_contacts = f64::from(least) * config.newtons_per_sum_q48 as f64 / 2_f64.powi(48);
     assert!((-0.121..-0.119).contains(&of_contacts), "{of_contacts} N are not three times 40 mN");
     for sum in [least, 0, 1_000_000] {
-        let mut monitor = Monitor::default();
-        let Shown { picture, motion, .. } = with(sum);
-        monitor.restart(&picture, &motion);
+        let mut monitor = restarted(&with(sum));
         for _ in 0..100 {
             assert_eq!(monitor.check(&with(sum).view(), &config), None, "{sum}");
         }
@@ -203,7 +200,7 @@ fn stopped_by_sums(goal_mn: i32, sums: impl Iterator<Item = (i32, u16)>) -> Opti
     let config = config();
     let mut shown = Shown::sound();
     shown.command.goal = newtons(goal_mn);
-    let mut monitor = restarted(0);
+    let mut monitor = restarted(&Shown::sound());
     let mut fault = |(sum, bad_count)| {
         shown.picture = TactileImage { sum, bad_count, moment_x: sum, ..shown.picture };
         let fault = monitor.check(&shown.view(), &config);

@@ -1,5 +1,4 @@
-//! Requests in the loop: all requests of one frame are executed, and refused ones are reported. Also the first frame
-//! with torque.
+//! Requests in the loop: all of one frame are executed, refused ones are reported. Also the first frame with torque.
 
 use crate::common::*;
 use fingertip::measure::MeasureStatus;
@@ -59,6 +58,14 @@ fn pressed(record: &mut Record) {
     record.frame.codes = board.frame().codes;
 }
 
+/// A tare was requested these frames ago.
+fn taring(frames: u32) -> Bench {
+    let mut board = Bench::default();
+    board.command().tare_request += 1;
+    board.frames(frames);
+    board
+}
+
 /// A tare lasts for these frames.
 fn tares(board: &mut Bench, frames: u32) {
     for _ in 0..frames {
@@ -112,24 +119,17 @@ fn a_tare_in_a_fault_is_refused_for_all_to_see() {
 #[test]
 fn a_fault_ends_a_tare_for_all_to_see() {
     for ((spoil, fault), frames_before) in EARLY_AND_LATE.into_iter().flat_map(|case| [(case, 0), (case, 1)]) {
-        let mut board = Bench::default();
-        board.command().tare_request += 1;
-        board.frames(frames_before);
-        let status = board.step_with(spoil);
+        let status = taring(frames_before).step_with(spoil);
         assert_eq!((status.mode, status.fault, status.tare), (Mode::Fault, Some(fault), Taring::Refused));
     }
-    let mut board = Bench::default();
-    board.command().tare_request += 1;
-    board.step();
+    let mut board = taring(1);
     board.pipeline().stop(Fault::LostFrames);
     assert_eq!(board.status().tare, Taring::Refused);
 }
 
 #[test]
 fn a_second_tare_during_a_tare_begins_anew() {
-    let mut board = Bench::default();
-    board.command().tare_request += 1;
-    board.frames(100);
+    let mut board = taring(100);
     board.command().tare_request += 1;
     tares(&mut board, TARE_FRAMES);
 }
@@ -152,9 +152,7 @@ fn a_tare_does_not_depend_on_the_one_before() {
 
 #[test]
 fn new_parameters_during_a_tare_begin_it_anew() {
-    let mut board = Bench::default();
-    board.command().tare_request += 1;
-    board.frames(100);
+    let mut board = taring(100);
     board.pipeline().configure(&config());
     tares(&mut board, TARE_FRAMES - 1);
 }
@@ -172,9 +170,7 @@ fn a_press_in_the_frame_of_a_fault_leaves_no_old_outcome() {
 
 #[test]
 fn a_press_that_comes_with_torque_or_during_a_tare_waits_for_the_drive() {
-    let mut board = Bench::default();
-    board.command().tare_request += 1;
-    board.step();
+    let mut board = taring(1);
     board.command().torque = true;
     board.request(Task::Press);
     let mut frames = 0;
@@ -195,8 +191,7 @@ fn a_press_that_comes_with_torque_or_during_a_tare_waits_for_the_drive() {
 
 #[test]
 fn a_press_that_waits_is_refused_once_torque_is_off() {
-    let mut board = Bench::default();
-    board.command().tare_request += 1;
+    let mut board = taring(0);
     board.command().torque = true;
     board.request(Task::Press);
     board.step();
@@ -238,8 +233,7 @@ fn measuring() -> Bench {
 fn the_first_frame_with_torque_is_judged_before_it_drives() {
     let others: [(Spoil, Fault); 2] = [(overloaded, Fault::Bridge), (pressed, Fault::OverForce)];
     for (spoil, fault) in EARLY_AND_LATE.into_iter().chain(others) {
-        let mut board = Bench::default();
-        board.tare();
+        let mut board = crate::common::ready();
         board.command().torque = false;
         board.command().goal = newtons(7_000);
         board.step();
@@ -284,7 +278,6 @@ fn torque_waits_until_the_tip_is_slow() {
     }
 }
 
-/// Torque is refused until the motor direction is confirmed, and the reason is reported.
 #[test]
 fn torque_is_refused_before_the_direction_is_confirmed() {
     let mut board = Bench::of(&Setup::default(), &allowed(Params::DEFAULT));
@@ -297,7 +290,6 @@ fn torque_is_refused_before_the_direction_is_confirmed() {
     }
 }
 
-/// Torque and a goal from before a tare request start no approach after the tare: torque must be off first.
 #[test]
 fn torque_that_was_on_before_the_tare_drives_nothing_until_it_was_off() {
     for (off_first, frames) in [(0, 0), (0, 1), (0, 100), (1, 1), (1, 100)] {
@@ -319,7 +311,6 @@ fn torque_that_was_on_before_the_tare_drives_nothing_until_it_was_off() {
     }
 }
 
-/// Torque that is turned on in the frame of a tare request, or during the tare, takes effect after the tare.
 #[test]
 fn torque_that_comes_with_a_tare_or_during_it_waits_for_its_end() {
     for after in [0, 1, TARE_FRAMES / 2, TARE_FRAMES] {
@@ -336,7 +327,6 @@ fn torque_that_comes_with_a_tare_or_during_it_waits_for_its_end() {
     }
 }
 
-/// New parameters or gains stop the finger; torque that was on starts nothing under them before it was off.
 #[test]
 fn torque_that_was_on_before_a_configuration_drives_nothing_until_it_was_off() {
     let changes: [fn(&mut Bench); 2] =
@@ -361,12 +351,10 @@ fn torque_that_was_on_before_a_configuration_drives_nothing_until_it_was_off() {
     }
 }
 
-/// A supply that was out of its window before torque stops the motor in its first frame with torque, undriven.
 #[test]
 fn torque_at_a_wrong_supply_is_a_fault_before_it_drives() {
     for (supply_mv, fault) in [(3_000, Fault::SupplyLow), (60_000, Fault::SupplyHigh)] {
-        let mut board = Bench::default();
-        board.tare();
+        let mut board = crate::common::ready();
         board.command().torque = false;
         for _ in 0..10 {
             assert_eq!(board.step_with(|record| record.sense.supply_mv = supply_mv).fault, None);

@@ -1,5 +1,4 @@
-//! Functions that are compared between processors: every public function of the model, over its whole domain, and more
-//! than refusals.
+//! Functions that are compared between processors: all of the model's public ones, over its whole domain.
 
 use crate::common::*;
 use host_tests::prove::random::reference_tip;

@@ -1,5 +1,4 @@
-//! Arrays of other shapes than the shipped one, through the whole core: closed loops, and the worst that a frame can
-//! bring.
+//! Arrays of other shapes through the whole core: closed loops, and the worst that a frame can bring.
 
 mod drawn;
 mod rates;

@@ -1,5 +1,4 @@
-//! The winding's temperature as the controller has it: bounded, never lower than that of the builds it covers, and what
-//! it does to the current.
+//! The winding's temperature in the controller: bounded, never lower than the true one, and its effect on the current.
 
 use crate::common::*;
 use fingertip::control::Winding;
@@ -171,7 +170,6 @@ proptest! {
         }
     }
 
-    /// At any parameters and any current: bounded, and more current never makes it cooler.
     #[test]
     fn it_is_bounded_and_monotone(
         values in proptest::array::uniform9(0.0..=1.0),

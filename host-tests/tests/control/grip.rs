@@ -181,9 +181,8 @@ fn stops_mm(from_mm: f64, speed: MillimetresPerSecond, config: &Config) -> f64 {
     d_mm
 }
 
-/// Speed limit forward above the approach speed: a shorted motor alone would coast from it by 1.25 times the
-/// indentation left until 1.3 times the goal plus 0.4 N. The contact brakes the rest. The limit is not lower unless
-/// another one acts.
+/// Forward, a shorted motor alone would coast from the speed limit by 1.25 times the indentation left until 1.3 times
+/// the goal plus 0.4 N; the contact brakes the rest. The limit is not lower unless another one acts.
 #[test]
 fn a_shorted_motor_stops_within_three_tenths_and_four_tenths_of_a_newton() {
     let config = config();
@@ -265,7 +264,6 @@ fn an_uncertain_force_takes_the_tip_to_be_as_deep_as_it_moved() {
     assert_eq!(reference(255), reference(0));
 }
 
-/// A tip still moves at full speed forward up to an eighth of uncertainty.
 #[test]
 fn more_than_an_eighth_of_uncertainty_is_slow_forward() {
     let config = config();

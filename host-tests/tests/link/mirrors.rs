@@ -123,7 +123,6 @@ fn lead(bench: &mut Bench, block: u16, place: u16, target: u16, bytes: u16) {
     assert_eq!(bench.write(block + 2 * place, &addresses), Ok(()));
 }
 
-/// The blocks are where drivers of X-series servos expect them.
 #[test]
 fn the_first_block_stands_where_servos_have_it() {
     assert_eq!(BLOCKS[0], (168, 224));
@@ -215,7 +214,6 @@ fn a_write_reaches_whole_registers_by_their_own_rules() {
     assert_eq!(bench.number(address::PARAMS, 4), 9_000);
 }
 
-/// Bytes of a register in another order, or of two registers, are no register.
 #[test]
 fn what_is_led_to_in_pieces_cannot_be_written() {
     let mut bench = Bench::new();

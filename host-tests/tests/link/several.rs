@@ -1,5 +1,4 @@
-//! Sync, Bulk, Fast Sync and Fast Bulk instructions: several devices on one bus, each hearing the other devices'
-//! packets.
+//! Sync, Bulk, Fast Sync and Fast Bulk instructions: several devices on one bus hear each other.
 
 use super::bench::{Answer, Bench, ID, answer, hex, packet};
 use crate::common::*;
@@ -229,7 +228,7 @@ fn a_part_of_a_fast_bulk_read_that_is_refused_is_zeros_and_a_packet_too_long_is_
     assert_eq!(first.ask(0x9A, &[1, 7, 0, 1, 0]).number(), 2, "only for all");
 }
 
-/// A driver that reads each device from its least address to its largest, as ROBOTIS' own do without indirect addresses.
+/// A driver without indirect addresses reads each device from its least address to its largest, as ROBOTIS' own do.
 #[test]
 fn bulk_read_goes_across_gaps() {
     let mut devices = [device(1), device(2)];

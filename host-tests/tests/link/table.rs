@@ -61,7 +61,6 @@ fn reads_of_no_or_too_many_bytes_are_refused() {
     }
 }
 
-/// All that the core can report is within the range that the table has for its register.
 #[test]
 fn the_last_fault_and_the_last_limit_are_in_the_table() {
     let largest = |address| REGISTERS.iter().find(|register| register.address == address).expect("a register").max;
@@ -406,7 +405,6 @@ fn parameters_that_contradict_each_other_are_a_limit_error() {
     assert_eq!(bench.number(address::SAVED_STATE, 1), 1);
 }
 
-/// Gains are written completely or not at all, like all registers, and passed to the loop once.
 #[test]
 fn gains_are_written_with_torque_off_in_their_range_and_all_at_once() {
     let mut bench = Bench::new();

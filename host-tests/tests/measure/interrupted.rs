@@ -210,7 +210,6 @@ fn every_state_has_its_answer() {
     }
 }
 
-/// The running motion answers both requests, and is not disturbed.
 #[test]
 fn a_request_during_a_motion_is_answered_by_its_end() {
     for task in [Task::Jog, Task::Press] {

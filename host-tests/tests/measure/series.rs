@@ -1,4 +1,4 @@
-//! The layout of a record, read by a decoder of its own: it knows only the documentation of `fingertip::measure::series`.
+//! The layout of a record, read by a decoder from the documentation of `fingertip::measure::series` alone.
 
 use crate::common::*;
 use fingertip::measure::Row;

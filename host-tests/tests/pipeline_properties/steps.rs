@@ -217,7 +217,7 @@ proptest! {
     }
 }
 
-/// Any run keeps to the rules. The inputs are not so wild that everything ends at once: each mode, and each fault that a step can find, is reached.
+/// Any run keeps to the rules. They reach each mode, and each fault that a step can find.
 #[test]
 fn any_run_keeps_to_the_rules_and_the_runs_come_everywhere() {
     let all = RefCell::new(Seen::default());

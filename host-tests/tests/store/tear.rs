@@ -305,10 +305,9 @@ proptest! {
     }
 }
 
-// Two sectors of flash that lose power, and the start and the save of a board on them.
-//
-// Programming only clears bits, of words that are blank; erasing sets all bits of a sector. A loss of power leaves of
-// the word that was programmed any of its bits undone, and of an erase any mixture: see [`Cut`].
+// Two sectors of flash that lose power, and the start and the save of a board on them. Programming only clears bits of
+// blank words, and a cut leaves any of them undone; erasing sets all bits of a sector, and a cut leaves any mixture:
+// see [`Cut`].
 
 /// A record that another pitch does not make.
 pub fn record(number: i32) -> Record {

@@ -125,8 +125,8 @@ fn a_force_that_returns_is_held_again() {
     }
 }
 
-/// After a step, up to a quarter of the largest force counts as a residue, and the touch becomes doubtful. It is held again
-/// only above the least force that was read since then.
+/// After a step, up to a quarter of the largest force counts as a residue, and the touch becomes doubtful. It is held
+/// again only above the least force that was read since then.
 #[test]
 fn a_residue_after_a_step_is_doubtful_until_the_force_rises() {
     let config = config();
@@ -244,7 +244,7 @@ fn a_release_never_goes_forward_and_without_a_touch_nowhere() {
     assert_eq!(got.0.speed, MillimetresPerSecond::ZERO, "no surface is known");
 }
 
-/// The force that was there before torque may be a residue: it gets a place once it is exceeded, and its release is slow.
+/// The force that was there before torque may be a residue: it gets a place once it is exceeded; its release is slow.
 #[test]
 fn a_touch_from_before_torque_has_no_place_until_its_force_rises() {
     let config = config();
@@ -341,7 +341,6 @@ fn a_release_moves_back_while_the_force_falls() {
     }
 }
 
-/// A residue from before torque does not make the tip go back for ever.
 #[test]
 fn a_residue_from_before_torque_does_not_move_the_place_of_rest_for_ever() {
     let config = config();

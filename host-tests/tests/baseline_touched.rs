@@ -1,41 +1,20 @@
-//! An object that touches a released tip, moved by another finger for example: the baseline must not learn its force,
-//! as the next press would be too hard by that force.
+//! The baseline must not learn the force of an object that touches a released tip: the next press would be too hard.
 
-use fastrand::Rng;
-use fingertip::command::Command;
-use fingertip::config::newtons;
-use fingertip::frame::Sense;
-use fingertip::measure::Task;
-use fingertip::params::Params;
-use fingertip::pipeline::Taring;
-use fingertip::pressure::GAIN_ONE;
-use fingertip::shipped::{COLUMNS, Calibration, Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
-use fingertip::state::{Limits, Mode};
-use host_tests::finger::config;
-use sim::effects::{Named, Set};
+use crate::common::*;
 use sim::mechanics::pressures::Cell;
-use sim::native::bench::Bench;
-use sim::plant::Taxel;
-use sim::scene::{Scene, read};
-use sim::setup::Setup;
 
-/// Presses with 1 N and releases; after a time the object is pushed into the tip by a depth for 5 s and taken away;
-/// then the next press has a goal of 1 N. Returns the array's reading at the end of the touch, the true force then, and
-/// the largest force of the second press.
+/// Presses with 1 N and releases; after a time the object is pushed into the tip for 5 s and taken away; then a press
+/// with 1 N. Returns the reading and the true force of that touch, and the largest force of the second press.
 fn next_press(torque: bool, after_s: f64, depth_mm: f64) -> [f64; 3] {
-    let setup = Setup::default();
-    let mut board: Bench = Bench::of(&setup, &config());
-    board.tare();
-    board.command().goal = newtons(1_000);
-    board.run(1.0);
-    board.command().goal = newtons(0);
-    board.run(after_s);
+    let mut board = ready();
+    board.hold(1_000, 1.0);
+    board.hold(0, after_s);
     board.command().torque = torque;
     let travel = board.truth().travel_mm;
-    board.carry_object(setup.wall.distance_mm, travel - depth_mm, 100.0, |_| {});
+    board.carry_object(5.0, travel - depth_mm, 100.0, |_| {});
     board.run(5.0);
     let touch = [board.status().contact.force.0.to_num(), board.truth().force_n];
-    board.place_object(setup.wall.distance_mm);
+    board.place_object(5.0);
     board.run(0.01);
     (board.command().torque, board.command().goal) = (true, newtons(1_000));
     let [read, held] = touch;
@@ -48,12 +27,8 @@ fn what_comes_to_a_released_tip_is_not_learnt() {
     let cases = [(0.5, 0.3), (0.5, 0.6), (0.5, 1.0), (2.0, 0.3), (2.0, 1.0), (0.05, 1.0)];
     // At once after the contact, when a residue is learnt.
     let soon = [(0.05, 0.3), (0.05, 0.5), (0.05, 0.6), (0.05, 0.8)];
-    let all = [
-        cases.map(|case| (false, case)).to_vec(),
-        cases.map(|case| (true, case)).to_vec(),
-        soon.map(|case| (true, case)).to_vec(),
-    ];
-    for (torque, (after_s, depth_mm)) in all.concat() {
+    let all = cases.into_iter().flat_map(|case| [(false, case), (true, case)]);
+    for (torque, (after_s, depth_mm)) in all.chain(soon.map(|case| (true, case))) {
         let [read, held, largest] = next_press(torque, after_s, depth_mm);
         let name = format!("torque {torque}, {depth_mm} mm deep after {after_s} s: {read} of {held} N, then {largest}");
         assert!(if torque { held == 0.0 } else { held > 0.05 }, "{name}");
@@ -62,7 +37,6 @@ fn what_comes_to_a_released_tip_is_not_learnt() {
     }
 }
 
-/// Less than the force of a contact is taken for a residue.
 #[test]
 fn no_more_than_the_force_of_a_contact_is_learnt() {
     let [read, held, largest] = next_press(true, 0.05, 0.2);
@@ -70,7 +44,7 @@ fn no_more_than_the_force_of_a_contact_is_learnt() {
 }
 
 fn bench(params: &Params) -> Bench {
-    let mut board = Bench::of(&Setup::default(), &Config::shipped(params).unwrap());
+    let mut board = Bench::of(&Setup::default(), &allowed(*params));
     board.tare();
     board
 }
@@ -79,31 +53,25 @@ fn bench(params: &Params) -> Bench {
 fn after_a_curve(touching: bool, off_s: f64, goal_mn: i32) -> f64 {
     let mut board = bench(&Params { curve_permille: 500, ..Params::DEFAULT });
     if touching {
-        board.command().goal = newtons(1_000);
-        board.run(0.5);
+        board.hold(1_000, 0.5);
     }
     board.command().torque = false;
-    board.command().goal = newtons(0);
-    board.run(0.01);
+    board.hold(0, 0.01);
     board.pipeline().configure(&config());
     board.place_object(50.0);
     board.place(0.0);
     board.run(off_s);
     board.place_object(5.0);
     board.command().torque = true;
-    board.command().goal = newtons(goal_mn);
-    board.run(2.0)
+    board.hold(goal_mn, 2.0)
 }
 
 /// `curve_permille` to 0 while the tip touches: the baseline learns the last bent frame's row for ever.
 #[test]
 fn a_characteristic_that_is_none_any_more_leaves_nothing() {
-    let mut failed = Vec::new();
     for (off_s, goal_mn) in [(0.1, 1_000), (0.3, 1_000), (0.5, 1_000), (0.6, 7_000), (2.0, 1_000)] {
         let largest = after_a_curve(true, off_s, goal_mn);
-        if largest > 1.02e-3 * f64::from(goal_mn) {
-            failed.push(format!("off for {off_s} s, goal {goal_mn} mN: {largest:.3} N"));
-        }
+        assert!(largest <= 1.02e-3 * f64::from(goal_mn), "off for {off_s} s, goal {goal_mn} mN: {largest:.3} N");
     }
     // No contact, only noise of +-3 codes, which is added up frame by frame.
     for seed in 0..3 {
@@ -112,12 +80,8 @@ fn a_characteristic_that_is_none_any_more_leaves_nothing() {
         board.command().torque = false;
         let mut noisy = |board: &mut Bench, frames: u32| {
             for _ in 0..frames {
-                board.step_with(|record| {
-                    for (row, column) in (0..10).flat_map(|row| (0..10).map(move |column| (row, column))) {
-                        let code = i32::from(record.frame.code(row, column)) + rng.i32(-3..=3);
-                        record.frame.set_code(row, column, code as u16);
-                    }
-                });
+                let mut noisy = |_, _, code| (i32::from(code) + rng.i32(-3..=3)) as u16;
+                board.step_with(|record| recode(&mut record.frame, &mut noisy));
             }
         };
         noisy(&mut board, 200);
@@ -126,14 +90,8 @@ fn a_characteristic_that_is_none_any_more_leaves_nothing() {
         let picture = *board.pipeline().array().picture();
         // 5.86 uN a sixteenth of a code.
         let off_n = f64::from(picture.sum) * 5.86e-6;
-        if off_n.abs() > 0.015 {
-            failed.push(format!(
-                "noise {seed}: {off_n:.3} N after 20 s, and the highest taxel {} codes",
-                picture.peak / 16
-            ));
-        }
+        assert!(off_n.abs() <= 0.015, "noise {seed}: {off_n:.3} N after 20 s, peak {}", picture.peak);
     }
-    assert!(failed.is_empty(), "{failed:#?}");
 }
 
 /// The object is put against the released tip as soon as that is clear of it, and follows.
@@ -147,11 +105,9 @@ fn clear(board: &mut Bench, clear_mm: f64) {
 /// object presses a released tip for 5 s with more than a quarter of the force held before; then with less.
 #[test]
 fn what_presses_for_seconds_is_not_left_of_what_was_held() {
-    let mut failed = Vec::new();
     for (goal_mn, first_mm, then_mm) in [(2_000, 0.95, 0.75), (6_000, 1.6, 1.3)] {
         let mut board = bench(&Params::DEFAULT);
-        board.command().goal = newtons(goal_mn);
-        board.run(1.0);
+        board.hold(goal_mn, 1.0);
         board.command().goal = newtons(0);
         clear(&mut board, 4.1);
         let travel = board.truth().travel_mm;
@@ -162,65 +118,49 @@ fn what_presses_for_seconds_is_not_left_of_what_was_held() {
         let (held, read) = (board.truth().force_n, board.status().contact.force.0.to_num::<f64>());
         board.place_object(5.0);
         board.run(0.05);
-        board.command().goal = newtons(1_000);
-        let largest = board.run(1.0);
-        if (held - read).abs() > 0.02 || largest > 1.02 {
-            failed.push(format!("after {goal_mn} mN: {held:.3} N read {read:.3} N; goal 1 N then has {largest:.3} N"));
-        }
+        let largest = board.hold(1_000, 1.0);
+        let name = format!("after {goal_mn} mN: {held:.3} N read {read:.3} N; goal 1 N then has {largest:.3} N");
+        assert!((held - read).abs() <= 0.02 && largest <= 1.02, "{name}");
     }
-    assert!(failed.is_empty(), "{failed:#?}");
 }
 
-/// A tare forgets the force that was held before it, so a later touch is not compared with it; torque is off for 5 s.
+/// Holds 6 N, switches torque off, takes the object away, and puts it back; each after a time, s.
+fn lose<E: Set>(board: &mut Bench<E>, [held_s, off_s, gone_s]: [f64; 3]) {
+    board.hold(6_000, held_s);
+    board.command().torque = false;
+    board.hold(0, off_s);
+    board.place_object(50.0);
+    board.place(0.0);
+    board.run(gone_s);
+    board.place_object(5.0);
+}
+
 #[test]
 fn a_tare_forgets_what_was_held() {
     let mut largest = [0.0; 2];
     for (history, largest) in [false, true].into_iter().zip(&mut largest) {
         let mut board = bench(&Params::DEFAULT);
         if history {
-            board.command().goal = newtons(6_000);
-            board.run(1.0);
-            board.command().torque = false;
-            board.command().goal = newtons(0);
-            board.run(0.2);
-            board.place_object(50.0);
-            board.place(0.0);
-            board.run(5.0);
-            board.place_object(5.0);
+            lose(&mut board, [1.0, 0.2, 5.0]);
             board.tare();
         }
-        board.command().goal = newtons(200);
-        board.run(1.0);
+        board.hold(200, 1.0);
         board.command().goal = newtons(0);
         clear(&mut board, 4.2);
         board.place_object(3.0);
         board.run(3.0);
         board.place_object(5.0);
         board.run(0.05);
-        board.command().goal = newtons(1_000);
-        *largest = board.run(1.0);
+        *largest = board.hold(1_000, 1.0);
     }
     assert!(largest[1] < largest[0] + 0.02, "goal 1 N has {largest:?} N without and with a history");
 }
 
 // A contact is not judged by the one before.
 
-fn told<E: Set>(board: &mut Bench<E>) -> String {
-    let (truth, status) = (board.truth(), *board.status());
-    format!(
-        "{:?} {:?}, true {:.3} N, read {:.3} N, doubt {}",
-        status.mode,
-        status.fault,
-        truth.force_n,
-        status.contact.force.0.to_num::<f64>(),
-        status.contact.doubt
-    )
-}
-
 /// Touched at 4 mm; then it is at 13 mm, and over the array's edge. A finger without that history holds the goal.
 #[test]
 fn another_object_at_the_edge_is_taken_hold_of() {
-    let mut failed = Vec::new();
     for x_mm in [7.0, 7.25, 7.5] {
         for goal_mn in [200, 1_000] {
             for history in ["none", "let go", "slipped away"] {
@@ -230,47 +170,32 @@ fn another_object_at_the_edge_is_taken_hold_of() {
                 board.place_object(4.0);
                 board.tare();
                 if history != "none" {
-                    board.command().goal = newtons(goal_mn);
-                    board.run(0.7);
+                    board.hold(goal_mn, 0.7);
                 }
                 if history == "let go" {
-                    board.command().goal = newtons(0);
-                    board.run(0.7);
+                    board.hold(0, 0.7);
                 }
                 board.place_object(13.0);
-                board.command().goal = newtons(goal_mn);
-                board.run(2.0);
+                board.hold(goal_mn, 2.0);
                 let off = (board.truth().force_n - 1e-3 * f64::from(goal_mn)).abs();
-                if off > 0.02 || board.status().mode != Mode::Force {
-                    failed.push(format!("{history}, {x_mm} mm, goal {goal_mn} mN: {}", told(&mut board)));
-                }
+                let held = off <= 0.02 && board.status().mode == Mode::Force;
+                assert!(held, "{history}, {x_mm} mm, goal {goal_mn} mN: {}", told(&mut board));
             }
         }
     }
-    assert!(failed.is_empty(), "{failed:#?}");
 }
 
-fn scene(x_mm: f64) -> Scene {
-    let text = format!(
-        "about = \"a plate\"\nduration_s = 1.0\n[object]\ndistance_mm = 5.0\ncentre_x_mm = {x_mm:?}\n\
-        [[script]]\nat_s = 0.0\ngoal_n = 0.0\n"
-    );
-    read("t.toml", &text, &[]).unwrap()
-}
-
-/// A contact at the edge was fitted before a measuring press touches in the middle: the force at the end of the press
-/// must not contain the force ratio of the earlier contact.
+/// A contact at the edge was fitted before a press: its ratio must not be in the force at the end of the press.
 #[test]
 fn a_press_that_measures_loses_the_fit() {
-    let mut board: Bench<Named> = Bench::new(&scene(6.8)).unwrap();
+    let mut board: Bench<Named> = Bench::new(&scene(1, 6.8, "")).unwrap();
     board.tare();
-    board.command().goal = newtons(2_000);
-    board.run(1.0);
+    board.hold(2_000, 1.0);
     board.request(Task::Press);
     board.step();
     while board.step().contact.force >= newtons(15) {}
     let travel_mm = board.truth().travel_mm;
-    board.exchange(&scene(0.0)).unwrap();
+    board.exchange(&scene(1, 0.0, "")).unwrap();
     board.place(travel_mm);
     for _ in 0..20_000 {
         let status = board.step();
@@ -279,37 +204,19 @@ fn a_press_that_measures_loses_the_fit() {
     }
 }
 
-/// A finger holds an object, is switched off, the object is taken away, and it is switched on before another, at the
-/// array's edge. What hysteresis and creep left of the first one reads as a contact in the air, which is where the surface
-/// is taken to be.
+/// The object is taken away with torque off; torque is on before another object. What hysteresis and creep left of the
+/// first one reads as a contact in the air, which must not be taken for a surface.
 #[test]
 fn what_is_left_of_a_contact_in_the_air_is_no_surface() {
-    let mut failed = Vec::new();
     for seed in 0..4 {
-        let text = format!(
-            "about = \"a finger\"\nseed = {seed}\nduration_s = 1.0\n[object]\ndistance_mm = 5.0\ncentre_x_mm = 6.5\n\
-            [effects.noise]\nrms_codes = 1.5\n[effects.dry_friction]\ntorque_mnm = 0.15\n[effects.hysteresis]\n\
-            width_percent = 6\n[effects.creep]\nrate_percent_per_decade = 3\n[effects.gain_spread]\nrms_percent = 6\n\
-            [[script]]\nat_s = 0.0\ngoal_n = 0.0\n"
-        );
         let mut swings = [0.0; 2];
         for (history, swing) in [false, true].into_iter().zip(&mut swings) {
-            let mut board: Bench<Named> = Bench::new(&read("t.toml", &text, &[]).unwrap()).unwrap();
-            board.tare();
+            let mut board = ordinary(seed, 6.5, 6, 3);
             if history {
-                board.command().goal = newtons(6_000);
-                board.run(3.0);
-                board.command().torque = false;
-                board.command().goal = newtons(0);
-                board.run(0.3);
-                board.place_object(60.0);
-                board.place(0.0);
-                board.run(0.01);
-                board.place_object(5.0);
+                lose(&mut board, [3.0, 0.3, 0.01]);
                 board.command().torque = true;
             }
-            board.command().goal = newtons(1_000);
-            board.run(2.0);
+            board.hold(1_000, 2.0);
             let (mut least, mut most) = (f64::MAX, 0.0_f64);
             for _ in 0..10_000 {
                 board.step();
@@ -318,11 +225,9 @@ fn what_is_left_of_a_contact_in_the_air_is_no_surface() {
             }
             *swing = most - least;
         }
-        if swings[1] > swings[0] + 0.05 {
-            failed.push(format!("finger {seed}, from 2 to 3 s after the goal of 1 N: the force swings by {swings:.3?} N without and with a history"));
-        }
+        // From 2 to 3 s after the goal of 1 N.
+        assert!(swings[1] <= swings[0] + 0.05, "finger {seed}: {swings:.3?} N without and with a history");
     }
-    assert!(failed.is_empty(), "{failed:#?}");
 }
 
 /// Six dead taxels are more than allowed; a mask leaves them out. It is given while frames already show them.
@@ -334,9 +239,7 @@ fn taxels_that_are_masked_are_no_fault_any_more() {
     for frames_before in [0, 5] {
         let mut board = Bench::default();
         board.harm(|faults| (2..8).for_each(|column| faults.array.taxels[4][column] = Taxel::Dead));
-        for _ in 0..frames_before {
-            board.step();
-        }
+        board.frames(frames_before);
         board.pipeline().calibrate(&calibration);
         board.tare();
         board.step();
@@ -346,8 +249,7 @@ fn taxels_that_are_masked_are_no_fault_any_more() {
     }
 }
 
-// A tare while something touches is distinguished from one on a free tip, over drawn arrays. The tare is never
-// refused; torque after it is.
+// A tare on a free tip and one while something touches are told apart, over drawn arrays; torque is refused after it.
 
 /// Arrays of each test.
 const ARRAYS: u64 = 120;
@@ -367,7 +269,7 @@ struct Finger {
 
 /// About normal, within 3 deviations.
 fn normal(rng: &mut Rng) -> f64 {
-    (0..12).map(|_| rng.f64()).sum::<f64>().clamp(3.0, 9.0) - 6.0
+    crate::common::normal(rng).clamp(-3.0, 3.0)
 }
 
 impl Finger {
@@ -377,15 +279,10 @@ impl Finger {
         let mut rng = Rng::with_seed(seed);
         let mut setup = Setup::default();
         setup.tip.modulus_kpa = modulus_kpa;
-        // The frames are made without the row's sag; what little preload a few taxels have here is more than few may
-        // lack.
-        let params = Params {
-            modulus_pa: (modulus_kpa * 1e3) as i32,
-            row_sag_ppb_per_code: 0,
-            bad_taxels_max: 20,
-            ..images::CONFIRMED
-        };
-        let mut pipeline = Pipeline::new(&Config::shipped(&params).unwrap());
+        // Frames have no sag of the row; a few taxels here have less preload than `bad_taxels_max` may lack.
+        let modulus_pa = (modulus_kpa * 1e3) as i32;
+        let params = Params { modulus_pa, row_sag_ppb_per_code: 0, bad_taxels_max: 20, ..images::CONFIRMED };
+        let mut pipeline = Pipeline::new(&allowed(params));
         let mut mask = [0u32; ROWS];
         for _ in 0..rng.usize(..4) {
             mask[rng.usize(..ROWS)] |= 1 << rng.usize(..COLUMNS);
@@ -431,11 +328,8 @@ impl Finger {
             let (_, status) = self.pipeline.step(&self.frame, &sense, &self.command);
             limits = status.limits;
         }
-        assert_eq!(
-            (self.pipeline.status().tare, limits.has(Limits::NOT_TARED)),
-            (Taring::Done, false),
-            "never refused"
-        );
+        let refused = limits.has(Limits::NOT_TARED);
+        assert_eq!((self.pipeline.status().tare, refused), (Taring::Done, false));
         limits.has(Limits::TARED_TOUCHING)
     }
 
@@ -450,10 +344,6 @@ impl Finger {
         let (angle, distance_mm) = (self.rng.f64() * std::f64::consts::TAU, self.rng.f64() * 5.0);
         [distance_mm * angle.cos(), distance_mm * angle.sin()]
     }
-}
-
-fn places() -> impl Iterator<Item = (usize, usize)> {
-    (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column)))
 }
 
 const MODULI_KPA: [f64; 3] = [100.0, 250.0, 700.0];
@@ -499,8 +389,7 @@ fn a_later_tare_under_two_tenths_of_a_newton_and_more_is_flagged_and_a_clean_one
     }
 }
 
-/// An unusually uneven array, by a patch of high readings without a touch: the tare is flagged, so torque is refused
-/// until the host forces it.
+/// A patch of high readings without a touch is flagged at the tare: torque is refused until the host forces it.
 #[test]
 fn torque_after_a_flagged_tare_is_refused_unless_it_was_forced() {
     let mut finger = Finger::new(1, 250.0);
@@ -521,7 +410,6 @@ fn torque_after_a_flagged_tare_is_refused_unless_it_was_forced() {
     }
 }
 
-/// A tare is void after a change of the calibration.
 #[test]
 fn a_new_calibration_forgets_the_flag() {
     let mut finger = Finger::new(2, 250.0);

@@ -1,29 +1,12 @@
 //! Commands to the bridge in each mode, and in the middle of the scan of a frame.
 
-use fingertip::config::newtons;
-use fingertip::pipeline::{Bridge, Status};
-use fingertip::shipped::Frame;
-use fingertip::state::{Fault, Mode};
-use fingertip::units::Duty;
-use sim::native::bench::Bench;
+use crate::common::*;
+use fingertip::pipeline::Bridge;
 
 /// Ends of a grip.
 type End = fn(&mut Bench);
 
-/// Holds 1 N, with the duty that this takes.
-fn holding() -> Bench {
-    let mut board = Bench::default();
-    board.tare();
-    board.command().goal = newtons(1_000);
-    for _ in 0..5_000 {
-        board.step();
-    }
-    let status = board.step();
-    assert!(status.mode == Mode::Force && status.duty.0 > 0, "{status:?}");
-    board
-}
-
-/// Configuration with the given number of dead taxels.
+/// Frame with the given number of dead taxels.
 fn dead(frame: &Frame, count: usize) -> Frame {
     let mut frame = *frame;
     (0..count).for_each(|place| frame.set_code(place, place, 0));
@@ -32,7 +15,7 @@ fn dead(frame: &Frame, count: usize) -> Frame {
 
 #[test]
 fn a_sound_frame_changes_nothing() {
-    let mut board = holding();
+    let mut board = holding(1_000);
     let before = *board.status();
     let allowed = board.pipeline().config().params.bad_taxels_max as usize;
     for frame in [*board.frame(), dead(board.frame(), allowed)] {
@@ -43,7 +26,7 @@ fn a_sound_frame_changes_nothing() {
 
 #[test]
 fn a_broken_frame_shorts_the_motor_and_leaves_the_verdict_to_the_step() {
-    let mut board = holding();
+    let mut board = holding(1_000);
     let before = *board.status();
     let broken = board.pipeline().config().params.bad_taxels_max as usize + 1;
     let frame = dead(board.frame(), broken);
@@ -55,7 +38,7 @@ fn a_broken_frame_shorts_the_motor_and_leaves_the_verdict_to_the_step() {
 
 #[test]
 fn nothing_is_looked_at_while_the_bridge_is_off() {
-    let mut board = holding();
+    let mut board = holding(1_000);
     board.command().torque = false;
     assert_eq!(board.step().mode, Mode::Off);
     let frame = dead(board.frame(), 10);
@@ -80,8 +63,7 @@ fn each_mode_has_its_command_for_the_bridge() {
     }
 }
 
-/// Torque off, a tare, new parameters and a cleared fault short the motor of a pressed tip until it has been at rest for
-/// 20 ms; then the bridge opens and stays open.
+/// However a drive ends, the motor is shorted until the tip was at rest for 20 ms. Then the bridge opens for good.
 #[test]
 fn a_motor_that_was_driven_brakes_until_the_tip_rests() {
     let endings: [(&str, End); 4] = [
@@ -100,7 +82,7 @@ fn a_motor_that_was_driven_brakes_until_the_tip_rests() {
         }),
     ];
     for (name, end) in endings {
-        let mut board = holding();
+        let mut board = holding(1_000);
         end(&mut board);
         let mut travel_mm = vec![board.truth().travel_mm];
         while board.step().bridge() == Bridge::Brakes {
@@ -128,18 +110,13 @@ fn a_motor_that_was_driven_brakes_until_the_tip_rests() {
     }
 }
 
-/// A stop between two steps shorts the motor before the next step.
 #[test]
 fn a_stop_and_new_parameters_brake_at_once() {
-    let mut board = holding();
+    let mut board = holding(1_000);
     let config = board.pipeline().config().clone();
     board.pipeline().configure(&config);
     assert_eq!((board.status().mode, board.status().bridge()), (Mode::Off, Bridge::Brakes));
-    let mut board = holding();
+    let mut board = holding(1_000);
     board.pipeline().stop(Fault::LostFrames);
     assert_eq!((board.status().mode, board.status().bridge()), (Mode::Fault, Bridge::Brakes));
-}
-
-fn drives(mode: Mode) -> bool {
-    !matches!(mode, Mode::Off | Mode::Tare | Mode::Fault)
 }

@@ -1,11 +1,8 @@
 //! Budget of the loop's time, for any distribution of the frames' times.
 
-use fingertip::contact::FitLevel;
+use crate::common::*;
 use fingertip::pipeline::budget::{WAIT_MAX, WINDOW};
 use fingertip::shipped::Budget;
-use fingertip::units::CoreCycles;
-use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 
 /// Three quarters of a frame at 10 kHz, ticks.
 const DEADLINE: u32 = 12_568;
@@ -13,8 +10,7 @@ const DEADLINE: u32 = 12_568;
 /// Frames of the longest refinement, of which only one is the dearest, and one more.
 const REFINEMENT: u32 = 12;
 
-/// Frame times: `rest`, up to `spread` more, and with a contact the time of the fit level, from its minimum at a
-/// `model_q8` of 0 to its maximum at 256.
+/// Frame time: `rest`, up to `spread` more, and with a contact that of the level, the largest at a `model_q8` of 256.
 #[derive(Clone, Copy, Debug)]
 struct Stretch {
     frames: u32,
@@ -65,12 +61,7 @@ fn fits(fit_level: FitLevel, rest: u32) -> bool {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig {
-        cases: 400,
-        rng_seed: RngSeed::Fixed(2003),
-        failure_persistence: None,
-        ..ProptestConfig::default()
-    })]
+    #![proptest_config(seeded(400, 2003))]
 
     #[test]
     fn a_deadline_is_missed_only_where_the_rest_jumps_by_more_than_the_margin(
@@ -121,8 +112,7 @@ proptest! {
         }
         prop_assert_eq!(changes, 0, "it hunts");
         let last = last.expect("there were frames");
-        // With a contact the rest is less certain: by the difference of the model's maximum and minimum in the longest
-        // frame of a window.
+        // With a contact the rest is less certain by the difference of the model's maximum and minimum.
         let sure = |fit_level: FitLevel| {
             let blur = if contact { Budget::model_cycles(fit_level.lower()) } else { [0, 0] };
             fits(fit_level, rest + 100 + blur[0] - blur[1])
@@ -151,30 +141,6 @@ fn a_model_dearer_than_estimated_is_tried_ever_less_often() {
     assert!(rises[1] <= 21 && rises[0] <= rises[1] + 12, "{rises:?}");
 }
 
-#[test]
-fn what_is_not_measured_is_not_held_back() {
-    let mut budget = Budget::new();
-    for fit_level in FitLevel::ALL.into_iter().chain(FitLevel::ALL.into_iter().rev()) {
-        assert_eq!(budget.next(fit_level, CoreCycles(0), CoreCycles(DEADLINE)), fit_level);
-    }
-}
-
-#[test]
-fn a_contact_out_of_nothing_finds_an_effort_that_fits() {
-    // Without a contact every fit level is cheap; the first frame with one must fit all the same.
-    for rest in (1_000..9_000).step_by(250) {
-        let mut running = Loop::new();
-        let still = Stretch { frames: 0, rest, spread: 0, contact: false, model_q8: 256 };
-        for _ in 0..100 * WINDOW {
-            running.frame(FitLevel::AllRows, DEADLINE, &still);
-        }
-        for _ in 0..1_000 {
-            let (fit_level, taken) = running.frame(FitLevel::AllRows, DEADLINE, &Stretch { contact: true, ..still });
-            assert!(taken <= DEADLINE, "{taken} with {fit_level:?}");
-        }
-    }
-}
-
 // The budget frame by frame: when the fit level falls, when it rises, and how long it waits.
 
 /// Deadline of a frame, core cycles; [`USABLE`] is seven eighths of it.
@@ -183,11 +149,16 @@ const USABLE: u32 = 28_000;
 /// Ticks that must be free before the level rises.
 const ROOM: u32 = USABLE / 32;
 
-/// At a fit level, with nothing learnt yet.
+/// At a fit level, with nothing measured yet, which holds nothing back.
 fn at(fit_level: FitLevel) -> Budget {
     let mut budget = Budget::new();
-    assert_eq!(budget.next(fit_level, CoreCycles(0), CoreCycles(TICKS)), fit_level);
+    assert_eq!(next(&mut budget, fit_level, 0), fit_level);
     budget
+}
+
+/// Fit level of the next frame after one that took so many cycles.
+fn next(budget: &mut Budget, asked: FitLevel, taken: u32) -> FitLevel {
+    budget.next(asked, CoreCycles(taken), CoreCycles(TICKS))
 }
 
 fn most(fit_level: FitLevel) -> u32 {
@@ -196,9 +167,9 @@ fn most(fit_level: FitLevel) -> u32 {
 
 /// Frames until the fit level changes, at most `at_most`.
 fn frames_to_change(budget: &mut Budget, asked: FitLevel, taken: u32, at_most: u32) -> Option<(u32, FitLevel)> {
-    let before = budget.next(asked, CoreCycles(taken), CoreCycles(TICKS));
+    let before = next(budget, asked, taken);
     (2..=at_most).find_map(|frame| {
-        let fit_level = budget.next(asked, CoreCycles(taken), CoreCycles(TICKS));
+        let fit_level = next(budget, asked, taken);
         (fit_level != before).then_some((frame, fit_level))
     })
 }
@@ -228,12 +199,8 @@ fn it_falls_at_once_where_the_dearest_frame_would_not_fit() {
         for (modelled, longest) in [(false, USABLE - most(fit_level)), (true, USABLE)] {
             let mut budget = at(fit_level);
             budget.note(modelled);
-            assert_eq!(budget.next(fit_level, CoreCycles(longest), CoreCycles(TICKS)), fit_level);
-            assert_eq!(
-                budget.next(fit_level, CoreCycles(longest + 1), CoreCycles(TICKS)),
-                fit_level.lower(),
-                "{fit_level:?}"
-            );
+            assert_eq!(next(&mut budget, fit_level, longest), fit_level);
+            assert_eq!(next(&mut budget, fit_level, longest + 1), fit_level.lower(), "{fit_level:?}");
         }
     }
     // There is nothing below the sum.
@@ -251,8 +218,7 @@ fn it_rises_where_the_next_effort_fits_with_room() {
     }
 }
 
-/// With a contact the measured frames include at least the model's minimum, so the rest is at most the frame time less
-/// that minimum.
+/// Measured frames with a contact include at least the model's minimum, so the rest is shorter by it.
 #[test]
 fn with_a_contact_the_models_least_is_taken_off() {
     let (fit_level, next) = (FitLevel::OneRow, FitLevel::TwoRows);
@@ -264,18 +230,13 @@ fn with_a_contact_the_models_least_is_taken_off() {
     }
 }
 
-/// It is the longest frame of the window that counts, and that of this window alone.
 #[test]
 fn one_long_frame_holds_it_back_for_its_window() {
     for long_frame in [1, 7, WINDOW - 1, WINDOW] {
         let mut budget = at(FitLevel::FiveRows);
         let long = USABLE - most(FitLevel::FiveRows);
         for frame in 1..=2 * WINDOW {
-            let fit_level = budget.next(
-                FitLevel::AllRows,
-                CoreCycles(if frame == long_frame { long } else { 10 }),
-                CoreCycles(TICKS),
-            );
+            let fit_level = next(&mut budget, FitLevel::AllRows, if frame == long_frame { long } else { 10 });
             let expected = if frame == 2 * WINDOW { FitLevel::AllRows } else { FitLevel::FiveRows };
             assert_eq!(fit_level, expected, "frame {frame}, long in {long_frame}");
         }
@@ -302,7 +263,6 @@ fn after_each_fall_it_waits_twice_as_long() {
     assert_eq!(rises, Some((WINDOW, FitLevel::AllRows)));
 }
 
-/// The begin or the end of a contact invalidates the frames before.
 #[test]
 fn a_contact_that_comes_or_goes_begins_the_window_anew() {
     for before in [1, 10, WINDOW - 1] {
@@ -338,9 +298,7 @@ fn the_dearest_frame_is_the_last_rows_with_the_solution() {
 #[test]
 fn there_is_no_fall_below_the_sum() {
     let mut budget = at(FitLevel::Sum);
-    for _ in 0..10 {
-        assert_eq!(budget.next(FitLevel::AllRows, CoreCycles(TICKS), CoreCycles(TICKS)), FitLevel::Sum);
-    }
+    (0..10).for_each(|_| assert_eq!(next(&mut budget, FitLevel::AllRows, TICKS), FitLevel::Sum));
     // The window that they were in, and the next.
     let rises = frames_to_change(&mut budget, FitLevel::AllRows, 10, 10 * WINDOW);
     assert_eq!(rises, Some((2 * WINDOW - 10, FitLevel::Moments)));

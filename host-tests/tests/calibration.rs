@@ -1,16 +1,13 @@
 //! Gains and masks of single taxels.
 
-use fingertip::command::Command;
-use fingertip::pressure::{CalibrationError, GAIN_MAX, GAIN_ONE};
-use fingertip::shipped::{COLUMNS, Calibration, Frame, Pipeline, ROWS, TARE_FRAMES};
-use fingertip::state::Mode;
-use host_tests::finger::{config, tared};
-use sim::plant::{Plant, Setup};
+use crate::common::*;
+use fingertip::pressure::{CalibrationError, GAIN_MAX};
+use host_tests::finger::tared;
 
 const GAINS: [[u16; COLUMNS]; ROWS] = [[GAIN_ONE; COLUMNS]; ROWS];
 
 /// A frame of a contact of 1.5 mm, and one without contact.
-fn frames() -> [Frame; 2] {
+pub fn frames() -> [Frame; 2] {
     let mut world = Plant::new(&Setup::default());
     let mut frames = [Frame::EMPTY; 2];
     world.fill_frame(&mut frames[1]);
@@ -29,7 +26,7 @@ fn a_gain_scales_its_taxel_and_no_other() {
     gains[5][3] = GAIN_ONE / 4 * 5;
     let calibration = Calibration::new(&gains, &[0; ROWS]).unwrap();
     let scaled = *tared(&calibration, &blank, &config).read(&pressed, &config);
-    for (row, column) in (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column))) {
+    for (row, column) in places() {
         let share = f64::from(gains[row][column]) / f64::from(GAIN_ONE);
         let expected = f64::from(plain.taxels[row][column]) * share;
         let found = f64::from(scaled.taxels[row][column]);
@@ -76,26 +73,4 @@ fn what_cannot_be_is_refused_by_name() {
     let mut gains = GAINS;
     (gains[2][2], gains[2][3], mask[6]) = (1, GAIN_MAX, 0x3ff);
     assert!(Calibration::new(&gains, &mask).is_ok());
-}
-
-#[test]
-fn a_new_calibration_needs_a_new_tare() {
-    let [_, mut blank] = frames();
-    let mut pipeline = Pipeline::new(&config());
-    let mut command = Command::default();
-    let mut step = |pipeline: &mut Pipeline, command: &Command| {
-        blank.sequence += 1;
-        let sense = fingertip::frame::Sense { supply_mv: 6_000, ..Default::default() };
-        pipeline.step(&blank, &sense, command).1.mode
-    };
-    step(&mut pipeline, &command);
-    (command.torque, command.tare_request) = (true, 1);
-    for _ in 0..TARE_FRAMES + 2 {
-        step(&mut pipeline, &command);
-    }
-    assert_eq!(step(&mut pipeline, &command), Mode::Release);
-    pipeline.calibrate(&Calibration::NONE);
-    assert_eq!(step(&mut pipeline, &command), Mode::Off);
-    command.tare_request += 1;
-    assert_eq!(step(&mut pipeline, &command), Mode::Tare);
 }

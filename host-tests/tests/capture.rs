@@ -1,79 +1,43 @@
 //! Captures in the core: kept frames come back to the bit, damage is reported, and a replay finds differences.
 
-use fingertip::capture::{Capture, CaptureState, Ended};
-use fingertip::command::Command;
-use fingertip::config::newtons;
-use fingertip::contact::FitLevel;
-use fingertip::frame::Sense;
-use fingertip::measure::Task;
-use fingertip::params::Params;
-use fingertip::pipeline::Status;
-use fingertip::pressure::GAIN_ONE;
-use fingertip::scan::Clocks;
-use fingertip::shipped::{CLOCKS, COLUMNS, Calibration, Frame, Gains, Pipeline, ROWS, SLOTS, TARE_FRAMES, TAXELS};
-use fingertip::state::{Fault, Mode};
-use fingertip::units::{Celsius, CoreCycles, Duty, Newtons};
-use host_tests::finger::config;
-use images::record::Record;
-use proptest::prelude::*;
+use crate::common::*;
+use fingertip::capture::{Ended, Head};
+use fingertip::shipped::Gains;
 use replay::{Field, Frames, ReplayError, replay};
-use sim::native::bench::Bench;
-use sim::setup::Setup;
 
 // A finger that is captured from its tare on.
 
 type Burst<const BYTES: usize> = Capture<ROWS, COLUMNS, BYTES>;
 
-struct Finger<const BYTES: usize> {
-    native: Bench,
-    capture: Box<Burst<BYTES>>,
-}
-
-impl<const BYTES: usize> Finger<BYTES> {
+impl<const BYTES: usize> Recorded<BYTES> {
     /// 0.4 mm from the wall, with gains that differ.
     fn new() -> Self {
-        let config = config();
         let mut setup = Setup::default();
         setup.wall.distance_mm = 0.4;
-        let mut native = Bench::of(&setup, &config);
-        native.pipeline().calibrate(&Calibration::of(&gains()));
-        Self { native, capture: Box::new(Burst::NEW) }
-    }
-
-    /// A frame, as a board takes it.
-    fn frame(&mut self) {
-        self.frame_with(|_| {});
-    }
-
-    /// Steps a frame whose inputs to the core are changed.
-    fn frame_with(&mut self, change: impl FnOnce(&mut Record)) {
-        let Self { native, capture } = self;
-        if capture.is_due(native.status(), &native.record().command) {
-            capture.begin(native.pipeline());
-        }
-        let mut given = native.record();
-        native.step_with(|record| {
-            change(record);
-            given = *record;
-        });
-        capture.record(&given.frame, &given.sense, &given.command, native.status());
+        let mut finger = Self::of(&setup, &config());
+        finger.bench.pipeline().calibrate(&Calibration::of(&gains()));
+        finger
     }
 
     /// Arms, tares, touches and holds until the memory is full.
     fn press(&mut self) {
         self.capture.arm();
-        self.native.command().tare_request += 1;
+        self.bench.command().tare_request += 1;
         self.frame();
-        self.native.command().torque = true;
-        self.native.command().goal = newtons(800);
-        self.until_done();
-    }
-
-    fn until_done(&mut self) {
+        self.bench.command().torque = true;
+        self.bench.command().goal = newtons(800);
         while self.capture.standing().state == CaptureState::Recording {
             self.frame();
         }
         assert_eq!(self.capture.standing().ended, Ended::Full);
+    }
+
+    /// A fresh finger that records from its tare on.
+    fn armed() -> Self {
+        let mut finger = Self::new();
+        finger.capture.arm();
+        finger.bench.command().tare_request += 1;
+        finger
     }
 
     /// A press of a fresh finger.
@@ -98,54 +62,35 @@ fn gains() -> Gains {
 const CODED_BYTES: usize = 8 << 10;
 
 /// A step's arguments and answer, by how far they may stray from frame to frame.
-#[derive(Clone, Debug)]
-struct Step {
-    frame: Frame,
-    sense: Sense,
-    command: Command,
-    status: Status,
-}
-
-fn step(spread: u16) -> impl Strategy<Value = Step> {
+fn step(spread: u16) -> impl Strategy<Value = (Record, Status)> {
     let codes = prop::collection::vec(0..=spread, SLOTS * COLUMNS);
-    let sense = (any::<i32>(), any::<u16>(), any::<u16>(), any::<bool>(), any::<u32>(), any::<bool>());
-    let command = (any::<[u8; 3]>(), any::<[bool; 2]>(), any::<i32>(), any::<u16>(), 0..6_u8, any::<bool>());
+    let bytes = prop::collection::vec(any::<u8>(), Record::BYTES);
+    let wild = (any::<bool>(), any::<bool>(), any::<bool>(), any::<bool>());
     let answer = (any::<i16>(), any::<bool>(), any::<bool>(), any::<u32>());
-    (codes, sense, command, answer).prop_map(move |(codes, sense, command, (duty, force, faulted, sequence))| {
+    (codes, bytes, wild, answer).prop_map(move |(codes, bytes, wild, (duty, force, faulted, sequence))| {
         let mut frame = Frame { sequence, ..Frame::EMPTY };
         for (place, code) in codes.into_iter().enumerate() {
             frame.set_code(place / COLUMNS, place % COLUMNS, code);
         }
-        let (encoder, supply_mv, bus_silent_ms, bridge_fault, answer, wild) = sense;
-        let sense = if wild {
-            let chip = answer.is_multiple_of(2).then_some(Celsius::from_bits(encoder.rotate_left(9)));
-            Sense { encoder, supply_mv, bus_silent_ms, bridge_fault, chip, answer: CoreCycles(answer) }
+        // Any sense and command; their truth values and the fit level come apart from their bytes.
+        let Record { sense, command, .. } = Record::from_bytes(&bytes.try_into().expect("the bytes of a record"));
+        let (wild_sense, wild, torque, tare_forced) = wild;
+        let chip = sense.chip.filter(|_| sense.answer.0.is_multiple_of(2));
+        let sense = if wild_sense {
+            Sense { chip, bridge_fault: sense.answer.0 % 4 < 2, ..sense }
         } else {
-            Sense { encoder: encoder & 3, supply_mv: 6_000 | supply_mv & 7, ..Sense::default() }
+            Sense { encoder: sense.encoder & 3, supply_mv: 6_000 | sense.supply_mv & 7, ..Sense::default() }
         };
-        let ([tare, clear, measure], bools, goal, watchdog, level, wild) = command;
-        let [torque, tare_forced] = bools;
-        let command = Command {
-            torque,
-            goal: Newtons::from_bits(goal),
-            bus_watchdog_ms: watchdog,
-            fit_level: FitLevel::from_number(level),
-            tare_request: tare,
-            tare_forced,
-            clear_request: clear,
-            measure_request: measure,
-        };
-        let status = Status {
-            duty: Duty(duty),
-            mode: if force { Mode::Force } else { Mode::Fault },
-            fault: faulted.then_some(Fault::BrownOutLevel),
-            ..Status::default()
-        };
-        Step { frame, sense, command: if wild { command } else { Command::default() }, status }
+        let fit_level = FitLevel::from_number(command.tare_request % 6);
+        let command = Command { torque, fit_level, tare_forced, ..command };
+        let mode = if force { Mode::Force } else { Mode::Fault };
+        let fault = faulted.then_some(Fault::BrownOutLevel);
+        let status = Status { duty: Duty(duty), mode, fault, ..Status::default() };
+        (Record { frame, sense, command: if wild { command } else { Command::default() } }, status)
     })
 }
 
-fn steps() -> impl Strategy<Value = Vec<Step>> {
+fn steps() -> impl Strategy<Value = Vec<(Record, Status)>> {
     let spread = prop_oneof![Just(2_u16), Just(40), Just(4_095), Just(u16::MAX)];
     prop::collection::vec(spread.prop_flat_map(step), 1..30)
 }
@@ -160,8 +105,8 @@ proptest! {
         capture.arm();
         capture.begin(&mut pipeline);
         let mut kept = 0;
-        for step in &steps {
-            capture.record(&step.frame, &step.sense, &step.command, &step.status);
+        for (Record { frame, sense, command }, status) in &steps {
+            capture.record(frame, sense, command, status);
             kept += usize::from(capture.standing().state == CaptureState::Recording);
         }
         capture.end(Ended::Asked);
@@ -170,13 +115,10 @@ proptest! {
         prop_assert!(kept == steps.len() || head.ended == Ended::Full);
         let frames: Vec<_> = frames.collect::<Result<_, _>>().expect("every frame");
         prop_assert_eq!(frames.len(), kept);
-        for (taken, step) in frames.iter().zip(&steps) {
-            prop_assert_eq!(&taken.frame, &step.frame);
-            prop_assert_eq!(taken.sense, step.sense);
-            prop_assert_eq!(taken.command, step.command);
-            prop_assert_eq!(taken.duty, step.status.duty);
-            let fault = step.status.fault.map_or(0, |fault| fault as u8);
-            prop_assert_eq!((taken.mode, taken.fault), (step.status.mode as u8, fault));
+        for (taken, (record, status)) in frames.iter().zip(&steps) {
+            prop_assert_eq!(Record { frame: taken.frame, sense: taken.sense, command: taken.command }, *record);
+            let fault = status.fault.map_or(0, |fault| fault as u8);
+            prop_assert_eq!((taken.duty, taken.mode, taken.fault), (status.duty, status.mode as u8, fault));
         }
     }
 
@@ -253,13 +195,7 @@ fn out_of_turn_nothing_is_kept() {
 #[test]
 fn a_frame_takes_what_its_noise_says() {
     let config = config();
-    let mut state = 1_u32;
-    let mut uniform = || {
-        state ^= state << 13;
-        state ^= state >> 17;
-        state ^= state << 5;
-        f64::from(state) / f64::from(u32::MAX) - 0.5
-    };
+    let mut rng = Rng::with_seed(1);
     for (noise, most) in [(0.0, 20.0), (0.5, 33.0), (1.0, 46.0), (2.0, 62.0)] {
         let mut pipeline = Pipeline::new(&config);
         let mut capture = Box::new(Burst::<{ 44 << 10 }>::NEW);
@@ -269,12 +205,11 @@ fn a_frame_takes_what_its_noise_says() {
         while capture.standing().state == CaptureState::Recording {
             frame.sequence += 1;
             for place in 0..SLOTS * COLUMNS {
-                // Twelve of them make a normal number.
-                let normal: f64 = (0..12).map(|_| uniform()).sum();
-                frame.set_code(place / COLUMNS, place % COLUMNS, (372.3 + noise * normal).round() as u16);
+                let code = 372.3 + noise * normal(&mut rng);
+                frame.set_code(place / COLUMNS, place % COLUMNS, code.round() as u16);
             }
-            let sense =
-                Sense { supply_mv: 6_000 + (8.0 * uniform()) as u16, answer: CoreCycles(5_000), ..Sense::default() };
+            let supply_mv = 6_000 + rng.u16(..4);
+            let sense = Sense { supply_mv, answer: CoreCycles(5_000), ..Sense::default() };
             capture.record(&frame, &sense, &Command::default(), &Status::default());
         }
         let frames = capture.standing().frames;
@@ -294,7 +229,7 @@ fn verdict(bytes: &[u8]) -> Result<bool, ReplayError> {
 
 #[test]
 fn every_bit_counts() {
-    let finger = Finger::<DAMAGED_BYTES>::pressed();
+    let finger = Recorded::<DAMAGED_BYTES>::pressed();
     let mut bytes = finger.capture.data().to_vec();
     assert_eq!(verdict(&bytes), Ok(true));
     for place in 0..bytes.len() {
@@ -308,7 +243,7 @@ fn every_bit_counts() {
 
 #[test]
 fn a_cut_is_told_at_every_length() {
-    let finger = Finger::<DAMAGED_BYTES>::pressed();
+    let finger = Recorded::<DAMAGED_BYTES>::pressed();
     let bytes = finger.capture.data();
     for length in 0..bytes.len() {
         assert_eq!(verdict(&bytes[..length]), Err(ReplayError::Cut), "{length} bytes");
@@ -318,7 +253,7 @@ fn a_cut_is_told_at_every_length() {
 
 #[test]
 fn others_are_told_apart() {
-    let finger = Finger::<DAMAGED_BYTES>::pressed();
+    let finger = Recorded::<DAMAGED_BYTES>::pressed();
     let changed = |place: usize, value: u8| {
         let mut bytes = finger.capture.data().to_vec();
         bytes[place] = value;
@@ -342,132 +277,113 @@ fn others_are_told_apart() {
 
 const BYTES: usize = 44 << 10;
 
-fn agrees<const BYTES: usize>(finger: &Finger<BYTES>) -> u32 {
-    let mut last = Status::default();
-    let replayed = replay::<ROWS, COLUMNS>(finger.capture.data(), &CLOCKS, |_, status| last = *status);
-    let replayed = replayed.expect("a capture");
+/// Replays a capture without a difference; its head.
+fn agrees<const BYTES: usize>(finger: &Recorded<BYTES>, mut each: impl FnMut(&Status)) -> Head<ROWS, COLUMNS> {
+    let replayed = replay(finger.capture.data(), &CLOCKS, |_, status| each(status)).expect("a capture");
     assert_eq!(replayed.difference, None);
-    replayed.head.frames
+    replayed.head
 }
 
 #[test]
 fn a_press_replays_to_the_bit_also_with_gains() {
-    let finger = Finger::<BYTES>::pressed();
+    let finger = Recorded::<BYTES>::pressed();
     let (mut modes, mut force_n) = (Vec::new(), 0.0);
-    let replayed = replay::<ROWS, COLUMNS>(finger.capture.data(), &CLOCKS, |_, status| {
-        if modes.last() != Some(&status.mode) {
-            modes.push(status.mode);
-        }
+    let head = agrees(&finger, |status| {
+        modes.push(status.mode);
         force_n = status.contact.force.0.to_num::<f64>();
     });
-    let replayed = replayed.expect("a capture");
-    assert_eq!(replayed.difference, None);
-    assert_eq!((replayed.head.ended, replayed.head.gains), (Ended::Full, gains()));
+    assert_eq!((head.ended, head.gains), (Ended::Full, gains()));
+    modes.dedup();
     assert_eq!(modes, [Mode::Tare, Mode::Off, Mode::Approach, Mode::Force], "a press is in it");
     assert!((force_n - 0.8).abs() < 0.1, "{force_n} N");
-    assert!(replayed.head.frames > TARE_FRAMES + 600, "{} frames", replayed.head.frames);
+    assert!(head.frames > TARE_FRAMES + 600, "{} frames", head.frames);
 }
 
 #[test]
 fn what_the_finger_did_before_does_not_matter() {
-    let mut finger = Finger::<{ 8 << 10 }>::new();
-    finger.native.tare();
-    finger.native.command().goal = newtons(1_500);
-    (0..3_000).for_each(|_| {
-        finger.native.step();
-    });
-    finger.native.request(Task::Press);
-    (0..3_000).for_each(|_| {
-        finger.native.step();
-    });
-    finger.native.command().goal = newtons(0);
-    (0..3_000).for_each(|_| {
-        finger.native.step();
-    });
-    finger.native.step_with(|record| record.sense.bridge_fault = true);
-    assert_eq!(finger.native.status().fault, Some(Fault::Bridge));
-    *finger.native.command() = Command { torque: false, clear_request: 1, ..*finger.native.command() };
-    (0..500).for_each(|_| {
-        finger.native.step();
-    });
+    let mut finger = Recorded::<{ 8 << 10 }>::new();
+    finger.bench.tare();
+    finger.bench.command().goal = newtons(1_500);
+    finger.bench.frames(3_000);
+    finger.bench.request(Task::Press);
+    finger.bench.frames(3_000);
+    finger.bench.command().goal = newtons(0);
+    finger.bench.frames(3_000);
+    finger.bench.step_with(|record| record.sense.bridge_fault = true);
+    assert_eq!(finger.bench.status().fault, Some(Fault::Bridge));
+    *finger.bench.command() = Command { torque: false, clear_request: 1, ..*finger.bench.command() };
+    finger.bench.frames(500);
     for _ in 0..2 {
         finger.press();
-        agrees(&finger);
-        *finger.native.command() = Command { torque: false, goal: newtons(0), ..*finger.native.command() };
-        (0..300).for_each(|_| finger.frame());
+        agrees(&finger, |_| {});
+        *finger.bench.command() = Command { torque: false, goal: newtons(0), ..*finger.bench.command() };
+        finger.frames(300);
     }
     assert_eq!(finger.capture.standing().count, 2);
 }
 
-/// The current limit keeps its state when a record begins.
 #[test]
 fn the_motor_stays_as_warm_as_it_is() {
-    let mut finger = Finger::<BYTES>::new();
-    finger.native.tare();
-    *finger.native.command() = Command { torque: true, goal: newtons(6_000), ..*finger.native.command() };
-    (0..5_000).for_each(|_| finger.frame());
-    *finger.native.command() = Command { torque: false, goal: newtons(0), ..*finger.native.command() };
-    (0..200).for_each(|_| finger.frame());
-    let before: f64 = finger.native.status().winding.0.to_num();
+    let mut finger = Recorded::<BYTES>::new();
+    finger.bench.tare();
+    *finger.bench.command() = Command { torque: true, goal: newtons(6_000), ..*finger.bench.command() };
+    finger.frames(5_000);
+    *finger.bench.command() = Command { torque: false, goal: newtons(0), ..*finger.bench.command() };
+    finger.frames(200);
+    let before: f64 = finger.bench.status().winding.0.to_num();
     assert!(before > 88.5, "{before} C: it is warmer than after a reset");
     finger.press();
     let mut coldest = f64::MAX;
-    let replayed = replay::<ROWS, COLUMNS>(finger.capture.data(), &CLOCKS, |_, status| {
-        coldest = coldest.min(status.winding.0.to_num());
-    });
-    assert_eq!(replayed.expect("a capture").difference, None);
+    agrees(&finger, |status| coldest = coldest.min(status.winding.0.to_num()));
     assert!(coldest > before - 0.1, "{coldest} C after {before} C");
 }
 
 #[test]
 fn a_fault_is_in_it_and_what_comes_after() {
-    let mut finger = Finger::<BYTES>::new();
-    finger.capture.arm();
-    finger.native.command().tare_request += 1;
-    (0..300).for_each(|_| finger.frame());
-    finger.native.command().torque = true;
-    finger.native.command().goal = newtons(500);
-    (0..100).for_each(|_| finger.frame());
-    (0..5).for_each(|_| finger.frame_with(|record| record.sense.supply_mv = 0));
-    (0..20).for_each(|_| finger.frame());
-    assert_eq!(finger.native.status().fault, Some(Fault::SupplyLow));
+    let mut finger = Recorded::<BYTES>::armed();
+    finger.frames(300);
+    finger.bench.command().torque = true;
+    finger.bench.command().goal = newtons(500);
+    finger.frames(100);
+    (0..5).for_each(|_| _ = finger.frame_with(|record| record.sense.supply_mv = 0));
+    finger.frames(20);
+    assert_eq!(finger.bench.status().fault, Some(Fault::SupplyLow));
     finger.capture.end(Ended::Asked);
-    assert_eq!(agrees(&finger), 425);
+    assert_eq!(agrees(&finger, |_| {}).frames, 425);
     // An action on the loop between steps ends the capture; the frames before it replay.
-    let mut finger = Finger::<BYTES>::new();
-    finger.capture.arm();
-    finger.native.command().tare_request += 1;
-    (0..200).for_each(|_| finger.frame());
-    finger.native.pipeline().stop(Fault::LostFrames);
+    let mut finger = Recorded::<BYTES>::armed();
+    finger.frames(200);
+    finger.bench.pipeline().stop(Fault::LostFrames);
     finger.capture.end(Ended::Stopped);
-    (0..20).for_each(|_| finger.frame());
+    finger.frames(20);
     assert_eq!(finger.capture.standing().state, CaptureState::Done);
-    assert_eq!(agrees(&finger), 200);
+    assert_eq!(agrees(&finger, |_| {}).frames, 200);
 }
 
 #[test]
 fn another_parameter_or_a_step_that_answers_otherwise_is_found_where_it_is() {
-    let finger = Finger::<BYTES>::pressed();
-    let mut bytes = finger.capture.data().to_vec();
-    // A creep's share more, though its effect comes late.
+    let difference = |bytes: &[u8]| {
+        let replayed = replay::<ROWS, COLUMNS>(bytes, &CLOCKS, |_, _| {}).expect("a capture");
+        replayed.difference.expect("a difference")
+    };
+    let mut bytes = Recorded::<BYTES>::pressed().capture.data().to_vec();
+    // A parameter whose effect comes late.
     let place = Params::RANGES.iter().position(|(name, ..)| *name == "modulus_pa").expect("a parameter");
     bytes[72 + 4 * place] ^= 1;
-    let replayed = replay::<ROWS, COLUMNS>(&bytes, &CLOCKS, |_, _| {}).expect("a capture");
-    assert_eq!(replayed.difference.map(|difference| (difference.frame, difference.field)), Some((0, Field::Digest)));
-    let told = replayed.difference.map(|difference| difference.to_string()).unwrap_or_default();
+    let found = difference(&bytes);
+    assert_eq!((found.frame, found.field), (0, Field::Digest));
+    let told = found.to_string();
     assert!(told.contains("frame 0: digest captured") && told.contains("replayed"), "{told}");
 
     // A duty that is one more than the core's.
-    let mut finger = Finger::<BYTES>::new();
-    finger.capture.arm();
-    finger.native.command().tare_request += 1;
-    finger.native.command().fit_level = fingertip::contact::FitLevel::TwoRows;
-    (0..20).for_each(|_| finger.frame());
-    let mut status = *finger.native.status();
+    let mut finger = Recorded::<BYTES>::armed();
+    finger.bench.command().fit_level = FitLevel::TwoRows;
+    finger.frames(20);
+    let mut status = *finger.bench.status();
     status.duty.0 += 1;
-    let given = finger.native.record();
+    let given = finger.bench.record();
     finger.capture.record(&given.frame, &given.sense, &given.command, &status);
     finger.capture.end(Ended::Asked);
-    let replayed = replay::<ROWS, COLUMNS>(finger.capture.data(), &CLOCKS, |_, _| {}).expect("a capture");
-    assert_eq!(replayed.difference.map(|difference| (difference.frame, difference.field)), Some((20, Field::Duty)));
+    let found = difference(finger.capture.data());
+    assert_eq!((found.frame, found.field), (20, Field::Duty));
 }

@@ -1,12 +1,8 @@
 //! Uncertainty of a force of which only a lower bound is known: by the sums, by a fit, and from frame to frame.
 
+use crate::common::*;
 use core::f64::consts::PI;
-use fastrand::Rng;
-use fingertip::contact::{Contact, FitLevel, from_sums};
-use fingertip::shipped::{Fit, ROWS, TactileImage};
-use fingertip::units::Millimetres;
-use host_tests::finger::config;
-use host_tests::fit_cases::{Noise, Object, Reading, Scene, Steps};
+use fingertip::contact::from_sums;
 
 const NONE: [u32; ROWS] = [0; ROWS];
 /// The reference array's.
@@ -18,9 +14,9 @@ fn mm(length: Millimetres) -> f64 {
 
 /// Tactile image of a plane contact with a spread of the taxel gains.
 fn plane(d_mm: f64, [x_mm, y_mm]: [f64; 2], spread: f64, bad: [u32; ROWS], rng: &mut Rng) -> TactileImage {
-    let scene = Scene { pitch_mm: PITCH_MM, d_mm, x_mm, y_mm, object: Object::Plane };
     let noise = if spread > 0.0 { Noise::OfReading(spread) } else { Noise::None };
-    Reading { steps: Steps::Sixteenths, noise, dead: 0 }.picture(&scene.pressures(), bad, rng).0
+    let pressures = crate::common::plane(PITCH_MM, d_mm, x_mm, y_mm).pressures();
+    Reading { steps: Steps::Sixteenths, noise, dead: 0 }.picture(&pressures, bad, rng).0
 }
 
 /// 0 up to `from`, 255 from `to` on.
@@ -102,14 +98,13 @@ fn sums_are_doubted_by_what_reaches_over_the_edge_or_is_hidden() {
     assert!(both > 10, "{kinds:?}");
 }
 
-/// The parabola's share of a taxel against the model's pressure over that taxel: a centred contact of 1.5 mm, one place
-/// after the other, from the middle to near the rim. A taxel alone hides less than counts: all those that are equally
-/// far from the middle are marked bad, and the four in the middle where these hide too little.
+/// The parabola's share of a taxel against the model's pressure over it, for a centred contact of 1.5 mm. A taxel alone
+/// hides too little: all at the same distance are marked bad, and the four in the middle where these still hide too
+/// little.
 #[test]
 fn the_share_that_a_bad_taxel_hides_is_that_of_the_models_pressure() {
     let mut rng = Rng::with_seed(4);
-    let scene = Scene { pitch_mm: PITCH_MM, d_mm: 1.5, x_mm: 0.0, y_mm: 0.0, object: Object::Plane };
-    let pressures = scene.pressures();
+    let pressures = crate::common::plane(PITCH_MM, 1.5, 0.0, 0.0).pressures();
     let all: f64 = pressures.iter().flatten().sum();
     let whole = plane(1.5, [0.0, 0.0], 0.0, NONE, &mut rng);
     // The sums stay those of the whole contact: its radius is right.
@@ -138,8 +133,7 @@ fn the_share_that_a_bad_taxel_hides_is_that_of_the_models_pressure() {
     }
 }
 
-/// Half of the rows are bad under a contact in the middle of the array: half of its force is hidden, whatever its size. Each
-/// row more hides no less.
+/// Half of the rows are bad under a centred contact: half of its force is hidden. Each row more hides no less.
 #[test]
 fn half_of_a_contact_is_hidden_by_half_of_the_rows() {
     let mut rng = Rng::with_seed(7);
@@ -155,10 +149,9 @@ fn half_of_a_contact_is_hidden_by_half_of_the_rows() {
     }
 }
 
-/// One bad taxel anywhere under a contact of 42 to 380 mN. The sums miss the hidden share h, so they estimate a squared
-/// radius that is too small by the root of 1 - h, and a share that is too large by the same factor; apart from that the
-/// share is right to a tenth. If the taxel is not in the middle, the estimated centre moves away from it, and the share
-/// is too small by up to a quarter.
+/// One bad taxel under a contact of 42 to 380 mN. The sums miss the hidden share h: their squared radius is too small,
+/// and their share too large, by the root of 1 - h; apart from that it is right to a tenth. A taxel that is not in the
+/// middle moves the estimated centre away, which makes the share smaller by up to a quarter.
 #[test]
 fn the_share_that_one_bad_taxel_hides_of_a_light_contact_is_right() {
     let mut rng = Rng::with_seed(5);
@@ -167,7 +160,7 @@ fn the_share_that_one_bad_taxel_hides_of_a_light_contact_is_right() {
         let (row, column) = (3 + rng.usize(..4), 3 + rng.usize(..4));
         let near = |index: usize, rng: &mut Rng| (index as f64 - 4.5 + 1.4 * (rng.f64() - 0.5)) * PITCH_MM;
         let (x_mm, y_mm) = (near(column, &mut rng), near(row, &mut rng));
-        let scene = Scene { pitch_mm: PITCH_MM, d_mm: 0.23 + 0.47 * rng.f64(), x_mm, y_mm, object: Object::Plane };
+        let scene = crate::common::plane(PITCH_MM, 0.23 + 0.47 * rng.f64(), x_mm, y_mm);
         let pressures = scene.pressures();
         let right = pressures[row][column] / pressures.iter().flatten().sum::<f64>();
         let mut bad = NONE;
@@ -187,8 +180,7 @@ fn the_share_that_one_bad_taxel_hides_of_a_light_contact_is_right() {
     assert!(kinds.iter().all(|kind| *kind > 500), "{kinds:?}");
 }
 
-/// A flickering taxel under a contact of 2 mm hides at most a twentieth of it: the uncertainty stays 0 at every fit
-/// level, for a taxel in the middle as for one at the rim.
+/// A flickering taxel hides at most a twentieth of a contact of 2 mm: the uncertainty stays 0 at every fit level.
 #[test]
 fn a_taxel_that_flickers_under_a_contact_makes_no_doubt() {
     let config = config();
@@ -221,10 +213,7 @@ fn a_fit_is_doubted_by_what_is_hidden_and_how_unlike_it_is() {
         let spread = 0.06 * rng.f64();
         let picture = plane(1.0 + 2.0 * rng.f64(), [along, rng.f64() * 2.0], spread, NONE, &mut rng);
         let mut fit = Fit::new(FitLevel::AllRows);
-        let mut contact = Contact::default();
-        for _ in 0..700 {
-            contact = fit.read(&picture, &config);
-        }
+        let contact = read_often(&mut fit, &picture, 700, &config);
         let force = |contact: &Contact| contact.force.0.to_num::<f64>();
         let ratio = force(&contact) / force(&from_sums(&picture, &config));
         if ratio < 1.000_1 {
@@ -276,13 +265,9 @@ fn doubt_comes_in_some_eight_frames_and_goes_in_some_sixty() {
         let found = f64::from(fit.read(&seen, &config).doubt);
         assert!((found - doubt).abs() <= 1.5, "{found}, {doubt} expected in frame {frame}");
     }
-    for _ in 0..400 {
-        fit.read(&seen, &config);
-    }
+    read_often(&mut fit, &seen, 400, &config);
     assert_eq!(fit.read(&seen, &config).doubt, 0, "it goes to the last bit");
     // Without a contact the uncertainty is 0 from the first frame on.
-    for _ in 0..10 {
-        fit.read(&doubtful, &config);
-    }
+    read_often(&mut fit, &doubtful, 10, &config);
     assert_eq!(fit.read(&TactileImage::EMPTY, &config).doubt, 0);
 }

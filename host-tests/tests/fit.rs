@@ -1,15 +1,10 @@
 //! The contact from pictures: the named hard cases, and small samples of what `cargo xtask fit` judges at length.
 
-use fingertip::contact::{CONFIDENCE_LEAST, Contact, FitLevel, from_sums};
-use fingertip::params::Params;
-use fingertip::shipped::{COLUMNS, Config, Fit, ROWS, TactileImage};
-use fingertip::units::{Millimetres, Newtons};
-use host_tests::finger::config;
-use host_tests::fit_cases::{Noise, Object, Reading, Scene, Steps, picture};
+use crate::common::*;
+use fingertip::contact::{CONFIDENCE_LEAST, from_sums};
+use host_tests::fit_cases::picture;
 use host_tests::fit_statistics::{BAD, CUT_MIN, FRAMES, GOOD, Judged, Outcome, Series, WAYS, judge, quantile};
 use images::single::{Refined, read};
-use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 
 /// A converter that gives its smallest and its largest code, in sixteenths.
 const FULL: i32 = 4095 * 16;
@@ -23,10 +18,7 @@ type Taxels = [[i32; COLUMNS]; ROWS];
 
 /// Contacts of a tactile image by each fit level once it has settled, and by each single-frame method; the sums first.
 fn all_ways(picture: &TactileImage, config: &Config) -> Vec<Contact> {
-    let followed = |fit_level| {
-        let mut fit = Fit::new(fit_level);
-        (0..FRAMES).map(|_| fit.read(picture, config)).last().expect("there are frames")
-    };
+    let followed = |fit_level| read_often(&mut Fit::new(fit_level), picture, FRAMES, config);
     let looks = Refined::ALL.map(|refined| read(picture, refined, config));
     FitLevel::ALL.map(followed).into_iter().chain(looks).collect()
 }
@@ -42,14 +34,7 @@ fn mm(length: Millimetres) -> f64 {
     length.0.to_num()
 }
 
-/// Tactile image of a scene without noise.
-fn still(scene: &Scene, bad: [u32; ROWS]) -> (TactileImage, usize) {
-    let reading = Reading { steps: Steps::Sixteenths, noise: Noise::None, dead: 0 };
-    reading.picture(&scene.pressures(), bad, &mut fastrand::Rng::with_seed(0))
-}
-
-/// Checks the bounds of force and centre for two refinements of one tactile image, and for each fit level after many
-/// frames.
+/// Checks force and centre of a tactile image for two refinements, and for each fit level after many frames.
 fn holds(scene: &Scene, bad: [u32; ROWS]) {
     let (picture, seen) = still(scene, bad);
     assert!(seen >= 12, "{seen} taxels see {scene:?}");
@@ -64,14 +49,13 @@ fn holds(scene: &Scene, bad: [u32; ROWS]) {
     assert!(sum.force > 5.0, "the sum alone is right as well: {scene:?}");
 }
 
-fn plane(pitch_mm: f64, d_mm: f64, x_mm: f64, y_mm: f64) -> Scene {
-    Scene { pitch_mm, d_mm, x_mm, y_mm, object: Object::Plane }
-}
-
 #[test]
 fn nothing_is_no_contact() {
-    for contact in all_ways(&TactileImage::EMPTY, &config()) {
-        assert_eq!(contact, Contact { confidence: 255, ..Contact::default() });
+    let saturated = picture(&[[FULL; COLUMNS]; ROWS], [(1 << COLUMNS) - 1; ROWS]);
+    for (picture, bad_taxels) in [(TactileImage::EMPTY, 0), (saturated, 100)] {
+        for contact in all_ways(&picture, &config()) {
+            assert_eq!(contact, Contact { confidence: 255, bad_taxels, ..Contact::default() });
+        }
     }
 }
 
@@ -87,14 +71,6 @@ fn one_taxel_is_its_own_sum() {
             assert!((newtons(contact.force) - 0.028_125).abs() < 1e-4, "{row} {column}: {contact:?}");
             assert!(mm(contact.centre_x).abs() <= 6.75 + 1e-6 && mm(contact.centre_y).abs() <= 6.75 + 1e-6);
         }
-    }
-}
-
-#[test]
-fn saturated_everywhere_is_nothing_seen() {
-    let picture = picture(&[[FULL; COLUMNS]; ROWS], [(1 << COLUMNS) - 1; ROWS]);
-    for contact in all_ways(&picture, &config()) {
-        assert_eq!(contact, Contact { confidence: 255, bad_taxels: 100, ..Contact::default() });
     }
 }
 
@@ -208,17 +184,13 @@ fn one_code_near_no_force_moves_the_indentation_by_what_is_documented() {
     let scene = plane(2.0, 1.0, 0.0, 0.0);
     let config = scene.config();
     let mut largest: f64 = 0.0;
-    for row in 0..ROWS {
-        for column in 0..COLUMNS {
-            for code in [-16, 16] {
-                let mut taxels = Taxels::default();
-                taxels[row][column] = code;
-                for contact in all_ways(&picture(&taxels, NONE), &config) {
-                    largest = largest.max(mm(contact.indentation));
-                    assert_eq!((contact.centre_x, contact.centre_y), (Millimetres::ZERO, Millimetres::ZERO));
-                    assert_eq!(contact.confidence, 255);
-                }
-            }
+    for ((row, column), code) in places().flat_map(|place| [(place, -16), (place, 16)]) {
+        let mut taxels = Taxels::default();
+        taxels[row][column] = code;
+        for contact in all_ways(&picture(&taxels, NONE), &config) {
+            largest = largest.max(mm(contact.indentation));
+            assert_eq!((contact.centre_x, contact.centre_y), (Millimetres::ZERO, Millimetres::ZERO));
+            assert_eq!(contact.confidence, 255);
         }
     }
     // sqrt(h^2 / (24 codes/kPa pi Y)) = 14.6 um for h = 2 mm; the force is rounded down to 1/65536 N before.
@@ -337,12 +309,7 @@ fn in_range(contact: &Contact, config: &Config) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig {
-        cases: 1_500,
-        rng_seed: RngSeed::Fixed(2003),
-        failure_persistence: None,
-        ..ProptestConfig::default()
-    })]
+    #![proptest_config(seeded(1_500, 2003))]
 
     #[test]
     fn any_pictures_are_read(config in any_config(), pictures in proptest::collection::vec(any_picture(), 1..4)) {

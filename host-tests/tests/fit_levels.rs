@@ -1,33 +1,20 @@
 //! The work of a fit, spread over frames: begin and end of a refinement, and the force that it follows meanwhile.
 
-use fastrand::Rng;
-use fingertip::command::Command;
-use fingertip::contact::{CONFIDENCE_LEAST, Contact, FitLevel, from_sums};
-use fingertip::frame::Sense;
-use fingertip::params::Params;
-use fingertip::pipeline::Status;
-use fingertip::shipped::{Config, Fit, Frame, Pipeline, ROWS, TARE_FRAMES, TactileImage};
-use host_tests::finger::config;
-use host_tests::fit_cases::{Noise, Object, Reading, Scene, Steps};
+use crate::common::*;
+use fingertip::contact::{CONFIDENCE_LEAST, from_sums};
 use images::single::{Refined, read};
-use sim::plant::{Plant, Setup};
 
-const NONE: [u32; ROWS] = [0; ROWS];
-/// FitLevels that take the model, and the frames of a refinement.
+/// Fit levels that use the model, and the frames of a refinement.
 const BY_MODEL: [(FitLevel, usize); 4] =
     [(FitLevel::OneRow, 11), (FitLevel::TwoRows, 6), (FitLevel::FiveRows, 3), (FitLevel::AllRows, 1)];
 
-fn picture(scene: &Scene, noise: Noise, rng: &mut Rng) -> TactileImage {
-    Reading { steps: Steps::Sixteenths, noise, dead: 0 }.picture(&scene.pressures(), NONE, rng).0
-}
-
 /// A contact that reaches over the edge.
 fn cut_off(d_mm: f64) -> Scene {
-    Scene { pitch_mm: 1.5, d_mm, x_mm: 6.0, y_mm: 1.0, object: Object::Plane }
+    plane(1.5, d_mm, 6.0, 1.0)
 }
 
-fn still(d_mm: f64) -> TactileImage {
-    picture(&cut_off(d_mm), Noise::None, &mut Rng::with_seed(0))
+fn image(scene: &Scene) -> TactileImage {
+    still(scene, [0; ROWS]).0
 }
 
 /// Number of the frame in which a refinement first gives a result, from 1.
@@ -46,22 +33,12 @@ fn efforts_are_counted_without_a_gap() {
 }
 
 #[test]
-fn a_refinement_ends_in_the_frame_that_the_effort_says() {
-    let (config, picture) = (config(), still(1.5));
-    for (fit_level, frames) in BY_MODEL {
-        assert_eq!(first_refined(&mut Fit::new(fit_level), &picture, &config), frames, "{fit_level:?}");
-    }
-}
-
-#[test]
-fn another_effort_begins_anew_and_the_same_does_not() {
-    let (config, picture) = (config(), still(1.5));
-    for before in 1..11 {
+fn a_refinement_ends_in_its_frame_and_another_effort_begins_anew() {
+    let (config, picture) = (config(), image(&cut_off(1.5)));
+    for before in 0..11 {
         for (fit_level, frames) in BY_MODEL {
-            let mut fit = Fit::new(FitLevel::OneRow);
-            for _ in 0..before {
-                fit.read(&picture, &config);
-            }
+            let mut fit = Fit::new(if before == 0 { fit_level } else { FitLevel::OneRow });
+            read_often(&mut fit, &picture, before, &config);
             fit.set_fit_level(fit_level);
             let expected = if fit_level == FitLevel::OneRow { 11 - before } else { frames };
             assert_eq!(first_refined(&mut fit, &picture, &config), expected, "{fit_level:?} after {before} frames");
@@ -69,14 +46,11 @@ fn another_effort_begins_anew_and_the_same_does_not() {
     }
 }
 
-/// The result of the fit stays: the force does not fall back to the sums.
 #[test]
 fn another_effort_keeps_what_was_found() {
-    let (config, picture) = (config(), still(1.5));
+    let (config, picture) = (config(), image(&cut_off(1.5)));
     let mut fit = Fit::new(FitLevel::AllRows);
-    for _ in 0..20 {
-        fit.read(&picture, &config);
-    }
+    read_often(&mut fit, &picture, 20, &config);
     let found = fit.read(&picture, &config);
     assert!(found.force > from_sums(&picture, &config).force);
     fit.set_fit_level(FitLevel::OneRow);
@@ -85,14 +59,11 @@ fn another_effort_keeps_what_was_found() {
     }
 }
 
-/// The next contact is no part of the last one: until a refinement of its own it is its sum.
 #[test]
 fn what_was_found_goes_with_the_contact() {
-    let (config, picture) = (config(), still(1.5));
+    let (config, picture) = (config(), image(&cut_off(1.5)));
     let mut fit = Fit::new(FitLevel::OneRow);
-    for _ in 0..100 {
-        fit.read(&picture, &config);
-    }
+    read_often(&mut fit, &picture, 100, &config);
     assert!(fit.read(&picture, &config).force > from_sums(&picture, &config).force);
     fit.read(&TactileImage::EMPTY, &config);
     for _ in 0..10 {
@@ -101,26 +72,20 @@ fn what_was_found_goes_with_the_contact() {
     }
 }
 
-/// Once the array sees all of the contact, its sum counts again, to the last bit.
 #[test]
 fn a_contact_that_comes_into_sight_is_its_sum() {
     let config = config();
-    let scene = Scene { x_mm: 0.5, ..cut_off(1.0) };
-    let seen = picture(&scene, Noise::None, &mut Rng::with_seed(0));
+    let seen = image(&Scene { x_mm: 0.5, ..cut_off(1.0) });
     let mut fit = Fit::new(FitLevel::AllRows);
-    for _ in 0..40 {
-        fit.read(&still(1.0), &config);
-    }
-    for _ in 0..40 {
-        fit.read(&seen, &config);
-    }
+    read_often(&mut fit, &image(&cut_off(1.0)), 40, &config);
+    read_often(&mut fit, &seen, 40, &config);
     let (contact, sums) = (fit.read(&seen, &config), from_sums(&seen, &config));
     assert_eq!((contact.force, contact.centre_x, contact.centre_y), (sums.force, sums.centre_x, sums.centre_y));
 }
 
 #[test]
 fn the_model_is_at_work_where_there_is_a_contact_and_an_effort_for_it() {
-    let (config, picture) = (config(), still(1.5));
+    let (config, picture) = (config(), image(&cut_off(1.5)));
     for fit_level in FitLevel::ALL {
         let mut fit = Fit::new(fit_level);
         assert!(!fit.at_work());
@@ -133,20 +98,17 @@ fn the_model_is_at_work_where_there_is_a_contact_and_an_effort_for_it() {
     }
 }
 
-/// During a refinement the indentation scales with the root of the force, so a change of force is not taken for another
-/// contact.
+/// The indentation scales with the root of the force, so a change of force is not taken for another contact.
 #[test]
 fn a_force_that_changes_within_a_refinement_is_followed() {
     let config = config();
     for (from_mm, to_mm) in [(1.2, 2.0), (2.0, 1.2)] {
         let mut fit = Fit::new(FitLevel::OneRow);
-        for _ in 0..200 {
-            fit.read(&still(from_mm), &config);
-        }
+        read_often(&mut fit, &image(&cut_off(from_mm)), 200, &config);
         let (frames, mut worst) = (120, 0.0_f64);
         for frame in 0..=frames {
             let scene = cut_off(from_mm + (to_mm - from_mm) * f64::from(frame) / f64::from(frames));
-            let contact = fit.read(&picture(&scene, Noise::None, &mut Rng::with_seed(0)), &config);
+            let contact = fit.read(&image(&scene), &config);
             worst = worst.max((contact.force.0.to_num::<f64>() / scene.force_n() - 1.0).abs());
             assert!(contact.confidence >= CONFIDENCE_LEAST, "{contact:?}");
         }
@@ -164,7 +126,8 @@ fn a_fit_without_confidence_never_says_less_than_the_taxels() {
     for case in 0..600 {
         let mut scene = [Scene::edge, Scene::two, Scene::bent][case % 3](&mut rng);
         scene.pitch_mm = 1.5;
-        let picture = picture(&scene, Noise::OfReading(0.1), &mut rng);
+        let reading = Reading { steps: Steps::Sixteenths, noise: Noise::OfReading(0.1), dead: 0 };
+        let picture = reading.picture(&scene.pressures(), [0; ROWS], &mut rng).0;
         let sums = from_sums(&picture, &config);
         let mut fit = Fit::new(FitLevel::AllRows);
         for _ in 0..40 {
@@ -184,10 +147,9 @@ fn a_fit_without_confidence_never_says_less_than_the_taxels() {
 
 /// The reference finger with another pitch and tip.
 fn with(pitch_um: i32, tip_radius_um: i32) -> Config {
-    Config::shipped(&Params { pitch_um, tip_radius_um, ..Params::DEFAULT }).unwrap()
+    allowed(Params { pitch_um, tip_radius_um, ..Params::DEFAULT })
 }
 
-/// The fit of one geometry is void for another.
 #[test]
 fn other_parameters_begin_the_fit_anew() {
     let last = with(4_000, 4_000);
@@ -219,8 +181,7 @@ fn other_parameters_begin_the_fit_anew() {
     }
 }
 
-/// A fit that is handed another geometry in the middle of a refinement takes it as a new one, by itself: its sums would
-/// overflow.
+/// A fit that is given another geometry during a refinement begins again by itself: its sums would overflow.
 #[test]
 fn a_fit_that_is_handed_another_geometry_begins_anew() {
     let mut rng = fastrand::Rng::with_seed(7);
@@ -243,66 +204,19 @@ fn a_fit_that_is_handed_another_geometry_begins_anew() {
     }
 }
 
-/// Pressed in at once after the tare, with the centre so far from the array's middle, and left there for 5,000 frames:
-/// the true force and the last status.
-fn pressed(fit_level: FitLevel, depth_mm: f64, [x, y]: [f64; 2]) -> (f64, Status) {
-    let mut setup = Setup::default();
-    (setup.wall.centre_x_mm, setup.wall.centre_y_mm) = (x, y);
-    let mut world = Plant::new(&setup);
-    let mut pipeline = Pipeline::new(&config());
-    let sense = Sense { supply_mv: 6_000, ..Sense::default() };
-    let command = Command { tare_request: 1, fit_level, ..Command::default() };
-    let mut frame = Frame::EMPTY;
-    let mut status = Status::default();
-    world.fill_frame(&mut frame);
-    for count in 0..TARE_FRAMES + 5_000 {
-        if count == TARE_FRAMES + 2 {
-            world.place(setup.wall.distance_mm + depth_mm);
-            world.fill_frame(&mut frame);
-        }
-        frame.sequence += 1;
-        status = *pipeline.step(&frame, &sense, &command).1;
-    }
-    (world.force_n(), status)
-}
-
-#[test]
-fn a_contact_that_appears_is_fitted_wherever_it_lies() {
-    for fit_level in [FitLevel::OneRow, FitLevel::TwoRows, FitLevel::FiveRows, FitLevel::AllRows] {
-        for (depth_mm, x, y) in [(1.5, 6.9, 0.0), (1.5, 0.0, 6.9), (1.5, -6.9, 1.0), (2.0, 5.0, 6.0), (1.5, 1.0, -7.2)]
-        {
-            let (force_n, status) = pressed(fit_level, depth_mm, [x, y]);
-            let contact = status.contact;
-            let sensed_n: f64 = contact.force.0.to_num();
-            let name = format!("{fit_level:?}, {depth_mm} mm deep at {x}, {y}: {sensed_n} of {force_n} N");
-            assert!((sensed_n - force_n).abs() <= 0.01 * force_n + 0.005, "{name}, {}", contact.confidence);
-            assert!((CONFIDENCE_LEAST..255).contains(&contact.confidence), "{name}, {}", contact.confidence);
-        }
-    }
-}
-
-/// A contact that jumps from place to place, farther than a refinement goes, is found again: a guess that leads nowhere
-/// is given up.
 #[test]
 fn a_contact_elsewhere_is_found_again() {
     let config = config();
     for fit_level in [FitLevel::OneRow, FitLevel::AllRows] {
         let mut fit = Fit::new(fit_level);
         for (d_mm, x_mm) in [(1.0, -7.0), (0.5, 6.5), (2.5, -6.0), (0.6, 6.0), (0.4, -6.5)] {
-            let scene = Scene { x_mm, ..cut_off(d_mm) };
-            let picture = picture(&scene, Noise::None, &mut Rng::with_seed(0));
+            let picture = image(&Scene { x_mm, ..cut_off(d_mm) });
             let frames = if fit_level == FitLevel::AllRows { 60 } else { 660 };
-            for _ in 0..frames {
-                fit.read(&picture, &config);
-            }
+            read_often(&mut fit, &picture, frames, &config);
             let contact = fit.read(&picture, &config);
             let fresh = read(&picture, Refined::Full, &config);
             let share = contact.force.0.to_num::<f64>() / fresh.force.0.to_num::<f64>();
-            assert!(
-                (share - 1.0).abs() < 0.02,
-                "{share} of {:?} at {x_mm} mm, {fit_level:?}: {contact:?}",
-                fresh.force
-            );
+            assert!((share - 1.0).abs() < 0.02, "{share} of {fresh:?} at {x_mm} mm, {fit_level:?}: {contact:?}");
             assert!(fresh.force > from_sums(&picture, &config).force);
         }
     }

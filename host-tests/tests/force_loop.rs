@@ -1,18 +1,6 @@
 //! The loop natively: touch, steps, release. The same bounds hold for the flash image on the virtual board.
 
-use fingertip::config::newtons;
-use fingertip::params::Params;
-use fingertip::pipeline::Status;
-use fingertip::shipped::Config;
-use fingertip::state::{Fault, Limits, Mode};
-use sim::native::bench::Bench;
-use sim::setup::Setup;
-
-fn board() -> Bench {
-    let mut board = Bench::default();
-    board.tare();
-    board
-}
+use crate::common::*;
 
 /// True force after each frame of a stretch of time.
 fn run(board: &mut Bench, goal_mn: i32, seconds: f64) -> (Vec<(f64, f64)>, Status) {
@@ -33,7 +21,7 @@ fn time_at_share(trace: &[(f64, f64)], from: f64, to: f64, share: f64) -> f64 {
 
 #[test]
 fn first_touch_from_five_millimetres_does_not_overshoot() {
-    let mut board = board();
+    let mut board = ready();
     let (trace, status) = run(&mut board, 1_000, 0.5);
     let peak = trace.iter().map(|(_, force)| *force).fold(0.0, f64::max);
     assert!((0.995..=1.10).contains(&peak), "peak {peak} N");
@@ -45,7 +33,7 @@ fn first_touch_from_five_millimetres_does_not_overshoot() {
 
 #[test]
 fn force_steps_are_quick_and_true() {
-    let mut board = board();
+    let mut board = ready();
     run(&mut board, 200, 0.5);
     for (from_mn, to_mn) in [(200, 2_000), (2_000, 5_000), (5_000, 1_000), (1_000, 200), (200, 7_000), (7_000, 50)] {
         let from = f64::from(from_mn) / 1e3;
@@ -68,7 +56,7 @@ fn force_steps_are_quick_and_true() {
 
 #[test]
 fn a_zero_goal_lets_go_and_stands_clear() {
-    let mut board = board();
+    let mut board = ready();
     run(&mut board, 2_000, 0.5);
     let (trace, status) = run(&mut board, 0, 0.5);
     assert_eq!((status.mode, status.fault), (Mode::Release, None));
@@ -82,7 +70,7 @@ fn a_zero_goal_lets_go_and_stands_clear() {
 
 #[test]
 fn a_goal_beyond_the_limit_is_cut_and_said() {
-    let mut board = board();
+    let mut board = ready();
     let (trace, status) = run(&mut board, 8_500, 0.6);
     let last = trace.last().unwrap().1;
     assert!((6.9..=7.1).contains(&last), "{last} N");
@@ -91,7 +79,7 @@ fn a_goal_beyond_the_limit_is_cut_and_said() {
 
 #[test]
 fn an_object_that_goes_away_is_not_chased() {
-    let mut board = board();
+    let mut board = ready();
     run(&mut board, 2_000, 0.5);
     // 10 mm away, at half a metre in a second.
     board.carry_object(5.0, 15.0, 500.0, |_| {});
@@ -106,7 +94,7 @@ fn an_object_that_goes_away_is_not_chased() {
 
 #[test]
 fn the_end_of_the_travel_stops_an_approach() {
-    let mut board = board();
+    let mut board = ready();
     board.place_object(40.0);
     let (_, status) = run(&mut board, 1_000, 1.0);
     assert!(status.limits.has(Limits::TRAVEL));
@@ -119,25 +107,22 @@ fn the_end_of_the_travel_stops_an_approach() {
 #[test]
 fn a_reading_that_vanishes_at_once_does_not_make_it_press_harder() {
     for goal_mn in [200, 1_000, 5_000] {
-        let mut board = board();
+        let mut board = ready();
         run(&mut board, goal_mn, 0.5);
-        let blank = {
-            let mut free = Bench::default();
-            free.step();
-            free.frame().codes
-        };
+        let mut free = Bench::default();
+        free.step();
+        let blank = free.frame().codes;
         let (mut largest_n, mut modes) = (0.0_f64, Vec::new());
         for _ in 0..20_000 {
             let mode = board.step_with(|record| record.frame.codes = blank).mode;
             largest_n = largest_n.max(board.truth().force_n);
-            if modes.last() != Some(&mode) {
-                modes.push(mode);
-            }
+            modes.push(mode);
             if mode == Mode::Approach {
                 break;
             }
         }
         assert!(largest_n < 1.02e-3 * f64::from(goal_mn) + 0.005, "{goal_mn} mN: {largest_n} N");
+        modes.dedup();
         assert_eq!(modes, [Mode::Force, Mode::Release, Mode::Approach], "{goal_mn} mN");
         assert_eq!((board.truth().force_n, board.status().fault), (0.0, None), "{goal_mn} mN");
     }
@@ -149,7 +134,7 @@ fn a_motor_that_is_shorted_on_the_way_stops_within_its_bound() {
     for (from_mn, goal_mn) in [(0, 100), (0, 1_000), (0, 7_000), (100, 500), (200, 2_000), (200, 7_000), (2_000, 5_000)]
     {
         for stopped_after in (1..40).map(|step| 5 * step) {
-            let mut board = board();
+            let mut board = ready();
             let goal_n = f64::from(goal_mn) * 1e-3;
             if from_mn > 0 {
                 run(&mut board, from_mn, 0.4);
@@ -158,15 +143,11 @@ fn a_motor_that_is_shorted_on_the_way_stops_within_its_bound() {
                 run(&mut board, goal_mn, 0.16);
             }
             board.command().goal = newtons(goal_mn);
-            for _ in 0..stopped_after {
-                board.step();
-            }
+            board.frames(stopped_after);
             board.pipeline().stop(Fault::LostFrames);
             let largest_n = board.run(0.1);
-            assert!(
-                largest_n < 1.3 * goal_n + 0.4,
-                "{from_mn} to {goal_mn} mN, shorted after {stopped_after} frames: {largest_n} N"
-            );
+            let name = format!("{from_mn} to {goal_mn} mN, shorted after {stopped_after} frames");
+            assert!(largest_n < 1.3 * goal_n + 0.4, "{name}: {largest_n} N");
         }
     }
 }
@@ -174,7 +155,7 @@ fn a_motor_that_is_shorted_on_the_way_stops_within_its_bound() {
 #[test]
 fn a_goal_below_the_least_contact_is_held_as_that() {
     for goal_mn in [1, 5, 14, 15, 39] {
-        let mut board = board();
+        let mut board = ready();
         let (_, status) = run(&mut board, goal_mn, 0.5);
         assert!(status.mode == Mode::Force && status.limits.has(Limits::GOAL), "{goal_mn} mN: {:?}", status.mode);
         let mut lost = 0;
@@ -186,7 +167,7 @@ fn a_goal_below_the_least_contact_is_held_as_that() {
         }
         assert_eq!(lost, 0, "{goal_mn} mN");
     }
-    let mut board = board();
+    let mut board = ready();
     let (_, status) = run(&mut board, 40, 0.5);
     assert!(!status.limits.has(Limits::GOAL), "the smallest force needs no motion");
 }
@@ -194,7 +175,7 @@ fn a_goal_below_the_least_contact_is_held_as_that() {
 /// An object that yields at 100 mm/s: the force falls by more than a quarter within a frame of a slow scan.
 #[test]
 fn a_slow_scan_follows_an_object_that_yields() {
-    let config = Config::shipped(&Params { settle_ns: 100_000, sample_cycles: 480, ..images::CONFIRMED }).unwrap();
+    let config = allowed(Params { settle_ns: 100_000, sample_cycles: 480, ..images::CONFIRMED });
     let frame_s = f64::from(config.timing.frame_ns) * 1e-9;
     let mut board = Bench::of(&Setup::default(), &config);
     board.tare();

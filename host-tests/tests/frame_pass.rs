@@ -1,11 +1,9 @@
 //! The pass over a frame, which works on rows, against the same taxel by taxel: any codes, gains, masks and tares.
 
-use fingertip::params::Params;
+use crate::common::*;
 use fingertip::pressure::{CODE_BITS, GAIN_MAX, TARE_BITS};
-use fingertip::shipped::{Array, COLUMNS, Calibration, Config, Frame, ROWS, TARE_FRAMES, TactileImage};
+use fingertip::shipped::Array;
 use host_tests::finger::tared;
-use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 
 /// Codes above the column's level, or any codes.
 #[derive(Clone, Debug)]
@@ -18,12 +16,8 @@ struct Codes {
 impl Codes {
     fn frame(&self) -> Frame {
         let mut frame = Frame::EMPTY;
-        for column in 0..COLUMNS {
-            frame.set_code(ROWS, column, self.levels[column]);
-            for row in 0..ROWS {
-                frame.set_code(row, column, self.levels[column] + self.above[row][column]);
-            }
-        }
+        recode(&mut frame, |row, column, _| self.levels[column] + self.above[row][column]);
+        (0..COLUMNS).for_each(|column| frame.set_code(ROWS, column, self.levels[column]));
         for (slot, column, code) in &self.wild {
             frame.set_code(*slot, *column, *code);
         }
@@ -45,9 +39,8 @@ fn calibration() -> impl Strategy<Value = Calibration> {
     (gains, mask).prop_map(|(gains, mask)| Calibration::new(&gains, &mask).unwrap())
 }
 
-fn config(sag_ppb: i32, dead_codes: i32) -> Config {
-    let params = Params { row_sag_ppb_per_code: sag_ppb, dead_codes, ..Params::DEFAULT };
-    Config::shipped(&params).unwrap()
+fn config(row_sag_ppb_per_code: i32, dead_codes: i32) -> Config {
+    allowed(Params { row_sag_ppb_per_code, dead_codes, ..Params::DEFAULT })
 }
 
 /// The bad columns of a row by their definition.
@@ -60,9 +53,7 @@ fn bad(frame: &Frame, row: usize, config: &Config) -> u32 {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig {
-        rng_seed: RngSeed::Fixed(21), failure_persistence: None, ..ProptestConfig::default()
-    })]
+    #![proptest_config(seeded(256, 21))]
 
     #[test]
     fn the_sums_are_those_of_the_taxels(
@@ -161,7 +152,6 @@ proptest! {
     }
 }
 
-/// Codes exactly at the limits, in each column, with one column higher than the others.
 #[test]
 fn a_taxel_is_bad_from_the_very_limit_on() {
     let config = config(1_667, 12);
@@ -185,7 +175,6 @@ fn a_taxel_is_bad_from_the_very_limit_on() {
     }
 }
 
-/// As many bad taxels as are allowed are left out; of more than that nothing is shown.
 #[test]
 fn a_broken_array_shows_nothing() {
     let config = config(1_667, 12);

@@ -1,13 +1,7 @@
-//! The guard alone, against arbitrary frames, senses and duties: its promises hold whatever the loop, the array and the
-//! host do.
+//! The guard alone, against arbitrary inputs: its promises hold whatever the loop, the array and the host do.
 
-use fastrand::Rng;
-use fingertip::config::newtons;
-use fingertip::params::Params;
+use crate::common::*;
 use fingertip::safety::guard::{Guard, Seen};
-use fingertip::shipped::Config;
-use fingertip::state::{Fault, Limits};
-use fingertip::units::{Duty, Newtons};
 
 /// Steps over all cases of a test.
 const STEPS: u32 = 10_000_000;
@@ -22,7 +16,12 @@ fn config(rng: &mut Rng) -> Config {
         inertia_ug_m2: rng.i32(40..120),
         ..Params::DEFAULT
     };
-    Config::shipped(&params).expect("allowed")
+    allowed(params)
+}
+
+/// Inputs of the guard while the host requests no force.
+pub fn seen(encoder: i32, force: Newtons, pressing: bool, given_q8_mm_per_s2: i32) -> Seen {
+    Seen { encoder, force, pressing, goal: Newtons::ZERO, given_q8_mm_per_s2 }
 }
 
 fn started(encoder: i32, config: &Config) -> Guard {
@@ -54,14 +53,13 @@ fn lets_through(guard: &Guard) -> [bool; 2] {
     })
 }
 
-/// The rear end that promise 1 allows, from the frames alone. It moves back only behind a push: the mean force rises by the
-/// least contact over an earlier frame, and the tip was not farther forward since that frame.
+/// The rear end that promise 1 allows, from the frames alone. It moves back only behind a push: the mean force rises by
+/// the least contact over an earlier frame, and the tip was not farther forward since that frame.
 struct RearEnd {
     mm: f64,
     /// Mean force as the guard measures it, Q16 N.
     force: i32,
-    /// Earlier frames at a larger travel than all later ones: travel, and smallest mean force up to that frame. The
-    /// farthest comes first.
+    /// Frames at a larger travel than all later ones, farthest first: travel, and smallest mean force up to that frame.
     earlier: Vec<(f64, i32)>,
     pushes: u32,
 }
@@ -84,9 +82,9 @@ impl RearEnd {
     }
 }
 
-/// Beyond an end of the travel no duty drives the tip farther out, and 1 mm beyond it is stopped: for any counts, forces
-/// and voltages, jumps included. The front end never moves outwards. The rear end moves back only behind an object that pushes,
-/// at most by the indentation, the clearance and 1 mm behind the place of the push.
+/// For any input no duty drives the tip farther beyond an end of the travel, and 1 mm beyond it is stopped. The rear
+/// end moves back only behind an object that pushes: to the indentation, the clearance and 1 mm behind the place of the
+/// push.
 #[test]
 fn no_input_opens_an_end() {
     let mut rng = Rng::with_seed(1);
@@ -130,25 +128,18 @@ fn no_input_opens_an_end() {
     assert!(runs.iter().all(|count| *count > 300) && behind > 1_000, "{runs:?}, {behind} frames behind a moved end");
 }
 
-/// An object that pushes the tip back is released: the rear end moves to the clearance and 1 mm behind where it pushed
-/// last. A force that only remains moves no end.
+/// The rear end moves to the clearance and 1 mm behind the last push. A force that only remains moves no end.
 #[test]
 fn only_a_push_takes_the_rear_end_along() {
-    let config = Config::shipped(&Params::DEFAULT).expect("allowed");
+    let config = allowed(Params::DEFAULT);
     let back_mm: f64 = config.bounds.back.0.to_num();
     let behind_mm = config.clearance.0.to_num::<f64>() + 1.0;
     let from_mm = 0.5 - back_mm;
     for rises in [true, false] {
         let mut guard = started(0, &config);
         let mut at = |travel_mm: f64, force_mn: i32| {
-            let force = newtons(force_mn);
-            let encoder = counts(travel_mm, &config);
-            let fault = guard.check(
-                &Seen { encoder, force, pressing: false, goal: Newtons::ZERO, given_q8_mm_per_s2: 0 },
-                true,
-                &config,
-            );
-            (fault, lets_through(&guard)[1])
+            let seen = seen(counts(travel_mm, &config), newtons(force_mn), false, 0);
+            (guard.check(&seen, true, &config), lets_through(&guard)[1])
         };
         // The tip moves back slowly. The force appears once the tip is back, or is constant from the start.
         let mut travel_mm = 0.0;
@@ -213,8 +204,7 @@ fn no_duty_makes_it_fast_in_the_air() {
         for _ in 0..STEPS / 1_000 {
             let encoder = (finger.travel_mm / count_mm(&config)).floor() as i32;
             let force = newtons(offset_mn).max(newtons(rng.i32(-20..20)));
-            let seen = Seen { encoder, force, pressing: rng.bool(), goal: Newtons::ZERO, given_q8_mm_per_s2: voltage };
-            if guard.check(&seen, true, &config).is_some() {
+            if guard.check(&seen(encoder, force, rng.bool(), voltage), true, &config).is_some() {
                 stopped += 1;
                 break;
             }
@@ -233,8 +223,6 @@ fn no_duty_makes_it_fast_in_the_air() {
     assert!(fast > 0 && stopped > 100, "the adversary never tried");
 }
 
-/// A finger that is as strong as its parameters say, give or take 30 %, with friction and contacts, is never taken for
-/// a broken one.
 #[test]
 fn a_sound_finger_is_never_stopped_for_its_direction() {
     let mut rng = Rng::with_seed(3);
@@ -255,14 +243,7 @@ fn a_sound_finger_is_never_stopped_for_its_direction() {
             }
             let sensed = force_n * (0.8 + 0.4 * strength / 1.3) + rng.f64() * 0.01;
             let encoder = (finger.travel_mm / count_mm(&config)).floor() as i32;
-            let seen = Seen {
-                encoder,
-                force: newtons((1e3 * sensed) as i32),
-                pressing: true,
-                goal: Newtons::ZERO,
-                given_q8_mm_per_s2: voltage,
-            };
-            match guard.check(&seen, true, &config) {
+            match guard.check(&seen(encoder, newtons((1e3 * sensed) as i32), true, voltage), true, &config) {
                 Some(Fault::Runaway) => break,
                 None => {}
                 fault => panic!("{fault:?} at {} mm, {} mm/s", finger.travel_mm, finger.speed_mm_per_s),
@@ -273,11 +254,10 @@ fn a_sound_finger_is_never_stopped_for_its_direction() {
     }
 }
 
-/// Swapped channels or leads: stopped within 5 ms and 0.5 mm of full drive, in either direction. A blocked motor or a
-/// dead encoder too.
+/// Swapped leads, a blocked motor or a dead encoder: stopped within 5 ms and 0.5 mm of full drive, in either direction.
 #[test]
 fn the_wrong_way_ends_within_half_a_millimetre() {
-    let config = Config::shipped(&Params::DEFAULT).expect("the defaults are allowed");
+    let config = allowed(Params::DEFAULT);
     for (turns, expected) in [(-1.0, Fault::Reversed), (0.0, Fault::EncoderFrozen)] {
         for duty in [Duty::FULL, -Duty::FULL] {
             let mut guard = started(0, &config);
@@ -286,17 +266,7 @@ fn the_wrong_way_ends_within_half_a_millimetre() {
             let mut voltage = 0;
             let frames = (1..200).find(|_| {
                 let encoder = (turns * finger.travel_mm / count_mm(&config)).floor() as i32;
-                let fault = guard.check(
-                    &Seen {
-                        encoder,
-                        force: Newtons::ZERO,
-                        pressing: true,
-                        goal: Newtons::ZERO,
-                        given_q8_mm_per_s2: voltage,
-                    },
-                    true,
-                    &config,
-                );
+                let fault = guard.check(&seen(encoder, Newtons::ZERO, true, voltage), true, &config);
                 voltage = finger.frame(&guard, &config, 1.0, 0.0, &mut rng);
                 assert!(fault.is_none_or(|fault| fault == expected), "{fault:?}");
                 fault.is_some()
@@ -317,35 +287,26 @@ fn counts(travel_mm: f64, config: &Config) -> i32 {
 /// a touch moves nothing while the host requests none.
 #[test]
 fn a_touch_bounds_the_retreat() {
-    let config = Config::shipped(&Params { clearance_um: 2_000, ..Params::DEFAULT }).expect("allowed");
+    let config = allowed(Params { clearance_um: 2_000, ..Params::DEFAULT });
     for (pressing, floor_mm) in [(true, 10.0 - 2.0 - 1.0), (false, -f64::from(config.bounds.back.0.to_num::<f32>()))] {
         let mut guard = started(0, &config);
-        let at = |travel_mm: f64, force: Newtons, guard: &mut Guard| {
-            let seen = Seen {
-                encoder: counts(travel_mm, &config),
-                force,
-                pressing,
-                goal: Newtons::ZERO,
-                given_q8_mm_per_s2: 0,
-            };
-            guard.check(&seen, true, &config)
+        let mut at = |travel_mm: f64, force: Newtons| {
+            let fault = guard.check(&seen(counts(travel_mm, &config), force, pressing, 0), true, &config);
+            (fault, lets_through(&guard)[1])
         };
         // Forward slowly, then 1 N at 10 mm and its indentation, then back into the air.
         let depth_mm: f64 = config.tip.indentation(newtons(1_000)).0.to_num();
         for step in 0..10_000 {
             let travel_mm = (10.0 + depth_mm) * f64::from(step) / 1e4;
             let force = newtons(((travel_mm - 10.0).max(0.0).powi(2) * 785.0) as i32);
-            assert_eq!(at(travel_mm, force, &mut guard), None);
+            assert_eq!(at(travel_mm, force).0, None);
         }
         let mut travel_mm = 10.0 + depth_mm;
         let mut cut_mm = None;
         let fault = loop {
             travel_mm -= 0.002;
-            let fault = at(travel_mm, Newtons::ZERO, &mut guard);
-            let [_, backward] = lets_through(&guard);
-            if !backward && cut_mm.is_none() {
-                cut_mm = Some(travel_mm);
-            }
+            let (fault, backward) = at(travel_mm, Newtons::ZERO);
+            cut_mm = cut_mm.or((!backward).then_some(travel_mm));
             if fault.is_some() {
                 break fault;
             }

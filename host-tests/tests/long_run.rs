@@ -1,10 +1,7 @@
 //! Filters and integrators in the loop over 10^9 steps, by their cycles; `long-run` also takes the steps one by one.
 
-use fastrand::Rng;
+use crate::common::*;
 use fingertip::control::Observer;
-use fingertip::params::Params;
-use fingertip::shipped::Config;
-use fingertip::state::{Fault, Mode};
 use host_tests::long_run::{Cycle, Machine, all, cycle, hold};
 
 #[test]
@@ -33,8 +30,6 @@ fn the_pipeline_comes_to_rest_under_what_does_not_change() {
     }
 }
 
-/// The observer comes to rest once the encoder rests, whatever happened before: also after jumps, and from impossible
-/// speeds.
 #[test]
 fn the_observer_recovers_from_anything() {
     for (settle_ns, sample_cycles, speed_max_um_per_s) in
@@ -42,7 +37,7 @@ fn the_observer_recovers_from_anything() {
     {
         let approach_um_per_s = speed_max_um_per_s.min(Params::DEFAULT.approach_um_per_s);
         let params = Params { settle_ns, sample_cycles, speed_max_um_per_s, approach_um_per_s, ..images::CONFIRMED };
-        let config = Config::shipped(&params).unwrap();
+        let config = allowed(params);
         let mut rng = Rng::with_seed(11);
         for _ in 0..300 {
             let mut observer = Observer::new();
@@ -61,7 +56,6 @@ fn the_observer_recovers_from_anything() {
     }
 }
 
-/// The search for cycles finds those that are known.
 #[test]
 fn known_cycles_are_found() {
     let step = |x: &mut u32| *x = if *x < 100 { *x + 1 } else { 94 };
@@ -73,7 +67,6 @@ fn known_cycles_are_found() {
     assert_eq!(cycle(&0_u64, 100_000, |x| *x += 1), None);
 }
 
-/// A swing above the documented one is a failure, a smaller one is not.
 #[test]
 fn a_swing_is_measured() {
     let swings = |allowed| Machine {

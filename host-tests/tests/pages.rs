@@ -1,6 +1,6 @@
 //! All that the pages tell a reader to run or to open exists: commands with their flags, files, links and anchors.
 
-use fingertip::units::Millimetres;
+use crate::common::*;
 use host_tests::figures::{Modulus, PITCH_MM, all, fit, readings, seen, tip};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -29,7 +29,7 @@ fn root() -> PathBuf {
 }
 
 /// Files below a folder with one of these endings, without built and hidden ones.
-fn files(folder: &Path, ends: &[&str], found: &mut Vec<PathBuf>) {
+pub fn files(folder: &Path, ends: &[&str], found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("a folder of the repository").map(|entry| entry.expect("its entry").path())
     {
         let name = entry.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -277,8 +277,7 @@ fn every_page_that_a_source_names_exists() {
     }
 }
 
-/// The schematic's labels are names and values of its page, and each net begins at the pin of the netlist, which the
-/// image uses.
+/// The labels of the schematic are names and values of its page; each net begins at a pin that the image uses.
 #[test]
 fn the_schematic_is_that_of_the_netlist() {
     let read = |path: &str| fs::read_to_string(root().join(path)).expect("a file of the repository");
@@ -292,20 +291,16 @@ fn the_schematic_is_that_of_the_netlist() {
         pins.extend(nets.zip(from).filter(|(_, pin)| pin.starts_with('P')));
     }
     let labels = picture.split("<text ").skip(1).filter_map(|text| {
-        text.split(['>', '<']).find(|part| {
-            // The text itself, without the tags around it.
-            !part.is_empty() && !part.contains('=')
-        })
+        // The text itself, without the tags around it.
+        text.split(['>', '<']).find(|part| !part.is_empty() && !part.contains('='))
     });
     let labels: Vec<&str> = labels.filter(|label| *label != "/text").collect();
     let shown: BTreeMap<&str, &str> =
         labels.windows(2).filter(|pair| pair[1].contains(" CN")).map(|pair| (pair[0], pair[1])).collect();
     assert_eq!(shown, pins);
     for pin in pins.values().map(|pin| pin.split(' ').next().expect("a pin")) {
-        assert!(
-            image.split(|sign: char| !sign.is_alphanumeric()).any(|word| word == pin),
-            "the image does not use {pin}"
-        );
+        let mut words = image.split(|sign: char| !sign.is_alphanumeric());
+        assert!(words.any(|word| word == pin), "the image does not use {pin}");
     }
     let titles: Vec<&str> =
         picture.split("font-weight=\"bold\">").skip(1).filter_map(|text| text.split('<').next()).collect();

@@ -9,23 +9,20 @@ const _: &str = env!("FINGERTIP_ROOT");
 /// 60 us at one instruction a cycle of 168 MHz.
 const STEP_INSTRUCTIONS_MAX: u32 = 10_080;
 
-/// Runs the comparison that `cargo xtask qemu` runs.
-fn qemu(failure: &[&str]) -> Output {
-    let image =
-        env::var_os("FINGERTIP_QEMU_IMAGE").expect("FINGERTIP_QEMU_IMAGE names the image; use cargo xtask test");
-    Command::new(env!("CARGO_BIN_EXE_qemu-host"))
-        .arg(image)
-        .arg(env!("CARGO_TARGET_TMPDIR"))
-        .args(failure)
-        .output()
-        .expect("the runner was built with this test")
+/// Runs a program with the image and these words.
+fn run(program: &str, words: &[&str]) -> Output {
+    let image = env::var_os("FINGERTIP_QEMU_IMAGE").expect("it names the image; use cargo xtask test");
+    Command::new(program).arg(image).args(words).output().expect("the runner was built with this test")
 }
 
-fn assert_fails(failure: &str, with: &str) {
-    let output = qemu(&[failure]);
-    let text = String::from_utf8_lossy(&output.stderr);
-    assert!(!output.status.success(), "{failure} went unnoticed");
-    assert!(text.starts_with(with), "{failure}: {text}");
+/// Runs the comparison that `cargo xtask qemu` runs.
+fn qemu(failure: &[&str]) -> Output {
+    run(env!("CARGO_BIN_EXE_qemu-host"), &[&[env!("CARGO_TARGET_TMPDIR")], failure].concat())
+}
+
+/// Runs the comparison of all functions.
+fn same_bits(words: &[&str]) -> Output {
+    run(env!("CARGO_BIN_EXE_same-bits"), words)
 }
 
 #[test]
@@ -50,28 +47,16 @@ fn two_emulated_runs_agree_to_the_instruction() {
 
 #[test]
 #[ignore = "needs QEMU: cargo xtask test"]
-fn a_panic_fails() {
-    assert_fails("panic", "FAILED: panic: injected");
-}
-
-#[test]
-#[ignore = "needs QEMU: cargo xtask test"]
-fn a_hard_fault_fails() {
-    assert_fails("hardfault", "FAILED: hard fault at 0x08");
-}
-
-#[test]
-#[ignore = "needs QEMU: cargo xtask test"]
-fn a_hang_fails() {
-    assert_fails("hang", "FAILED: hang: a step took");
-}
-
-/// Runs the comparison of all functions.
-fn same_bits(words: &[&str]) -> Output {
-    let image =
-        env::var_os("FINGERTIP_QEMU_IMAGE").expect("FINGERTIP_QEMU_IMAGE names the image; use cargo xtask test");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_same-bits"));
-    command.arg(image).args(words).output().expect("the runner was built with this test")
+fn a_panic_a_hard_fault_and_a_hang_fail() {
+    for (failure, with) in [
+        ("panic", "FAILED: panic: injected"),
+        ("hardfault", "FAILED: hard fault at 0x08"),
+        ("hang", "FAILED: hang: a step took"),
+    ] {
+        let output = qemu(&[failure]);
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert!(!output.status.success() && text.starts_with(with), "{failure}: {text}");
+    }
 }
 
 #[test]

@@ -1,18 +1,9 @@
-//! Requests in the loop: all requests of one frame are executed, and refused ones are reported. Also the first frame
-//! with torque.
+//! Requests in the loop: all of one frame are executed, refused ones are reported. Also the first frame with torque.
 
-use fingertip::config::newtons;
-use fingertip::contact::Contact;
-use fingertip::measure::{Ended, MeasureState, MeasureStatus, Task};
-use fingertip::params::Params;
-use fingertip::pipeline::{Bridge, Taring};
+use crate::common::*;
+use fingertip::measure::MeasureStatus;
+use fingertip::pipeline::Bridge;
 use fingertip::pressure::TARE_BITS;
-use fingertip::shipped::{Calibration, Config, TARE_FRAMES};
-use fingertip::state::{Fault, Limits, Mode};
-use host_tests::finger::config;
-use images::record::Record;
-use sim::native::bench::Bench;
-use sim::plant::{Setup, Taxel};
 
 const NOT_READY: MeasureStatus = MeasureStatus::over(Task::Press, Ended::NotReady, 0);
 const RUNNING: MeasureStatus = MeasureStatus::running(Task::Press);
@@ -24,9 +15,9 @@ fn at(distance_mm: f64) -> Bench {
     board
 }
 
+/// Tared, at rest with torque on.
 fn ready() -> Bench {
-    let mut board = Bench::default();
-    board.tare();
+    let mut board = crate::common::ready();
     board.step();
     board
 }
@@ -67,10 +58,19 @@ fn pressed(record: &mut Record) {
     record.frame.codes = board.frame().codes;
 }
 
-fn tares(board: &mut Bench) {
-    for _ in 1..=TARE_FRAMES {
-        let status = board.step();
-        assert_eq!((status.mode, status.tare), (Mode::Tare, Taring::Running));
+/// A tare was requested these frames ago.
+fn taring(frames: u32) -> Bench {
+    let mut board = Bench::default();
+    board.command().tare_request += 1;
+    board.frames(frames);
+    board
+}
+
+/// A tare lasts for these frames.
+fn tares(board: &mut Bench, frames: u32) {
+    for _ in 0..frames {
+        let Status { mode, tare, duty, .. } = board.step();
+        assert_eq!((mode, tare, duty), (Mode::Tare, Taring::Running, Duty::ZERO));
     }
     assert_eq!(board.step().tare, Taring::Done);
 }
@@ -81,7 +81,7 @@ fn a_tare_that_comes_with_torque_off_is_done() {
     assert_eq!(board.step().mode, Mode::Release);
     board.command().torque = false;
     board.command().tare_request += 1;
-    tares(&mut board);
+    tares(&mut board, TARE_FRAMES);
     assert_eq!(board.step().mode, Mode::Off);
 }
 
@@ -90,12 +90,8 @@ fn a_tare_that_comes_with_torque_off_is_done() {
 fn a_tare_between_torque_off_and_on_is_done() {
     let mut board = ready();
     board.command().tare_request += 1;
-    assert_eq!(board.step().duty.0, 0);
-    for _ in 1..TARE_FRAMES {
-        assert_eq!(board.step().mode, Mode::Tare);
-    }
-    assert_eq!(board.step().mode, Mode::Off);
-    assert_eq!(board.step().mode, Mode::Release);
+    tares(&mut board, TARE_FRAMES);
+    assert_eq!((board.status().mode, board.step().mode), (Mode::Off, Mode::Release));
 }
 
 #[test]
@@ -103,7 +99,7 @@ fn a_tare_that_comes_with_the_clearing_of_a_fault_is_done() {
     let mut board = faulted();
     board.command().clear_request += 1;
     board.command().tare_request += 1;
-    tares(&mut board);
+    tares(&mut board, TARE_FRAMES);
     assert_eq!(board.step().fault, None);
 }
 
@@ -119,40 +115,23 @@ fn a_tare_in_a_fault_is_refused_for_all_to_see() {
     assert_eq!((status.mode, status.tare), (Mode::Off, Taring::Refused), "it does not come back by itself");
 }
 
-#[test]
-fn a_tare_in_the_frame_of_a_fault_is_refused_for_all_to_see() {
-    let mut board = ready();
-    board.command().torque = false;
-    board.command().tare_request += 1;
-    let status = board.step_with(broken);
-    assert_eq!((status.mode, status.tare), (Mode::Fault, Taring::Refused));
-}
-
+/// Also in the frame of the request.
 #[test]
 fn a_fault_ends_a_tare_for_all_to_see() {
-    for (spoil, fault) in EARLY_AND_LATE {
-        let mut board = Bench::default();
-        board.command().tare_request += 1;
-        board.step();
-        let status = board.step_with(spoil);
+    for ((spoil, fault), frames_before) in EARLY_AND_LATE.into_iter().flat_map(|case| [(case, 0), (case, 1)]) {
+        let status = taring(frames_before).step_with(spoil);
         assert_eq!((status.mode, status.fault, status.tare), (Mode::Fault, Some(fault), Taring::Refused));
     }
-    let mut board = Bench::default();
-    board.command().tare_request += 1;
-    board.step();
+    let mut board = taring(1);
     board.pipeline().stop(Fault::LostFrames);
     assert_eq!(board.status().tare, Taring::Refused);
 }
 
 #[test]
 fn a_second_tare_during_a_tare_begins_anew() {
-    let mut board = Bench::default();
+    let mut board = taring(100);
     board.command().tare_request += 1;
-    for _ in 0..100 {
-        board.step();
-    }
-    board.command().tare_request += 1;
-    tares(&mut board);
+    tares(&mut board, TARE_FRAMES);
 }
 
 /// The array is the same, so is its tare, to the rounding of its means.
@@ -173,16 +152,9 @@ fn a_tare_does_not_depend_on_the_one_before() {
 
 #[test]
 fn new_parameters_during_a_tare_begin_it_anew() {
-    let mut board = Bench::default();
-    board.command().tare_request += 1;
-    for _ in 0..100 {
-        board.step();
-    }
+    let mut board = taring(100);
     board.pipeline().configure(&config());
-    for _ in 1..TARE_FRAMES {
-        assert_eq!(board.step().mode, Mode::Tare);
-    }
-    assert_eq!(board.step().tare, Taring::Done);
+    tares(&mut board, TARE_FRAMES - 1);
 }
 
 #[test]
@@ -198,9 +170,7 @@ fn a_press_in_the_frame_of_a_fault_leaves_no_old_outcome() {
 
 #[test]
 fn a_press_that_comes_with_torque_or_during_a_tare_waits_for_the_drive() {
-    let mut board = Bench::default();
-    board.command().tare_request += 1;
-    board.step();
+    let mut board = taring(1);
     board.command().torque = true;
     board.request(Task::Press);
     let mut frames = 0;
@@ -221,8 +191,7 @@ fn a_press_that_comes_with_torque_or_during_a_tare_waits_for_the_drive() {
 
 #[test]
 fn a_press_that_waits_is_refused_once_torque_is_off() {
-    let mut board = Bench::default();
-    board.command().tare_request += 1;
+    let mut board = taring(0);
     board.command().torque = true;
     board.request(Task::Press);
     board.step();
@@ -232,22 +201,11 @@ fn a_press_that_waits_is_refused_once_torque_is_off() {
     assert_eq!((status.mode, status.measure), (Mode::Tare, NOT_READY));
 }
 
-#[test]
-fn a_press_without_a_tare_is_refused() {
-    let mut board = Bench::default();
-    board.command().torque = true;
-    board.step();
-    board.request(Task::Press);
-    assert_eq!(board.step().measure, NOT_READY);
-}
-
 /// A request while a measurement runs is answered by its outcome, also in its last frame; the next one begins another.
 #[test]
 fn a_press_in_the_frame_in_which_another_ends_has_its_outcome() {
-    let refused_at = {
-        let mut board = measuring();
-        (1..20_000).find(|_| board.step().measure.state != MeasureState::Running).expect("an end")
-    };
+    let mut board = measuring();
+    let refused_at = (1..20_000).find(|_| board.step().measure.state != MeasureState::Running).expect("an end");
     let mut board = measuring();
     for _ in 1..refused_at {
         assert_eq!(board.step().measure, RUNNING);
@@ -275,8 +233,7 @@ fn measuring() -> Bench {
 fn the_first_frame_with_torque_is_judged_before_it_drives() {
     let others: [(Spoil, Fault); 2] = [(overloaded, Fault::Bridge), (pressed, Fault::OverForce)];
     for (spoil, fault) in EARLY_AND_LATE.into_iter().chain(others) {
-        let mut board = Bench::default();
-        board.tare();
+        let mut board = crate::common::ready();
         board.command().torque = false;
         board.command().goal = newtons(7_000);
         board.step();
@@ -321,11 +278,9 @@ fn torque_waits_until_the_tip_is_slow() {
     }
 }
 
-/// Torque is refused until the motor direction is confirmed, and the reason is reported.
 #[test]
 fn torque_is_refused_before_the_direction_is_confirmed() {
-    let config = Config::shipped(&Params::DEFAULT).expect("the defaults are allowed");
-    let mut board = Bench::of(&Setup::default(), &config);
+    let mut board = Bench::of(&Setup::default(), &allowed(Params::DEFAULT));
     board.tare();
     board.command().goal = newtons(1_000);
     for _ in 0..1_000 {
@@ -335,20 +290,14 @@ fn torque_is_refused_before_the_direction_is_confirmed() {
     }
 }
 
-/// Torque and a goal that were set before the tare request do not start an approach after the tare; torque must be
-/// turned off first.
 #[test]
 fn torque_that_was_on_before_the_tare_drives_nothing_until_it_was_off() {
     for (off_first, frames) in [(0, 0), (0, 1), (0, 100), (1, 1), (1, 100)] {
         let mut board = at(5.0);
         board.command().goal = newtons(1_000);
-        for _ in 0..off_first {
-            board.step();
-        }
+        board.frames(off_first);
         board.command().torque = true;
-        for _ in 0..frames {
-            board.step();
-        }
+        board.frames(frames);
         board.command().tare_request += 1;
         for _ in 0..2 * TARE_FRAMES {
             let status = board.step();
@@ -362,7 +311,6 @@ fn torque_that_was_on_before_the_tare_drives_nothing_until_it_was_off() {
     }
 }
 
-/// Torque that is turned on in the frame of a tare request, or during the tare, takes effect after the tare.
 #[test]
 fn torque_that_comes_with_a_tare_or_during_it_waits_for_its_end() {
     for after in [0, 1, TARE_FRAMES / 2, TARE_FRAMES] {
@@ -370,9 +318,7 @@ fn torque_that_comes_with_a_tare_or_during_it_waits_for_its_end() {
         board.command().goal = newtons(1_000);
         board.step();
         board.command().tare_request += 1;
-        for _ in 0..after {
-            board.step();
-        }
+        board.frames(after);
         board.command().torque = true;
         for _ in after..=TARE_FRAMES {
             assert_eq!(board.step().duty.0, 0);
@@ -381,7 +327,6 @@ fn torque_that_comes_with_a_tare_or_during_it_waits_for_its_end() {
     }
 }
 
-/// New parameters or gains stop the finger; torque that was on starts nothing under them before it was off.
 #[test]
 fn torque_that_was_on_before_a_configuration_drives_nothing_until_it_was_off() {
     let changes: [fn(&mut Bench); 2] =
@@ -406,12 +351,10 @@ fn torque_that_was_on_before_a_configuration_drives_nothing_until_it_was_off() {
     }
 }
 
-/// A supply that was out of its window before torque stops the motor in its first frame with torque, undriven.
 #[test]
 fn torque_at_a_wrong_supply_is_a_fault_before_it_drives() {
     for (supply_mv, fault) in [(3_000, Fault::SupplyLow), (60_000, Fault::SupplyHigh)] {
-        let mut board = Bench::default();
-        board.tare();
+        let mut board = crate::common::ready();
         board.command().torque = false;
         for _ in 0..10 {
             assert_eq!(board.step_with(|record| record.sense.supply_mv = supply_mv).fault, None);
@@ -423,8 +366,7 @@ fn torque_at_a_wrong_supply_is_a_fault_before_it_drives() {
     }
 }
 
-/// Before a tare the offsets of the array look like a contact. So no contact is reported, whatever presses; only
-/// defects of the array are.
+/// Before a tare the array's offsets look like a contact: none is reported, only defects of the array are.
 #[test]
 fn before_a_tare_no_contact_is_reported() {
     let mut board = at(-2.0);

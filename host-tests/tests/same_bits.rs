@@ -1,10 +1,6 @@
-//! Functions that are compared between processors: every public function of the model, over its whole domain, and more
-//! than refusals.
+//! Functions that are compared between processors: all of the model's public ones, over its whole domain.
 
-use fingertip::pipeline::Status;
-use fingertip::shipped::Pipeline;
-use fingertip::state::{Fault, Mode};
-use host_tests::finger::config;
+use crate::common::*;
 use host_tests::prove::random::reference_tip;
 use host_tests::stimulus;
 use host_tests::study::inputs::Inputs;
@@ -96,11 +92,6 @@ fn a_digest_is_that_of_its_inputs_and_sees_one_bit() {
     assert_eq!(differing, ["energy"]);
 }
 
-fn statuses() -> Vec<Status> {
-    let mut pipeline = Pipeline::new(&config());
-    stimulus::records().iter().map(|record| *pipeline.step(&record.frame, &record.sense, &record.command).1).collect()
-}
-
 #[test]
 fn it_is_the_same_each_time() {
     let (first, second) = (stimulus::records(), stimulus::records());
@@ -120,20 +111,16 @@ fn the_digest_sees_one_bit() {
 
 #[test]
 fn it_visits_every_mode_and_what_the_core_can_detect() {
-    let statuses = statuses();
+    let mut pipeline = Pipeline::new(&config());
+    let records = stimulus::records();
+    let statuses = records.iter().map(|record| *pipeline.step(&record.frame, &record.sense, &record.command).1);
+    let statuses: Vec<_> = statuses.collect();
     let modes: BTreeSet<_> = statuses.iter().map(|status| status.mode as u8).collect();
     assert_eq!(modes, (Mode::Off as u8..=Mode::Fault as u8).collect());
     let faults: BTreeSet<_> = statuses.iter().filter_map(|status| status.fault).map(|fault| fault as u8).collect();
-    let wanted = [
-        Fault::ArrayBroken,
-        Fault::RowStuck,
-        Fault::EncoderFrozen,
-        Fault::BusSilent,
-        Fault::SupplyLow,
-        Fault::SupplyHigh,
-        Fault::Bridge,
-    ];
-    for fault in wanted {
+    let of_the_array = [Fault::ArrayBroken, Fault::RowStuck];
+    let others = [Fault::EncoderFrozen, Fault::BusSilent, Fault::SupplyLow, Fault::SupplyHigh, Fault::Bridge];
+    for fault in of_the_array.into_iter().chain(others) {
         assert!(faults.contains(&(fault as u8)), "{fault:?} is missing from {faults:?}");
     }
     let touched = statuses.iter().filter(|status| status.mode == Mode::Force).count();

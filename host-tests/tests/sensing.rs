@@ -1,15 +1,11 @@
 //! From codes to contact: the plant's electrical model against the readings of the core.
 
-use fingertip::config::ConfigError;
-use fingertip::contact::{Contact, from_sums};
-use fingertip::params::Params;
-use fingertip::pressure::{GAIN_ONE, TARE_BITS};
-use fingertip::shipped::{Array, COLUMNS, Calibration, Config, Frame, ROWS, SLOTS, TARE_FRAMES};
+use crate::common::*;
+use fingertip::contact::from_sums;
+use fingertip::pressure::TARE_BITS;
+use fingertip::shipped::Array;
 use fingertip::touch::Touch;
-use fingertip::units::Newtons;
-use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
-use sim::plant::{Plant, Setup};
+use host_tests::finger::tared;
 
 struct Bench {
     world: Plant,
@@ -24,8 +20,8 @@ impl Bench {
     }
 
     fn with(setup: &Setup, params: &Params) -> Self {
-        let config = Config::shipped(params).unwrap();
-        let mut bench = Self { world: Plant::new(setup), array: Array::new(), config, frame: Frame::EMPTY };
+        let (world, config) = (Plant::new(setup), allowed(*params));
+        let mut bench = Self { world, array: Array::new(), config, frame: Frame::EMPTY };
         bench.tare();
         bench
     }
@@ -51,8 +47,7 @@ impl Bench {
 
 /// Weight with which the baseline learns a row while nothing touches.
 fn drift_weight() -> u32 {
-    let config = Config::shipped(&Params::DEFAULT).unwrap();
-    Touch::default().learns(Newtons::ZERO, ROWS as u32, &config).expect("it learns")
+    Touch::default().learns(Newtons::ZERO, ROWS as u32, &allowed(Params::DEFAULT)).expect("it learns")
 }
 
 #[test]
@@ -96,21 +91,11 @@ fn the_centre_follows_the_contact() {
 }
 
 #[test]
-fn without_force_the_centre_is_the_middle() {
-    let contact = Bench::new(&Setup::default()).read();
-    assert_eq!((contact.force.to_bits(), contact.centre_x.to_bits(), contact.centre_y.to_bits()), (0, 0, 0));
-}
-
-#[test]
 fn the_undriven_slot_takes_out_a_common_offset() {
     let mut bench = Bench::new(&Setup::default());
     let before = bench.press(1.0);
-    for slot in 0..SLOTS {
-        for column in 0..10 {
-            let code = bench.frame.code(slot, column);
-            bench.frame.set_code(slot, column, code + 25);
-        }
-    }
+    recode(&mut bench.frame, |_, _, code| code + 25);
+    (0..COLUMNS).for_each(|column| bench.frame.set_code(ROWS, column, bench.frame.code(ROWS, column) + 25));
     assert_eq!(from_sums(bench.array.read(&bench.frame, &bench.config), &bench.config), before);
 }
 
@@ -118,12 +103,7 @@ fn the_undriven_slot_takes_out_a_common_offset() {
 fn the_baseline_follows_drift_only_when_told() {
     let mut bench = Bench::new(&Setup::default());
     bench.read();
-    for column in 0..10 {
-        for row in 0..ROWS {
-            let code = bench.frame.code(row, column);
-            bench.frame.set_code(row, column, code + 2);
-        }
-    }
+    recode(&mut bench.frame, |_, _, code| code + 2);
     let drifted = bench.array.read(&bench.frame, &bench.config).sum;
     assert!((3_100..3_300).contains(&drifted), "100 taxels, 2 codes, 16ths: {drifted}");
     // One time constant of the baseline, 1024 visits to each row.
@@ -145,44 +125,20 @@ fn the_force_that_is_seen_whole_leaves_the_converter_room() {
         (setup.wall.centre_x_mm, setup.wall.centre_y_mm) = (0.75, 0.75);
         // Without the sag, which lets the converter see more.
         setup.array.row_ohm = 0.0;
-        let params = Params {
-            tip_radius_um: (radius_mm * 1e3) as i32,
-            modulus_pa: (modulus_kpa * 1e3) as i32,
-            ..Params::DEFAULT
-        };
-        let config = Config::shipped(&params).unwrap();
+        let [tip_radius_um, modulus_pa] = [radius_mm, modulus_kpa].map(|value| (value * 1e3) as i32);
+        let config = allowed(Params { tip_radius_um, modulus_pa, ..Params::DEFAULT });
         let seen_n: f64 = config.force_seen.0.to_num();
         let mut world = Plant::new(&setup);
         let indentation_mm = setup.tip.indentation_mm(seen_n);
         world.place(setup.wall.distance_mm + indentation_mm);
         let mut frame = Frame::EMPTY;
         world.fill_frame(&mut frame);
-        let highest = (0..ROWS).flat_map(|row| (0..10).map(move |column| (row, column)));
-        let highest = highest.map(|(row, column)| frame.code(row, column)).max().unwrap();
+        let highest = places().map(|(row, column)| frame.code(row, column)).max().unwrap();
         println!("{radius_mm} mm, {modulus_kpa} kPa: {seen_n} N at {indentation_mm} mm, code {highest}");
         let share = f64::from(highest) / f64::from(config.saturated_codes);
         assert!(share <= 0.951, "{highest}");
         // A taxel averages over a peak that may be small.
         assert!(share >= 0.733, "{highest}: more could be seen");
-    }
-}
-
-/// Bounds of the held force for any parameters: never beyond the model, never below zero.
-#[test]
-fn the_force_that_is_seen_whole_is_one_of_the_tips() {
-    for undriven_max_codes in [0, 700, 4_000] {
-        for codes_per_kpa_milli in [1_000, 24_000, 200_000] {
-            for modulus_pa in [20_000, 2_000_000] {
-                let params = Params { undriven_max_codes, codes_per_kpa_milli, modulus_pa, ..Params::DEFAULT };
-                match Config::shipped(&params) {
-                    Ok(config) => {
-                        assert!(config.force_seen.0 > 0 && config.force_seen <= config.tip.force_max(), "{params:?}");
-                    }
-                    Err(ConfigError::Seen { seen_mn, least_mn, .. }) => assert!((0..least_mn).contains(&seen_mn)),
-                    Err(error) => panic!("{error}"),
-                }
-            }
-        }
     }
 }
 
@@ -233,10 +189,7 @@ fn with_the_same_codes_a_curve_never_reads_less_than_the_line() {
 fn the_baseline_follows_drift_as_by_a_line() {
     let (mut curve, mut line) = (curved(GROWTH, 3_300), curved(GROWTH, 0));
     for bench in [&mut curve, &mut line] {
-        for (row, column) in (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column))) {
-            let code = bench.frame.code(row, column);
-            bench.frame.set_code(row, column, code + 10);
-        }
+        recode(&mut bench.frame, |_, _, code| code + 10);
         for _ in 0..30_000 {
             bench.array.read(&bench.frame, &bench.config);
             bench.array.follow_drift(drift_weight());
@@ -273,24 +226,20 @@ fn what_leaves_too_few_codes_at_the_full_range_is_refused() {
     let params = Params { codes_per_kpa_milli: 4_000, curve_permille: 3_500, ..Params::DEFAULT };
     let error = Config::shipped(&params).unwrap_err();
     assert_eq!(error.to_string(), "codes_per_kpa_milli of 4000: 4500 to 200000 are allowed");
-    assert!(Config::shipped(&Params { codes_per_kpa_milli: 4_500, ..params }).is_ok());
+    allowed(Params { codes_per_kpa_milli: 4_500, ..params });
 }
 
 #[test]
 fn less_force_is_seen_where_the_characteristic_saturates() {
-    let seen = |curve_permille| {
-        let params = Params { curve_permille, codes_per_kpa_milli: 72_000, ..Params::DEFAULT };
-        Config::shipped(&params).unwrap().force_seen
+    let seen = |curve_permille, codes_per_kpa_milli| {
+        allowed(Params { curve_permille, codes_per_kpa_milli, ..Params::DEFAULT }).force_seen
     };
-    assert!(seen(3_300) > seen(0), "the same codes reach farther");
-    let full = Config::shipped(&Params { codes_per_kpa_milli: 72_000 * 10 / 43, ..Params::DEFAULT }).unwrap();
-    assert!(seen(3_300) < full.force_seen, "but not as far as a line through the full range");
+    assert!(seen(3_300, 72_000) > seen(0, 72_000), "the same codes reach farther");
+    assert!(seen(3_300, 72_000) < seen(0, 72_000 * 10 / 43), "but not as far as a line through the full range");
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig {
-        rng_seed: RngSeed::Fixed(5), failure_persistence: None, cases: 200, ..ProptestConfig::default()
-    })]
+    #![proptest_config(seeded(200, 5))]
 
     /// Any codes of sound taxels and any gains: against the formula in double precision.
     #[test]
@@ -302,19 +251,12 @@ proptest! {
     ) {
         let frame = |codes: &[[u16; COLUMNS]; ROWS]| {
             let mut frame = Frame::EMPTY;
-            for (row, column) in (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column))) {
-                frame.set_code(row, column, codes[row][column]);
-            }
+            recode(&mut frame, |row, column, _| codes[row][column]);
             frame
         };
         let calibration = Calibration::new(&gains, &[0; ROWS]).unwrap();
-        let config = Config::shipped(&Params { curve_permille, ..Params::DEFAULT }).unwrap();
-        let mut bent = Array::new();
-        bent.calibrate(&calibration);
-        for _ in 0..TARE_FRAMES {
-            bent.read(&frame(&blank), &config);
-            bent.continue_tare();
-        }
+        let config = allowed(Params { curve_permille, ..Params::DEFAULT });
+        let mut bent = tared(&calibration, &frame(&blank), &config);
         bent.read(&frame(&codes), &config);
         let growth = f64::from(curve_permille) / 1e3;
         let mut exact_sum = 0.0;

@@ -1,21 +1,11 @@
 //! Compensation of the array's drift with the microcontroller's temperature: result, bounds, and off at 0.
 
+use crate::common::*;
 use fingertip::chip::{Chip, FRAMES, Factory};
-use fingertip::command::Command;
-use fingertip::config::newtons;
 use fingertip::control::{Creep, TemperatureDrift};
-use fingertip::params::Params;
-use fingertip::shipped::{Config, TARE_FRAMES};
-use fingertip::state::{Fault, Mode};
-use fingertip::units::{Celsius, Newtons};
-use images::record::Record;
-use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
-use sim::native::bench::Bench;
-use sim::setup::Setup;
 
 fn config(array_gain_ppm_per_k: i32, array_zero_pa_per_k: i32) -> Config {
-    Config::shipped(&Params { array_gain_ppm_per_k, array_zero_pa_per_k, ..images::CONFIRMED }).unwrap()
+    allowed(Params { array_gain_ppm_per_k, array_zero_pa_per_k, ..images::CONFIRMED })
 }
 
 fn celsius(degrees: i32) -> Option<Celsius> {
@@ -81,7 +71,7 @@ fn the_zero_s_temperature_moves_as_the_baseline_does() {
     }
 }
 
-/// Contact lost for a frame, after the array has cooled since its tare: the baseline has learnt next to nothing of that.
+/// Contact lost for a frame, after the array has cooled since its tare: the baseline has learnt almost nothing.
 #[test]
 fn a_frame_without_contact_does_not_forget_the_drift() {
     let mut board: Bench = Bench::of(&Setup::default(), &config(0, 10));
@@ -134,18 +124,16 @@ fn it_follows_slowly() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(7), failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(seeded(256, 7))]
 
     #[test]
     fn it_stays_within_half_of_what_is_held(
         chips in proptest::collection::vec((any::<Option<i32>>(), 1_u32..3_000, any::<bool>()), 1..12),
-        held in any::<i32>(), gain in -10_000..=10_000, gain_at in -40..=125, zero in -1_000..=1_000, pitch in 500..=4_000,
+        held in any::<i32>(), array_gain_ppm_per_k in -10_000..=10_000, array_gain_at_c in -40..=125,
+        array_zero_pa_per_k in -1_000..=1_000, pitch_um in 500..=4_000,
     ) {
-        let params = Params {
-            array_gain_ppm_per_k: gain, array_gain_at_c: gain_at, array_zero_pa_per_k: zero, pitch_um: pitch,
-            ..images::CONFIRMED
-        };
-        let config = Config::shipped(&params).unwrap();
+        let zero = Params { array_zero_pa_per_k, pitch_um, ..images::CONFIRMED };
+        let config = allowed(Params { array_gain_ppm_per_k, array_gain_at_c, ..zero });
         let mut drift = TemperatureDrift::default();
         for (chip, frames, zeroes) in chips {
             for _ in 0..frames {
@@ -201,7 +189,7 @@ proptest! {
         let codes: Vec<_> = noise.iter().map(|(a, b)| (noisy(reference_v, *a), noisy(volts(chip_c), *b))).collect();
         let (mv, found) = told(factory, &codes, FRAMES);
         let found = found.expect("it is sound");
-        // The mean noise of 64 draws, the factory's truncated codes (a code is 0.4 K at 30 C and as much at 110), the ratio's.
+        // The mean noise of 64 draws, the factory's truncated codes (a code is 0.4 K), and that of the ratio.
         prop_assert!((found - chip_c).abs() < 1.5, "{found} C of {chip_c} C");
         prop_assert!((f64::from(mv) - 1e3 * supply_v).abs() < 6.0, "{mv} mV of {supply_v} V");
     }
@@ -210,11 +198,7 @@ proptest! {
 // Compensation of the creep of a held force: result, bounds, and parts that must not depend on it.
 
 fn creeping(creep_permille: i32, creep_time_ms: i32) -> Config {
-    Config::shipped(&Params { creep_permille, creep_time_ms, ..images::CONFIRMED }).unwrap()
-}
-
-fn frame_s(config: &Config) -> f64 {
-    f64::from(config.timing.frame_ns) * 1e-9
+    allowed(Params { creep_permille, creep_time_ms, ..images::CONFIRMED })
 }
 
 #[test]
@@ -251,7 +235,7 @@ fn at_rate_zero_and_where_nothing_is_held_there_is_none() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(3), failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(seeded(256, 3))]
 
     #[test]
     fn it_stays_between_none_and_its_share_of_the_largest_reading(
@@ -276,10 +260,7 @@ proptest! {
 fn hold(config: &Config, goal_mn: i32, seconds: f64) -> (f64, Bench) {
     let mut board = Bench::of(&Setup::default(), config);
     board.tare();
-    board.command().goal = newtons(goal_mn);
-    while board.time_s() < seconds {
-        board.step();
-    }
+    board.hold(goal_mn, seconds - board.time_s());
     (board.truth().force_n, board)
 }
 
@@ -299,7 +280,7 @@ fn what_is_held_grows_by_the_rate_and_no_more_than_that() {
 #[test]
 fn it_never_leads_beyond_the_largest_force() {
     let params = Params { creep_permille: 300, creep_time_ms: 50, force_max_mn: 3_000, ..images::CONFIRMED };
-    let (force, board) = hold(&Config::shipped(&params).unwrap(), 3_000, 3.0);
+    let (force, board) = hold(&allowed(params), 3_000, 3.0);
     assert!((2.98..3.02).contains(&force), "{force}");
     assert_eq!(board.status().fault, None);
 }
@@ -307,19 +288,11 @@ fn it_never_leads_beyond_the_largest_force() {
 #[test]
 fn over_force_is_judged_by_the_reading() {
     // 2.6 N are read; 2 N are taken for true.
-    let params = Params {
-        creep_permille: 300,
-        creep_time_ms: 50,
-        force_max_mn: 2_650,
-        force_fault_mn: 2_700,
-        ..images::CONFIRMED
-    };
-    let (_, mut board) = hold(&Config::shipped(&params).unwrap(), 2_000, 4.0);
+    let params = Params { force_max_mn: 2_650, force_fault_mn: 2_700, ..creeping(300, 50).params };
+    let (_, mut board) = hold(&allowed(params), 2_000, 4.0);
     assert_eq!(board.status().fault, None);
     let travel = board.truth().travel_mm;
     board.place(travel + 0.2);
-    for _ in 0..50 {
-        board.step();
-    }
+    board.frames(50);
     assert_eq!(board.status().fault, Some(Fault::OverForce));
 }

@@ -1,30 +1,23 @@
 //! Questionable configurations: the warnings, and the pitch limit, which must separate good fits from bad ones.
 
-use fingertip::command::Command;
-use fingertip::config::{Shaped, Warning, newtons};
-use fingertip::contact::FitLevel;
+use crate::common::*;
+use fingertip::config::Warning;
 use fingertip::fixed::types::I8F24;
-use fingertip::frame::{Frame, Sense};
-use fingertip::params::Params;
-use fingertip::pipeline::Pipeline;
-use fingertip::scan::Clocks;
-use fingertip::shipped::CLOCKS;
-use fingertip::units::Millimetres;
 
 fn warned(params: Params) -> Vec<Warning> {
-    Shaped::<10, 10>::new(&params, &CLOCKS).unwrap().warnings().collect()
+    allowed(params).warnings().collect()
 }
 
 /// Confidence and force (N) of an ideal hemisphere at a force, with the middle of its contact off the middle of the
 /// array, and with one dead taxel or none. A taxel reads the mean pressure on it.
-fn seen<const ROWS: usize, const COLUMNS: usize>(params: &Params, force_mn: i32, off_mm: f64, dead: bool) -> (u8, f64) {
-    let config = Shaped::<ROWS, COLUMNS>::new(params, &CLOCKS).unwrap();
+fn seen(params: &Params, force_mn: i32, off_mm: f64, dead: bool) -> (u8, f64) {
+    let config = allowed(*params);
     let depth = config.tip.indentation(newtons(force_mn));
     let pitch = f64::from(params.pitch_um) * 1e-3;
     let mut finger = Pipeline::new(&config);
     let command = Command { tare_request: 1, fit_level: FitLevel::AllRows, ..Command::default() };
     let sense = Sense { supply_mv: 6_500, ..Sense::default() };
-    let mut blank = Frame::<ROWS, COLUMNS>::EMPTY;
+    let mut blank = Frame::EMPTY;
     let mut pressed = blank;
     for (row, column) in (0..=ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column))) {
         blank.set_code(row, column, if row < ROWS { 412 } else { 372 });
@@ -59,8 +52,8 @@ fn a_pitch_is_doubtful_where_an_ideal_hemisphere_is_not_seen_as_one() {
             let codes_per_kpa_milli = 12_000;
             let params = Params { tip_radius_um, modulus_pa, pitch_um, codes_per_kpa_milli, ..Params::DEFAULT };
             let places = [0.0, 0.25, 0.5].map(|place| place * 1e-3 * f64::from(pitch_um));
-            let confidences = places.map(|mm| seen::<10, 10>(&params, FORCE_MN, mm, false).0);
-            let forces = places.map(|mm| seen::<10, 10>(&params, FORCE_MN, -mm, true).1);
+            let confidences = places.map(|mm| seen(&params, FORCE_MN, mm, false).0);
+            let forces = places.map(|mm| seen(&params, FORCE_MN, -mm, true).1);
             let off = forces.map(|force| (force * 1e3 / f64::from(FORCE_MN) - 1.0).abs());
             let worst = off.into_iter().fold(0.0, f64::max);
             let coarse = warned(params).into_iter().find_map(|warning| match warning {
@@ -88,18 +81,10 @@ fn each_doubt_has_its_warning_and_the_reference_finger_has_none() {
     assert!(weak[0].contains("the motor presses 5750 mN at most"), "{weak:?}");
     // Without a gear a motor is a small mass at the tip: enough for quick frames, too little for slow ones.
     let direct = Params { reduction_mrad_per_mm: 250, inertia_ug_m2: 300, force_max_mn: 2_000, ..Params::DEFAULT };
-    let at = |frame_ns| {
-        let clocks = Clocks { frame_ns, ..CLOCKS };
-        Shaped::<10, 10>::new(&direct, &clocks)
-            .unwrap()
-            .warnings()
-            .map(|warning| warning.to_string())
-            .collect::<Vec<_>>()
-    };
-    assert_eq!(at(None), [""; 0]);
-    let light = at(Some(500_000));
-    assert!(light[0].starts_with("reduction_mrad_per_mm: the motor is a mass of 18 g at the tip"), "{light:?}");
-    let clocks = Clocks { frame_ns: Some(10_000_000), ..CLOCKS };
-    let slow = Shaped::<10, 10>::new(&Params::DEFAULT, &clocks).unwrap();
-    assert!(slow.warnings().eq([Warning::SlowFrames { frame_ns: 10_000_000 }]));
+    let at =
+        |params, frame_ns| Config::new(params, &Clocks { frame_ns, ..CLOCKS }).unwrap().warnings().collect::<Vec<_>>();
+    assert_eq!(at(&direct, None), []);
+    let light = at(&direct, Some(500_000))[0].to_string();
+    assert!(light.starts_with("reduction_mrad_per_mm: the motor is a mass of 18 g at the tip"), "{light}");
+    assert_eq!(at(&Params::DEFAULT, Some(10_000_000)), [Warning::SlowFrames { frame_ns: 10_000_000 }]);
 }

@@ -1,26 +1,10 @@
-//! The winding's temperature as the controller has it: bounded, never lower than that of the builds it covers, and what
-//! it does to the current.
+//! The winding's temperature in the controller: bounded, never lower than the true one, and its effect on the current.
 
-use fingertip::config::newtons;
-use fingertip::control::{SpeedLoop, Winding};
-use fingertip::params::Params;
-use fingertip::shipped::Config;
-use fingertip::state::{Limits, Mode};
-use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
-use sim::native::bench::Bench;
-use sim::setup::Setup;
+use crate::common::*;
+use fingertip::control::Winding;
 
 /// Parameters with the thermal lag of a winding only, of a small motor: enough for these tests.
 const QUICK: Params = Params { housing_k_per_w: 0, winding_k_per_w: 46, winding_time_ms: 2_000, ..images::CONFIRMED };
-
-fn config(params: Params) -> Config {
-    Config::shipped(&params).unwrap()
-}
-
-fn frame_s(config: &Config) -> f64 {
-    f64::from(config.timing.frame_ns) * 1e-9
-}
 
 /// g R i of a current, Q8 mm/s^2.
 fn driven(config: &Config, amperes: f64) -> i32 {
@@ -71,7 +55,7 @@ impl Truth {
 #[test]
 fn a_steady_current_warms_it_by_a_quarter_more_than_the_parameters_say() {
     for (params, amperes) in [(QUICK, 0.1), (QUICK, 0.35), (Params { resistance_mohm: 12_000, ..QUICK }, 0.05)] {
-        let config = config(params);
+        let config = allowed(params);
         let mut winding = Winding::new();
         for _ in 0..(16.0 / frame_s(&config)) as u32 {
             winding.observe(driven(&config, amperes), &config);
@@ -84,7 +68,7 @@ fn a_steady_current_warms_it_by_a_quarter_more_than_the_parameters_say() {
 
 #[test]
 fn without_resistances_it_is_as_warm_as_its_surroundings_and_takes_nothing_away() {
-    let config = config(Params { winding_k_per_w: 0, housing_k_per_w: 0, ..images::CONFIRMED });
+    let config = allowed(Params { winding_k_per_w: 0, housing_k_per_w: 0, ..images::CONFIRMED });
     let mut winding = Winding::new();
     for _ in 0..100_000 {
         winding.observe(i32::MAX, &config);
@@ -97,13 +81,13 @@ fn without_resistances_it_is_as_warm_as_its_surroundings_and_takes_nothing_away(
 #[test]
 fn what_is_left_out_later_holds_no_heat_of_before() {
     let mut winding = Winding::new();
-    let warm = config(images::CONFIRMED);
+    let warm = allowed(images::CONFIRMED);
     (0..10_000).for_each(|_| winding.observe(driven(&warm, 0.3), &warm));
     assert!(degrees(&winding, &warm) > 80.0);
-    let hot = config(Params { winding_max_c: 85, ambient_c: 60, ..images::CONFIRMED });
+    let hot = allowed(Params { winding_max_c: 85, ambient_c: 60, ..images::CONFIRMED });
     (0..256).for_each(|_| winding.observe(0, &hot));
     assert_eq!(winding.share(), 0);
-    let left_out = config(Params { winding_k_per_w: 0, housing_k_per_w: 0, ..hot.params });
+    let left_out = allowed(Params { winding_k_per_w: 0, housing_k_per_w: 0, ..hot.params });
     (0..256).for_each(|_| winding.observe(0, &left_out));
     assert_eq!(winding.share(), 256);
     assert!((degrees(&winding, &left_out) - 60.0).abs() < 1e-3);
@@ -111,7 +95,7 @@ fn what_is_left_out_later_holds_no_heat_of_before() {
 
 #[test]
 fn after_a_reset_it_is_as_warm_as_a_housing_can_be_and_cools() {
-    let config = config(images::CONFIRMED);
+    let config = allowed(images::CONFIRMED);
     let mut winding = Winding::new();
     let mut observe = |seconds: f64| {
         (0..(seconds / frame_s(&config)) as u32).for_each(|_| winding.observe(0, &config));
@@ -130,7 +114,7 @@ fn after_a_reset_it_is_as_warm_as_a_housing_can_be_and_cools() {
 fn it_never_passes_its_largest_temperature() {
     for params in [images::CONFIRMED, QUICK, Params { current_max_ma: 20_000, winding_max_c: 85, ..images::CONFIRMED }]
     {
-        let config = config(params);
+        let config = allowed(params);
         let mut motion = SpeedLoop::new();
         let mut truth = Truth::of(&params);
         // The housing temperature after hours at the limit.
@@ -156,9 +140,7 @@ fn it_never_passes_its_largest_temperature() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig {
-        cases: 64, rng_seed: RngSeed::Fixed(5), failure_persistence: None, ..ProptestConfig::default()
-    })]
+    #![proptest_config(seeded(64, 5))]
 
     /// Motors as they come, under any pattern of voltage.
     #[test]
@@ -168,7 +150,7 @@ proptest! {
     ) {
         // A warm housing hides errors of the winding model; a motor without a housing model hides none.
         let params = if housed { images::CONFIRMED } else { QUICK };
-        let config = config(params);
+        let config = allowed(params);
         let mut truth = Truth::of(&params);
         truth.ohm *= ohm;
         truth.k_per_w = truth.k_per_w.map(|value| value * k_per_w);
@@ -188,7 +170,6 @@ proptest! {
         }
     }
 
-    /// At any parameters and any current: bounded, and more current never makes it cooler.
     #[test]
     fn it_is_bounded_and_monotone(
         values in proptest::array::uniform9(0.0..=1.0),
@@ -205,7 +186,7 @@ proptest! {
             params[place] = min + (f64::from(max - min) * f64::powi(value, 3)) as i32;
         }
         let params = Params::from_array(&params);
-        let config = config(params);
+        let config = allowed(params);
         let (mut less, mut more) = (Winding::new(), Winding::new());
         for (net, beside, frames) in currents {
             for _ in 0..frames {
@@ -227,7 +208,7 @@ fn a_motor_that_may_hardly_be_driven_presses_no_harder_and_lets_go_no_farther() 
     let hot = Params { winding_max_c: 85, ambient_c: 60, winding_time_ms: 2_000, ..images::CONFIRMED };
     for (k_per_w, goals_n) in [([500, 500], [3.0, 0.3]), ([200, 0], [6.0, 1.0]), ([200, 0], [6.0, 0.2])] {
         let [winding_k_per_w, housing_k_per_w] = k_per_w;
-        let mut board = Bench::of(&Setup::default(), &config(Params { winding_k_per_w, housing_k_per_w, ..hot }));
+        let mut board = Bench::of(&Setup::default(), &allowed(Params { winding_k_per_w, housing_k_per_w, ..hot }));
         board.tare();
         let [mut held_back, mut peak_n, mut least_n] = [0.0_f64, 0.0, f64::MAX];
         let [first_n, then_n] = goals_n;

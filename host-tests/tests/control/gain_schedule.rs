@@ -1,11 +1,9 @@
 //! Tests of the gain schedule: the gain set that it selects in each frame, and the gains of each set.
 
-use crate::config;
+use super::config;
+use crate::common::*;
 use fingertip::config::{Config, GAIN_SETS};
 use fingertip::control::GainSchedule;
-use fingertip::params::Params;
-use fingertip::shipped;
-use fingertip::units::Millimetres;
 
 /// Number of the gain set that the schedule selects.
 fn number(schedule: &GainSchedule, config: &Config) -> usize {
@@ -44,8 +42,7 @@ fn without_an_error_each_gain_set_lasts_twice_as_long_as_the_one_before() {
     assert_eq!(run(&mut schedule, 0, 1_000, &config), [GAIN_SETS - 1; 1_000], "no gain set is calmer");
 }
 
-/// The largest mean error of a gain set is two bands for the calmest set and doubles with each faster set. The mean
-/// converges to a constant error from above to the last bit.
+/// The largest mean error of a set: two bands for the calmest, twice as much for each faster one. The mean is exact.
 #[test]
 fn a_gain_set_is_kept_up_to_its_largest_error() {
     let config = config();
@@ -77,11 +74,8 @@ fn half_the_largest_error_is_calm() {
             run(&mut schedule, i32::MAX, 100, &config);
             run(&mut schedule, calm + 1, 20 * config.calm_frames, &config);
             assert_eq!(number(&schedule, &config), at, "at {calm}");
-            assert_eq!(
-                *run(&mut schedule, way, 20 * config.calm_frames, &config).last().unwrap(),
-                next,
-                "{way} of {calm}"
-            );
+            let last = *run(&mut schedule, way, 20 * config.calm_frames, &config).last().unwrap();
+            assert_eq!(last, next, "{way} of {calm}");
         }
     }
 }
@@ -136,45 +130,29 @@ fn is_made_for(speed_gain: f64, gain_set: usize, config: &Config) {
     assert_eq!(gains.slope_per_s, slope as i32, "gain set {gain_set}");
 }
 
-/// With a fine encoder the frame time T sets the speed gain: 1 / (5 T), and half as much for each calmer set.
+/// The speed gain of the fastest set is halved for each calmer one, down to 60 /s. It is limited by:
+/// - the frame time T: at most 1 / (5 T). This limits a loop with a fine encoder.
+/// - the voltage of one count q, at most three quarters of the maximum: 5.8 k_v^2 q = 0.75 g V_max. This limits a loop
+///   with a coarse encoder.
+/// - the speed of one count, at most 60 mm/s in an observer that is 2.5 times as fast as the speed loop. This limits a
+///   motor that drives the tip almost directly.
 #[test]
-fn with_a_fine_encoder_the_frame_time_sets_the_gains() {
-    let config =
-        shipped::Config::shipped(&Params { encoder_counts_per_turn: 65_536, ..Params::DEFAULT }).expect("allowed");
-    let frame_s = f64::from(config.frame_s_q37) / 2_f64.powi(37);
-    for gain_set in 0..config.gain_sets.len() {
-        is_made_for(0.2 / frame_s / f64::from(1 << gain_set), gain_set, &config);
-    }
-}
-
-/// One count changes the voltage by at most three quarters of the maximum: 5.8 k_v^2 q = 0.75 g V_max. No speed gain is
-/// below 60 /s.
-#[test]
-fn a_coarse_encoder_makes_a_slower_loop() {
-    let config = shipped::Config::shipped(&Params { encoder_counts_per_turn: 16, ..Params::DEFAULT }).expect("allowed");
-    let q_mm = config.mm_per_count_q40 as f64 / 2_f64.powi(40);
-    let quickest = (0.75 * f64::from(config.voltage_max_q8_mm_per_s2) / 256.0 / (5.8 * q_mm)).sqrt();
-    let frame_s = f64::from(config.frame_s_q37) / 2_f64.powi(37);
-    assert!((120.0..0.2 / frame_s).contains(&quickest), "{quickest} /s");
-    let mut at_the_least = 0;
-    for gain_set in 0..config.gain_sets.len() {
-        let speed_gain = quickest / f64::from(1 << gain_set);
-        at_the_least += usize::from(speed_gain < 60.0);
-        is_made_for(speed_gain.max(60.0), gain_set, &config);
-    }
-    assert!(at_the_least < config.gain_sets.len() - 1, "{quickest} /s");
-}
-
-/// The observer, 2.5 times as fast as the speed loop, estimates at most 60 mm/s from one count. This limits the gains
-/// of a motor that drives the tip almost directly.
-#[test]
-fn one_count_is_at_most_60_mm_per_s() {
-    let config = shipped::Config::shipped(&Params { reduction_mrad_per_mm: 150, ..Params::DEFAULT }).expect("allowed");
-    let q_mm = config.mm_per_count_q40 as f64 / 2_f64.powi(40);
-    let quickest = 60.0 / (2.5 * q_mm);
-    let frame_s = f64::from(config.frame_s_q37) / 2_f64.powi(37);
-    assert!((480.0..0.2 / frame_s).contains(&quickest), "{quickest} /s");
-    for gain_set in 0..config.gain_sets.len() {
-        is_made_for(quickest / f64::from(1 << gain_set), gain_set, &config);
+fn frame_time_and_encoder_set_the_gains() {
+    let default = Params::DEFAULT;
+    for (limit, params, least) in [
+        (0, Params { encoder_counts_per_turn: 65_536, ..default }, 0.0),
+        (1, Params { encoder_counts_per_turn: 16, ..default }, 120.0),
+        (2, Params { reduction_mrad_per_mm: 150, ..default }, 480.0),
+    ] {
+        let config = allowed(params);
+        let q_mm = config.mm_per_count_q40 as f64 / 2_f64.powi(40);
+        let voltage_max = f64::from(config.voltage_max_q8_mm_per_s2) / 256.0;
+        let by_frames = 0.2 * 2_f64.powi(37) / f64::from(config.frame_s_q37);
+        let quickest = [by_frames, (0.75 * voltage_max / (5.8 * q_mm)).sqrt(), 60.0 / (2.5 * q_mm)];
+        let limits = quickest.iter().all(|other| *other >= quickest[limit]);
+        assert!(limits && quickest[limit] > least, "{quickest:?}");
+        for gain_set in 0..config.gain_sets.len() {
+            is_made_for((quickest[limit] / f64::from(1 << gain_set)).max(60.0), gain_set, &config);
+        }
     }
 }

@@ -2,14 +2,12 @@
 
 mod touch;
 
-use crate::{config, mm};
-use fingertip::config::{Config, newtons};
-use fingertip::contact::Contact;
-use fingertip::control::{Reference, SpeedLoop};
+use super::{config, mm};
+use crate::common::*;
+use fingertip::config::Config;
+use fingertip::control::Reference;
 use fingertip::grip::{Goal, Grip};
-use fingertip::state::{Limits, Mode};
 use fingertip::touch::{Felt, Stage, Touch};
-use fingertip::units::{Millimetres, MillimetresPerSecond, Newtons};
 
 /// Position error that a calm loop accepts: 0.4 um.
 const SLACK: Millimetres = Millimetres::from_bits((1 << 24) / 2_500);
@@ -72,10 +70,6 @@ struct Hand {
     touch: Touch,
 }
 
-fn asked(force: Newtons) -> Goal {
-    Goal { force, drift: Newtons::ZERO }
-}
-
 impl Hand {
     /// Nothing touches.
     fn free(config: &Config) -> Self {
@@ -84,7 +78,6 @@ impl Hand {
         hand
     }
 
-    /// Presses with 1 N on a surface that it found at 5 mm; the contact and the travel.
     fn pressing(config: &Config) -> (Self, Contact, Millimetres) {
         Self::pressing_with(1_000, config)
     }
@@ -107,12 +100,8 @@ impl Hand {
     }
 
     fn see(&mut self, contact: &Contact, motion: SpeedLoop, config: &Config) {
-        let felt = Felt {
-            contact,
-            summed: contact.force,
-            travel: motion.observer.travel,
-            presses: self.grip.mode(&self.touch) != Mode::Release,
-        };
+        let presses = self.grip.mode(&self.touch) != Mode::Release;
+        let felt = Felt { contact, summed: contact.force, travel: motion.observer.travel, presses };
         self.touch.observe(&felt, || Millimetres::ZERO, config);
     }
 
@@ -123,20 +112,19 @@ impl Hand {
 
     fn frame_of(&mut self, goal: Newtons, contact: &Contact, motion: SpeedLoop, config: &Config) -> (Reference, u16) {
         self.see(contact, motion, config);
-        let mut limits = Limits::default();
-        let Self { grip, touch } = self;
-        let reference = grip.reference(&asked(goal), contact, touch, &mut { motion }, config, &mut limits);
+        self.reference(goal, contact, motion, config)
+    }
+
+    fn reference(&mut self, force: Newtons, contact: &Contact, motion: SpeedLoop, config: &Config) -> (Reference, u16) {
+        let (goal, mut limits) = (Goal { force, drift: Newtons::ZERO }, Limits::default());
+        let reference = self.grip.reference(&goal, contact, &mut self.touch, &mut { motion }, config, &mut limits);
         (reference, limits.0)
     }
 
     /// The travel at which a release rests: there the reference changes its sign.
     fn rest_mm(&self, contact: &Contact, config: &Config) -> f64 {
         let forward = |travel_mm: f64| {
-            let mut hand = *self;
-            let mut limits = Limits::default();
-            let mut motion = at(mm(travel_mm));
-            let Self { grip, touch } = &mut hand;
-            let reference = grip.reference(&asked(Newtons::ZERO), contact, touch, &mut motion, config, &mut limits);
+            let (reference, _) = { *self }.reference(Newtons::ZERO, contact, at(mm(travel_mm)), config);
             reference.speed > MillimetresPerSecond::ZERO
         };
         let (mut back_mm, mut front_mm) = (-60.0, 20.0);
@@ -178,8 +166,7 @@ fn a_hold_goes_quickly_over_what_is_left() {
     assert!(is_fast({ hand }.frame(7_000, &held, at(travel), &config).0));
 }
 
-/// Indentation at which a shorted motor stops that goes into a contact with this speed: by the motor's damping, its
-/// friction and the contact.
+/// Indentation at which a shorted motor stops: by its damping, its friction and the contact.
 fn stops_mm(from_mm: f64, speed: MillimetresPerSecond, config: &Config) -> f64 {
     let c_per_s = f64::from(config.damping_q17_per_s) / 131_072.0;
     let mm_per_s2_per_n = f64::from(config.bounds.acceleration_per_n) / 256.0;
@@ -194,9 +181,8 @@ fn stops_mm(from_mm: f64, speed: MillimetresPerSecond, config: &Config) -> f64 {
     d_mm
 }
 
-/// Speed limit forward above the approach speed: a shorted motor alone would coast from it by 1.25 times the
-/// indentation left until 1.3 times the goal plus 0.4 N. The contact brakes the rest. The limit is not lower unless
-/// another one acts.
+/// Forward, a shorted motor alone would coast from the speed limit by 1.25 times the indentation left until 1.3 times
+/// the goal plus 0.4 N; the contact brakes the rest. The limit is not lower unless another one acts.
 #[test]
 fn a_shorted_motor_stops_within_three_tenths_and_four_tenths_of_a_newton() {
     let config = config();
@@ -250,8 +236,7 @@ fn the_motion_since_the_scan_counts() {
     }
 }
 
-/// Of the distance that the tip moved beyond the indentation since the touch, the share of the uncertainty counts as
-/// indentation.
+/// The share of the uncertainty of the way beyond the indentation since the touch counts as indentation.
 #[test]
 fn an_uncertain_force_takes_the_tip_to_be_as_deep_as_it_moved() {
     let config = config();
@@ -279,7 +264,6 @@ fn an_uncertain_force_takes_the_tip_to_be_as_deep_as_it_moved() {
     assert_eq!(reference(255), reference(0));
 }
 
-/// A tip still moves at full speed forward up to an eighth of uncertainty.
 #[test]
 fn more_than_an_eighth_of_uncertainty_is_slow_forward() {
     let config = config();

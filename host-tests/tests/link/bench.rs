@@ -7,7 +7,7 @@ use fingertip::link::{Captured, Crash, CrashCause, Health, Reply, ResetCause};
 use fingertip::params::Params;
 use fingertip::pipeline::{AcknowledgedRequests, Status, Taring};
 use fingertip::pressure::TARE_BITS;
-use fingertip::shipped::{CLOCKS, COLUMNS, Frame, ROWS, Record, SLOTS, Server, Snapshot};
+use fingertip::shipped::{CLOCKS, COLUMNS, Frame, REGISTERS, ROWS, Record, SLOTS, Server, Snapshot};
 use fingertip::state::{Fault, Mode};
 
 /// The ID of the device under test.
@@ -25,6 +25,10 @@ impl Answer {
     /// The error's number, without the alert.
     pub fn number(&self) -> u8 {
         self.error & 0x7F
+    }
+
+    fn result(self) -> Result<Vec<u8>, u8> {
+        if self.number() == 0 { Ok(self.data) } else { Err(self.number()) }
     }
 }
 
@@ -137,15 +141,12 @@ impl Bench {
 
     /// Reads bytes.
     pub fn read(&mut self, address: u16, length: u16) -> Result<Vec<u8>, u8> {
-        let answer = self.ask(0x02, &[address.to_le_bytes(), length.to_le_bytes()].concat());
-        if answer.number() == 0 { Ok(answer.data) } else { Err(answer.number()) }
+        self.ask(0x02, &[address.to_le_bytes(), length.to_le_bytes()].concat()).result()
     }
 
     /// Writes bytes.
     pub fn write(&mut self, address: u16, data: &[u8]) -> Result<(), u8> {
-        let answer = self.ask(0x03, &[&address.to_le_bytes(), data].concat());
-        assert!(answer.data.is_empty());
-        if answer.number() == 0 { Ok(()) } else { Err(answer.number()) }
+        self.ask(0x03, &[&address.to_le_bytes(), data].concat()).result().map(|data| assert!(data.is_empty()))
     }
 
     /// Reads a number of `width` bytes, unsigned.
@@ -159,6 +160,21 @@ impl Bench {
     pub fn refused(&self, error: StatusError) -> u16 {
         self.server.counters().refused(error)
     }
+}
+
+/// The address of a parameter.
+pub fn param(name: &str) -> u16 {
+    REGISTERS.iter().find(|register| register.name == name).map(|register| register.address).expect("a parameter")
+}
+
+/// True if a register has this byte.
+pub fn owned(address: u16) -> bool {
+    REGISTERS.iter().any(|register| (register.address..register.address + register.bytes()).contains(&address))
+}
+
+/// The first address behind the table.
+pub fn table_end() -> u16 {
+    REGISTERS.last().map(|last| last.address + last.bytes()).expect("registers")
 }
 
 /// A number for each taxel.

@@ -1,11 +1,9 @@
-//! Sync, Bulk, Fast Sync and Fast Bulk instructions: several devices on one bus, each hearing the other devices'
-//! packets.
+//! Sync, Bulk, Fast Sync and Fast Bulk instructions: several devices on one bus hear each other.
 
-use crate::bench::{Answer, Bench, ID, answer, hex, packet};
-use fingertip::contact::FitLevel;
+use super::bench::{Answer, Bench, ID, answer, hex, packet};
+use crate::common::*;
 use fingertip::link::Actions;
-use fingertip::link::packet::{CRC_START, update_crc};
-use fingertip::params::Params;
+use fingertip::link::packet::{CRC_START, StatusError, update_crc};
 use fingertip::shipped::{Record, Settings, address};
 
 const BROADCAST: u8 = 254;
@@ -77,10 +75,9 @@ fn sync_write_reaches_each_with_its_own() {
     let goals = devices.each_mut().map(|device| device.number(address::GOAL_FORCE_MN, 4));
     assert_eq!(goals, [2000, 1000, 0]);
     // An entry that is cut short spoils the packet; one that is refused concerns its own device only.
-    assert!(talk(&mut devices, &packet(BROADCAST, 0x83, &hex("00 01 04 00  01 00 00 00 00  02 00 00"))).is_empty());
-    assert!(
-        talk(&mut devices, &packet(BROADCAST, 0x83, &hex("00 01 04 00  01 00 00 00 40  02 01 00 00 00"))).is_empty()
-    );
+    for entries in ["00 01 04 00  01 00 00 00 00  02 00 00", "00 01 04 00  01 00 00 00 40  02 01 00 00 00"] {
+        assert!(talk(&mut devices, &packet(BROADCAST, 0x83, &hex(entries))).is_empty());
+    }
     let goals = devices.each_mut().map(|device| device.number(address::GOAL_FORCE_MN, 4));
     assert_eq!(goals, [2000, 1, 0]);
     assert_eq!(devices[0].number(address::RANGE_ERRORS, 2), 1);
@@ -103,22 +100,30 @@ fn bulk_read_and_write_have_addresses_of_their_own() {
     assert!(talk(&mut devices, &packet(BROADCAST, 0x92, &hex("02 00 01 04"))).is_empty());
 }
 
+/// The devices answer a request for these spans in one packet, whose parts each have a checksum over all before it.
+fn answer_in_one_packet(devices: &mut [Bench], request: &[u8], list: &[(u8, u16, u16)]) {
+    let wire = talk(devices, request).concat();
+    let length = 1 + list.iter().map(|&(_, _, length)| usize::from(length) + 4).sum::<usize>();
+    assert_eq!(wire.len(), 7 + length, "{wire:02X?}");
+    assert_eq!(wire[..8], [0xFF, 0xFF, 0xFD, 0, 0xFE, length as u8, (length >> 8) as u8, 0x55]);
+    let mut begin = 8;
+    for &(id, address, length) in list {
+        let data = devices[usize::from(id) - 1].read(address, length).expect("within the table");
+        let end = begin + 2 + usize::from(length);
+        assert_eq!(wire[begin..begin + 2], [0, id]);
+        assert_eq!(wire[begin + 2..end], data, "of {id}");
+        assert_eq!(wire[end..end + 2], update_crc(CRC_START, &wire[..end]).to_le_bytes(), "over all before it");
+        begin = end + 2;
+    }
+}
+
 #[test]
 fn fast_sync_read_makes_one_packet_of_all_parts() {
     let mut devices = [device(1), device(2), device(3)];
-    let counter = address::FRAME_COUNTER.to_le_bytes();
+    let counter = address::FRAME_COUNTER;
     for ids in [&[1][..], &[2, 3, 1], &[3, 1], &[1, 2, 3]] {
-        let request = packet(BROADCAST, 0x8A, &[&counter[..], &[4, 0], ids].concat());
-        let wire = talk(&mut devices, &request).concat();
-        let length = 1 + 8 * ids.len();
-        assert_eq!(wire.len(), 7 + length, "{wire:02X?}");
-        assert_eq!(wire[..8], [0xFF, 0xFF, 0xFD, 0, 0xFE, length as u8, 0, 0x55]);
-        for (place, &id) in ids.iter().enumerate() {
-            let begin = 8 + 8 * place;
-            let (part, checksum) = wire[begin..begin + 8].split_at(6);
-            assert_eq!(part, [0, id, 100 + id, 0, 0, 0]);
-            assert_eq!(checksum, update_crc(CRC_START, &wire[..begin + 6]).to_le_bytes());
-        }
+        let request = packet(BROADCAST, 0x8A, &[&counter.to_le_bytes()[..], &[4, 0], ids].concat());
+        answer_in_one_packet(&mut devices, &request, &ids.iter().map(|id| (*id, counter, 4)).collect::<Vec<_>>());
     }
 }
 
@@ -137,14 +142,11 @@ fn who_waits_for_one_that_is_missing_does_not_speak_into_the_next_packet() {
     let request = packet(BROADCAST, 0x8A, &[7, 0, 1, 0, 1, 2]);
     let first = devices[0].hear(&request).concat();
     assert!(devices[1].hear(&request).is_empty());
-    let heard: Vec<_> = first
-        .iter()
-        .flat_map(|byte| {
-            devices[1].tick_ms += 2;
-            devices[1].hear(&[*byte])
-        })
-        .collect();
-    assert_eq!(heard.len(), 1);
+    let heard = first.iter().flat_map(|byte| {
+        devices[1].tick_ms += 2;
+        devices[1].hear(&[*byte])
+    });
+    assert_eq!(heard.count(), 1);
 }
 
 /// A device does not receive its own packet: the rest of the shared packet does not count as noise.
@@ -154,12 +156,8 @@ fn a_shared_packet_is_no_framing_error() {
     let sync =
         |ids: &[u8]| packet(BROADCAST, 0x8A, &[&address::FRAME_COUNTER.to_le_bytes()[..], &[4, 0], ids].concat());
     let bulk = |id: u8, length: u8| [&[id][..], &address::PRESENT_MODE.to_le_bytes(), &[length, 0]].concat();
-    let requests = [
-        sync(&[1]),
-        sync(&[1, 2, 3]),
-        sync(&[3, 1, 2]),
-        packet(BROADCAST, 0x9A, &[bulk(2, 9), bulk(1, 54), bulk(3, 1)].concat()),
-    ];
+    let bulk = packet(BROADCAST, 0x9A, &[bulk(2, 9), bulk(1, 54), bulk(3, 1)].concat());
+    let requests = [sync(&[1]), sync(&[1, 2, 3]), sync(&[3, 1, 2]), bulk];
     for request in requests.iter().chain(&requests) {
         assert!(!talk(&mut devices, request).is_empty());
         // The host waits for its time-out before it continues.
@@ -177,12 +175,14 @@ fn a_shared_packet_is_no_framing_error() {
 }
 
 #[test]
-fn fast_sync_read_gives_way_to_another_packet() {
-    let mut waiting = device(2);
-    let request = packet(BROADCAST, 0x8A, &[7, 0, 1, 0, 1, 2]);
-    assert!(waiting.hear(&request).is_empty());
-    assert_eq!(waiting.hear(&packet(2, 0x01, &[])).len(), 1, "a ping is answered as ever");
-    assert!(waiting.hear(&[0; 40]).is_empty(), "the turn is over");
+fn a_fast_read_gives_way_to_another_packet() {
+    let bulk = [[1, 7, 0, 1, 0], [2, 7, 0, 1, 0]].concat();
+    for request in [packet(BROADCAST, 0x8A, &[7, 0, 1, 0, 1, 2]), packet(BROADCAST, 0x9A, &bulk)] {
+        let mut waiting = device(2);
+        assert!(waiting.hear(&request).is_empty());
+        assert_eq!(waiting.hear(&packet(2, 0x01, &[])).len(), 1, "a ping is answered as ever");
+        assert!(waiting.hear(&[0; 40]).is_empty(), "the turn is over");
+    }
     // Data that cannot be read is zero, with its error; and nothing at all is sent where it would not fit.
     let mut first = device(1);
     let reply = first.hear(&packet(BROADCAST, 0x8A, &[0xFF, 0x7F, 3, 0, 1])).concat();
@@ -207,22 +207,7 @@ fn fast_bulk_read_makes_one_packet_of_unequal_parts() {
                 [&[id][..], &address.to_le_bytes(), &length.to_le_bytes()].concat()
             })
             .collect();
-        let wire = talk(&mut devices, &packet(BROADCAST, 0x9A, &entries)).concat();
-        let length = 1 + list.iter().map(|&(_, _, length)| usize::from(length) + 4).sum::<usize>();
-        assert_eq!(wire.len(), 7 + length, "{wire:02X?}");
-        assert_eq!(wire[..8], [0xFF, 0xFF, 0xFD, 0, 0xFE, length as u8, (length >> 8) as u8, 0x55]);
-        let mut begin = 8;
-        for &(id, address, length) in list {
-            let data = devices[usize::from(id) - 1].read(address, length).expect("within the table");
-            let end = begin + 2 + usize::from(length);
-            assert_eq!(wire[begin..begin + 2], [0, id]);
-            assert_eq!(wire[begin + 2..end], data, "of {id}");
-            assert_eq!(wire[end..end + 2], update_crc(CRC_START, &wire[..end]).to_le_bytes(), "over all before it");
-            begin = end + 2;
-        }
-        // What a client checks is the whole packet, as any other.
-        let (body, checksum) = wire.split_at(wire.len() - 2);
-        assert_eq!(checksum, update_crc(CRC_START, body).to_le_bytes());
+        answer_in_one_packet(&mut devices, &packet(BROADCAST, 0x9A, &entries), list);
     }
 }
 
@@ -231,7 +216,7 @@ fn a_part_of_a_fast_bulk_read_that_is_refused_is_zeros_and_a_packet_too_long_is_
     let mut first = device(1);
     let reply = first.hear(&packet(BROADCAST, 0x9A, &[1, 0xFF, 0x7F, 3, 0])).concat();
     assert_eq!(reply[8..13], [7, 1, 0, 0, 0]);
-    assert_eq!(first.refused(fingertip::link::packet::StatusError::Access), 1);
+    assert_eq!(first.refused(StatusError::Access), 1);
     let too_long = [1, 0, 0, 1, 1];
     assert!(first.hear(&packet(BROADCAST, 0x9A, &too_long)).is_empty(), "257 bytes");
     let overflows = [[1, 7, 0, 1, 0], [2, 0, 0, 0xFF, 0xFF]].concat();
@@ -241,14 +226,9 @@ fn a_part_of_a_fast_bulk_read_that_is_refused_is_zeros_and_a_packet_too_long_is_
     }
     assert!(first.hear(&packet(BROADCAST, 0x9A, &[])).is_empty(), "nobody is asked");
     assert_eq!(first.ask(0x9A, &[1, 7, 0, 1, 0]).number(), 2, "only for all");
-    // A turn that is waited for ends with the next packet.
-    let mut waiting = device(2);
-    assert!(waiting.hear(&packet(BROADCAST, 0x9A, &[[1, 7, 0, 1, 0], [2, 7, 0, 1, 0]].concat())).is_empty());
-    assert_eq!(waiting.hear(&packet(2, 0x01, &[])).len(), 1);
-    assert!(waiting.hear(&[0; 40]).is_empty());
 }
 
-/// A driver that reads each device from its least address to its largest, as ROBOTIS' own do without indirect addresses.
+/// A driver without indirect addresses reads each device from its least address to its largest, as ROBOTIS' own do.
 #[test]
 fn bulk_read_goes_across_gaps() {
     let mut devices = [device(1), device(2)];
@@ -342,18 +322,8 @@ fn factory_reset_keeps_what_it_is_told_to() {
         let mut bench = Bench::with(record);
         assert_eq!(bench.ask(0x06, &[kind]), Answer { id: 9, error: 0, data: vec![] });
         assert_eq!(bench.server.settings().record, Record { id, baud_code, ..Record::DEFAULT });
-        let actions = bench.server.take_actions();
-        assert_eq!(
-            actions,
-            Actions {
-                reboot: false,
-                save: true,
-                configure: true,
-                calibrate: false,
-                capture: None,
-                baud: baud_code != 4
-            }
-        );
+        let actions = Actions { save: true, configure: true, baud: baud_code != 4, ..Actions::default() };
+        assert_eq!(bench.server.take_actions(), actions);
     }
     let mut bench = Bench::with(record);
     assert_eq!(bench.ask_as(BROADCAST, 0x06, &[0xFF]), None);
@@ -394,7 +364,7 @@ fn a_packet_too_long_to_keep_is_refused() {
     // 400 parameters and their CRC, put together by hand.
     let mut bytes = hex("FF FF FD 00 01 93 01 03");
     bytes.extend([0; 400]);
-    let crc = fingertip::link::packet::update_crc(0, &bytes);
+    let crc = update_crc(CRC_START, &bytes);
     bytes.extend(crc.to_le_bytes());
     let replies = bench.hear(&bytes);
     assert_eq!(replies.iter().map(|reply| reply[8]).collect::<Vec<_>>(), [5]);

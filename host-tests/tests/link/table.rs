@@ -1,16 +1,13 @@
 //! Reading the control table.
 
-use crate::bench::{Bench, ID};
-use fingertip::contact::FitLevel;
+use super::bench::{Bench, ID, owned, param, table_end};
+use crate::common::*;
 use fingertip::link::Actions;
 use fingertip::link::packet::StatusError;
 use fingertip::link::table::indirect::BLOCK;
 use fingertip::link::table::{Access, READ_MAX, Register};
-use fingertip::params::Params;
-use fingertip::shipped::{Gains, REGISTERS, TAXELS, address};
-use fingertip::state::{Fault, Limits, Mode};
+use fingertip::shipped::{Gains, REGISTERS, address};
 use fingertip::store::Record;
-use fingertip::units::{Duty, Millimetres, MillimetresPerSecond, Newtons};
 use host_tests::control_table::{COMMAND, markdown, step};
 use host_tests::model_file::{items, text};
 
@@ -26,13 +23,9 @@ fn registers_stand_in_order_and_apart() {
 #[test]
 fn every_span_reads_as_its_bytes_and_gaps_as_zero() {
     let mut bench = Bench::new();
-    let last = REGISTERS.last().expect("registers");
-    let end = last.address + last.bytes();
+    let end = table_end();
     let bytes: Vec<u8> = (0..end).map(|address| bench.read(address, 1).expect("within the table")[0]).collect();
-    let owned = |address: &u16| {
-        REGISTERS.iter().any(|register| (register.address..register.address + register.bytes()).contains(address))
-    };
-    let gaps: Vec<u16> = (0..end).filter(|address| !owned(address)).collect();
+    let gaps: Vec<u16> = (0..end).filter(|address| !owned(*address)).collect();
     assert!(gaps.len() > 300 && gaps.iter().all(|&gap| bytes[usize::from(gap)] == 0));
     // What the reads themselves change.
     let counts = usize::from(address::GOOD_PACKETS)..usize::from(address::GOOD_PACKETS + 4);
@@ -68,7 +61,6 @@ fn reads_of_no_or_too_many_bytes_are_refused() {
     }
 }
 
-/// All that the core can report is within the range that the table has for its register.
 #[test]
 fn the_last_fault_and_the_last_limit_are_in_the_table() {
     let largest = |address| REGISTERS.iter().find(|register| register.address == address).expect("a register").max;
@@ -166,17 +158,6 @@ fn each_figure_stands_where_the_page_says() {
 }
 
 #[test]
-fn one_read_fetches_the_whole_state_or_a_whole_picture() {
-    let mut bench = Bench::new();
-    let end = address::FRAME_PERIOD_NS + 4;
-    assert!(bench.read(address::PRESENT_MODE, end - address::PRESENT_MODE).is_ok());
-    assert!(bench.read(address::GOAL_FORCE_MN, address::GOOD_PACKETS + 4 - address::GOAL_FORCE_MN).is_ok());
-    for (address, bytes) in [(address::PRESSURES, 200), (address::RAW_CODES, 220), (address::TARE_CODES, 200)] {
-        assert_eq!(bench.read(address, bytes).map(|data| data.len()), Ok(usize::from(bytes)));
-    }
-}
-
-#[test]
 fn refusals_are_counted_by_their_number() {
     let mut bench = Bench::new();
     assert_eq!(bench.read(300, 0), Err(5));
@@ -202,18 +183,14 @@ fn refusals_are_counted_by_their_number() {
 }
 
 #[test]
-fn the_page_is_fresh() {
-    let path = concat!(env!("FINGERTIP_ROOT"), "/docs/control-table.md");
-    let page = std::fs::read_to_string(path).expect("docs/control-table.md can be read");
-    assert!(page == markdown(), "docs/control-table.md is stale: renew it with `{COMMAND}`");
-}
-
-#[test]
-fn the_model_files_are_fresh() {
-    for (path, direct) in [("fingertip.model", false), ("fingertip_direct.model", true)] {
-        let path = format!("{}/examples/dynamixel/{path}", env!("FINGERTIP_ROOT"));
-        let file = std::fs::read_to_string(&path).expect("the model file can be read");
-        assert!(file == text(direct), "{path} is stale: renew it with `{COMMAND}`");
+fn the_page_and_the_model_files_are_fresh() {
+    for (path, fresh) in [
+        ("docs/control-table.md", markdown()),
+        ("examples/dynamixel/fingertip.model", text(false)),
+        ("examples/dynamixel/fingertip_direct.model", text(true)),
+    ] {
+        let file = std::fs::read_to_string(format!("{}/{path}", env!("FINGERTIP_ROOT"))).expect("it can be read");
+        assert!(file == fresh, "{path} is stale: renew it with `{COMMAND}`");
     }
 }
 
@@ -229,11 +206,9 @@ fn the_description_for_ros2_control_asks_for_what_there_is() {
         // Keys of the driver itself.
         let names: Vec<&str> = names.filter(|name| !["type", "ID"].contains(name)).collect();
         assert!(!names.is_empty(), "no {tag}");
-        let item = |name: &&str| items.iter().find(|item| item.name == **name);
-        names
-            .iter()
-            .map(|name| usize::from(item(name).unwrap_or_else(|| panic!("no item {name}")).bytes))
-            .sum::<usize>()
+        let item =
+            |name: &&str| items.iter().find(|item| item.name == **name).unwrap_or_else(|| panic!("no item {name}"));
+        names.iter().map(|name| usize::from(item(name).bytes)).sum::<usize>()
     };
     assert!(bytes("<state_interface name=\"") <= BLOCK && bytes("<command_interface name=\"") <= BLOCK);
     bytes("<param name=\"");
@@ -257,12 +232,8 @@ fn every_register_is_explained() {
 /// A number as a register's bytes, where they can hold it.
 fn bytes(register: &Register, value: i64) -> Option<Vec<u8>> {
     let width = usize::from(register.kind.width());
-    let unsigned = format!("{:?}", register.kind).starts_with('U');
-    let (least, largest) = match (unsigned, width) {
-        (true, _) => (0, (1i64 << (8 * width)) - 1),
-        (false, _) => (-(1i64 << (8 * width - 1)), (1i64 << (8 * width - 1)) - 1),
-    };
-    (least..=largest).contains(&value).then(|| value.to_le_bytes()[..width].to_vec())
+    let least = if format!("{:?}", register.kind).starts_with('U') { 0 } else { -1 << (8 * width - 1) };
+    (least..least + (1 << (8 * width))).contains(&value).then(|| value.to_le_bytes()[..width].to_vec())
 }
 
 fn refuses(bench: &mut Bench, address: u16, data: &[u8], error: StatusError, what: &str) {
@@ -368,13 +339,8 @@ fn one_bad_value_spoils_the_whole_write() {
     let goal = 1000i32.to_le_bytes();
     // Goal, tare, clear, then 2 for save; then a register that cannot be written; then one that does not exist.
     refuses(&mut bench, address::GOAL_FORCE_MN, &[&goal[..], &[1, 1, 2]].concat(), StatusError::Range, "save");
-    refuses(
-        &mut bench,
-        address::GOAL_FORCE_MN,
-        &[&goal[..], &[1, 1, 1, 0]].concat(),
-        StatusError::Access,
-        "saved state",
-    );
+    let saved_state = [&goal[..], &[1, 1, 1, 0]].concat();
+    refuses(&mut bench, address::GOAL_FORCE_MN, &saved_state, StatusError::Access, "saved state");
     refuses(&mut bench, address::BAUD_RATE, &[4, 10, 0], StatusError::Access, "beyond return delay");
     let mut params: Vec<u8> = Params::DEFAULT.to_array().into_iter().flat_map(i32::to_le_bytes).collect();
     let last = params.len() - 1;
@@ -412,15 +378,8 @@ fn every_goal_comes_back_as_it_was_written() {
         assert_eq!(bench.write(address::GOAL_FORCE_MN, &goal.to_le_bytes()), Ok(()));
         assert_eq!(bench.number(address::GOAL_FORCE_MN, 4), goal as u32);
     }
-}
-
-#[test]
-fn a_goal_beyond_the_largest_force_is_a_limit_error() {
-    let mut bench = Bench::new();
-    refuses(&mut bench, address::GOAL_FORCE_MN, &7_001i32.to_le_bytes(), StatusError::Limit, "goal");
-    assert_eq!(bench.write(address::GOAL_FORCE_MN, &7_000i32.to_le_bytes()), Ok(()));
-    let force_max = param("force_max_mn");
-    refuses(&mut bench, force_max, &6_999i32.to_le_bytes(), StatusError::Limit, "force_max_mn below the goal");
+    refuses(&mut bench, address::GOAL_FORCE_MN, &7_001i32.to_le_bytes(), StatusError::Limit, "beyond force_max_mn");
+    refuses(&mut bench, param("force_max_mn"), &6_999i32.to_le_bytes(), StatusError::Limit, "below the goal");
 }
 
 #[test]
@@ -446,23 +405,6 @@ fn parameters_that_contradict_each_other_are_a_limit_error() {
     assert_eq!(bench.number(address::SAVED_STATE, 1), 1);
 }
 
-#[test]
-fn torque_is_refused_while_a_fault_stands() {
-    let mut bench = Bench::new();
-    bench.set_fault(Some(Fault::SupplyLow));
-    let answer = bench.ask(0x03, &[64, 0, 1]);
-    assert_eq!(answer.error, 0x80 | StatusError::Result as u8);
-    bench.set_fault(None);
-    assert_eq!(bench.write(address::TORQUE_ENABLE, &[1]), Ok(()));
-    assert!(bench.server.command().torque);
-}
-
-/// The address of a parameter.
-fn param(name: &str) -> u16 {
-    REGISTERS.iter().find(|register| register.name == name).map(|register| register.address).expect("a parameter")
-}
-
-/// Gains are written completely or not at all, like all registers, and passed to the loop once.
 #[test]
 fn gains_are_written_with_torque_off_in_their_range_and_all_at_once() {
     let mut bench = Bench::new();

@@ -1,15 +1,9 @@
 //! Early ends of a motion: the motor rests, the motion and its record say so, and the next one works.
 
-use crate::{Finger, params};
-use fingertip::capture::{CaptureState, Ended as CaptureEnded};
-use fingertip::measure::{Ended, MeasureState, Task};
-use fingertip::params::Params;
-use fingertip::pressure::Calibration;
-use fingertip::shipped::Config;
-use fingertip::state::Mode;
-use sim::native::bench::Bench;
+use crate::common::*;
+use fingertip::capture::Ended as CaptureEnded;
 
-type Made = Finger<{ 44 << 10 }>;
+type Made = Recorded;
 type Act = fn(&mut Made);
 
 const ENDS: [(&str, Act); 6] = [
@@ -21,20 +15,14 @@ const ENDS: [(&str, Act); 6] = [
         finger.bench.command().tare_forced = true;
     }),
     ("fault", |finger| _ = finger.frame_with(|record| record.sense.bridge_fault = true)),
-    ("stopped", |finger| finger.bench.pipeline().stop(fingertip::state::Fault::LostFrames)),
-    ("parameters", |finger| {
-        let config = Config::shipped(&crate::params()).expect("allowed");
-        finger.bench.pipeline().configure(&config);
-    }),
+    ("stopped", |finger| finger.bench.pipeline().stop(Fault::LostFrames)),
+    ("parameters", |finger| finger.bench.pipeline().configure(&config())),
 ];
 
 /// Frames of a whole motion.
 fn frames(task: Task) -> u32 {
     let mut finger = Made::begun(task);
-    let mut frames = 1;
-    while finger.frame().measure.state == MeasureState::Running {
-        frames += 1;
-    }
+    let frames = (1..).find(|_| finger.frame().measure.state != MeasureState::Running).expect("an end");
     finger.assert_ended(task, Ended::Complete);
     frames
 }
@@ -57,7 +45,7 @@ fn end_and_go_on(parts: &[u32]) {
             for part in parts {
                 let at = 1 + (frames - 40) * part / 6 + number as u32;
                 let mut finger = Made::begun(task);
-                (0..at).for_each(|_| _ = finger.frame());
+                finger.frames(at);
                 assert_eq!(finger.bench.status().measure.state, MeasureState::Running, "{name} at {at}");
                 act(&mut finger);
                 let mut waited = 0;
@@ -69,7 +57,7 @@ fn end_and_go_on(parts: &[u32]) {
                 finger.frame();
                 finger.assert_ended(task, Ended::Interrupted);
                 // Goal 0: a press that was stopped releases.
-                (0..15_000).for_each(|_| _ = finger.frame());
+                finger.frames(15_000);
                 let status = *finger.bench.status();
                 assert!(!matches!(status.mode, Mode::Press | Mode::Strokes), "{name} at {at}: {status:?}");
                 let speed = finger.bench.truth().speed_mm_per_s;
@@ -81,17 +69,16 @@ fn end_and_go_on(parts: &[u32]) {
                 finger.frame();
                 finger.bench.place(0.0);
                 finger.bench.command().tare_request += 1;
-                (0..2_000).for_each(|_| _ = finger.frame());
+                finger.frames(2_000);
                 finger.begin(Task::Strokes);
-                (0..2_000).for_each(|_| _ = finger.frame());
+                finger.frames(2_000);
                 assert_eq!(finger.bench.status().measure.state, MeasureState::Running, "{name} at {at}");
             }
         }
     }
 }
 
-/// Torque off and strokes in one write, while a press moves: the press ends with its own record, the strokes are not
-/// rows of it.
+/// Torque off and strokes in one write during a press: the press ends with its own record, without rows of the strokes.
 #[test]
 fn a_motion_that_replaces_another_is_one_of_its_own() {
     let mut finger = Made::begun(Task::Press);
@@ -102,12 +89,12 @@ fn a_motion_that_replaces_another_is_one_of_its_own() {
     finger.bench.request(Task::Strokes);
     finger.frame();
     finger.assert_ended(Task::Press, Ended::Interrupted);
-    (0..20_000).for_each(|_| _ = finger.frame());
+    finger.frames(20_000);
     let measure = finger.bench.status().measure;
     assert_eq!(measure.task, Task::Strokes, "{measure:?}");
     // And a tare with a jog.
     let mut finger = Made::begun(Task::Strokes);
-    (0..3_000).for_each(|_| _ = finger.frame());
+    finger.frames(3_000);
     finger.bench.command().tare_request += 1;
     finger.bench.request(Task::Jog);
     finger.frame();
@@ -142,11 +129,23 @@ fn a_record_ended_by_the_host_is_whole() {
 // A request that cannot be served has its reason at once.
 
 /// The array with the object pressed in.
-fn pressed(finger: &mut Made) {
+fn pressed(mut finger: Made) -> Made {
     finger.bench.place_object(-0.8);
-    for _ in 0..20 {
-        finger.frame();
-    }
+    finger.frames(20);
+    finger
+}
+
+fn with_torque(mut finger: Made) -> Made {
+    finger.bench.command().torque = true;
+    finger.frame();
+    finger
+}
+
+/// During a tare, or after it.
+fn taring(mut finger: Made, frames: u32) -> Made {
+    finger.bench.command().tare_request += 1;
+    finger.frames(frames);
+    finger
 }
 
 /// A state, how it is made, and how a jog, strokes and a press end in it.
@@ -156,59 +155,24 @@ type Case = (&'static str, fn() -> Made, [Option<Ended>; 3]);
 #[test]
 fn every_state_has_its_answer() {
     const NO: Option<Ended> = Some(Ended::NotReady);
-    let states: [Case; 9] = [
-        ("not tared", || Finger::with(&params()), [NO; 3]),
-        ("tared", Finger::tared, [None, None, NO]),
+    let states: [Case; 10] = [
+        ("not tared", Made::untared, [NO; 3]),
+        ("not tared, torque on", || with_torque(Made::untared()), [NO; 3]),
+        ("tared", Made::tared, [None, None, NO]),
         (
             "unconfirmed",
             || {
-                let mut finger = Finger::with(&Params::DEFAULT);
+                let mut finger = Made::of(&Setup::default(), &allowed(Params::DEFAULT));
                 finger.bench.tare();
                 finger.bench.command().torque = false;
                 finger
             },
             [None, Some(Ended::Unconfirmed), NO],
         ),
-        (
-            "torque on",
-            || {
-                let mut finger = Made::tared();
-                finger.bench.command().torque = true;
-                finger.frame();
-                finger
-            },
-            [NO, NO, None],
-        ),
-        (
-            "taring",
-            || {
-                let mut finger = Made::tared();
-                finger.bench.command().tare_request += 1;
-                finger.frame();
-                finger
-            },
-            [NO; 3],
-        ),
-        (
-            "touching",
-            || {
-                let mut finger = Made::tared();
-                pressed(&mut finger);
-                finger
-            },
-            [NO; 3],
-        ),
-        (
-            "tared while touching",
-            || {
-                let mut finger = Made::with(&params());
-                pressed(&mut finger);
-                finger.bench.command().tare_request += 1;
-                (0..700).for_each(|_| _ = finger.frame());
-                finger
-            },
-            [NO; 3],
-        ),
+        ("torque on", || with_torque(Made::tared()), [NO, NO, None]),
+        ("taring", || taring(Made::tared(), 1), [NO; 3]),
+        ("touching", || pressed(Made::tared()), [NO; 3]),
+        ("tared while touching", || taring(pressed(Made::untared()), 700), [NO; 3]),
         (
             "gains changed",
             || {
@@ -221,9 +185,7 @@ fn every_state_has_its_answer() {
         (
             "fault",
             || {
-                let mut finger = Made::tared();
-                finger.bench.command().torque = true;
-                finger.frame();
+                let mut finger = with_torque(Made::tared());
                 finger.frame_with(|record| record.sense.bridge_fault = true);
                 finger.bench.command().torque = false;
                 finger.frame();
@@ -240,15 +202,14 @@ fn every_state_has_its_answer() {
             let status = finger.frame();
             let (measure, taken) = (status.measure, status.taken.measure);
             assert_eq!((measure.task, taken), (task, finger.bench.command().measure_request), "{name}");
-            let expected =
-                answer.map_or((MeasureState::Running, Ended::Complete), |ended| (MeasureState::Ended, ended));
+            let began = (MeasureState::Running, Ended::Complete);
+            let expected = answer.map_or(began, |ended| (MeasureState::Ended, ended));
             assert_eq!((measure.state, measure.ended), expected, "{name}: {task:?}");
             assert_eq!(matches!(status.mode, Mode::Press | Mode::Strokes), answer.is_none(), "{name}: {task:?}");
         }
     }
 }
 
-/// The running motion answers both requests, and is not disturbed.
 #[test]
 fn a_request_during_a_motion_is_answered_by_its_end() {
     for task in [Task::Jog, Task::Press] {
@@ -260,8 +221,6 @@ fn a_request_during_a_motion_is_answered_by_its_end() {
                 assert_eq!((status.measure.task, status.measure.state), (task, MeasureState::Running));
                 assert_eq!(status.taken.measure, finger.bench.command().measure_request);
             }
-            let bench: &mut Bench = &mut finger.bench;
-            bench.command();
             finger.ends().measure
         };
         assert_eq!(end(&[]), end(&[Task::Jog, Task::Strokes, Task::Press]));

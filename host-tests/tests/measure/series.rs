@@ -1,9 +1,9 @@
-//! The layout of a record, read by a decoder of its own: it knows only the documentation of `fingertip::measure::series`.
+//! The layout of a record, read by a decoder from the documentation of `fingertip::measure::series` alone.
 
+use crate::common::*;
+use fingertip::measure::Row;
 use fingertip::measure::press::{PARTS, Step};
 use fingertip::measure::series::{CHECK, Head, Out, step_bytes};
-use fingertip::measure::{Ended, Row};
-use fingertip::units::Celsius;
 
 /// A row of a press.
 pub struct Read {
@@ -157,10 +157,8 @@ fn comes_back<const ROWS: usize, const COLUMNS: usize>() {
     assert_eq!((record.kind, record.shape, record.ended), (1, [ROWS, COLUMNS], 12));
     assert_eq!((record.frame_ns, record.origin, record.delay_ns, record.value), (99_762, -77_000, 33_000, -5));
     for ((step, frames), read) in steps.iter().zip(&record.steps) {
-        assert_eq!(
-            (read.frames, read.counts, read.taken, read.back),
-            (step.frames, step.counts, step.taken, step.back)
-        );
+        assert_eq!((read.frames, read.counts), (step.frames, step.counts));
+        assert_eq!((read.taken, read.back), (step.taken, step.back));
         assert_eq!(i32::from(read.voltage_mv), step.voltage_mv / i32::from(step.taken));
         let kelvin = step.chip.map_or(0.0, |chip| chip.0.to_num::<f64>() + 273.15);
         assert!((f64::from(read.tenths_k) / 10.0 - kelvin).abs() <= 0.15, "{} {kelvin}", read.tenths_k);
@@ -186,12 +184,8 @@ fn a_press_comes_back_from_its_bytes() {
 
 #[test]
 fn strokes_come_back_from_their_bytes() {
-    let rows = [
-        Row::Stroke,
-        Row::Sample { count: -1, voltage: i16::MAX },
-        Row::Sample { count: i16::MAX, voltage: -2 },
-        Row::<10, 10>::Stroke,
-    ];
+    let sample = |count, voltage| Row::Sample { count, voltage };
+    let rows = [Row::Stroke, sample(-1, i16::MAX), sample(i16::MAX, -2), Row::<10, 10>::Stroke];
     let record = decode(&written(&rows, 2));
     assert_eq!(record.samples, [[i16::MIN, 0], [-1, i16::MAX], [i16::MAX, -2], [i16::MIN, 0]]);
 }

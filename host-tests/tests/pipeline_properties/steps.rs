@@ -1,14 +1,8 @@
 //! Runs of steps, judged one by one.
 
-use crate::{Arguments, Input, any_inputs, any_params, config};
-use fingertip::measure::{Ended, MeasureState, Task};
-use fingertip::params::Params;
-use fingertip::pipeline::{Status, Taring};
-use fingertip::shipped::{Pipeline, TARE_FRAMES};
-use fingertip::state::{Fault, Limits, Mode};
-use fingertip::units::{Duty, Newtons};
+use super::{Input, any_inputs, any_params, at_rest, config, next};
+use crate::common::*;
 use images::record::Digest;
-use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -19,7 +13,7 @@ const CASES: u32 = 500;
 /// A pipeline and its last inputs.
 struct Run {
     pipeline: Pipeline,
-    arguments: Arguments,
+    arguments: Record,
     before: Status,
     clear_seen: u8,
     /// A force of at least a contact's was read since the last tare began.
@@ -37,7 +31,7 @@ impl Run {
         let pipeline = Pipeline::new(&config(params));
         let mut run = Self {
             pipeline,
-            arguments: Arguments::new(),
+            arguments: at_rest(),
             before: Status::default(),
             clear_seen: 0,
             touched: false,
@@ -56,7 +50,7 @@ impl Run {
 
     fn take(&mut self, inputs: &[Input]) {
         for input in inputs {
-            self.arguments.next(input);
+            next(&mut self.arguments, input);
             self.step();
         }
     }
@@ -68,7 +62,7 @@ impl Run {
         let measures = self.arguments.command.measure_request != self.before.taken.measure;
         let task = Task::of(self.arguments.command.measure_request);
         let strokes = measures && matches!(task, Task::Jog | Task::Strokes);
-        let Arguments { frame, sense, command } = &self.arguments;
+        let Record { frame, sense, command } = &self.arguments;
         let (duty, &status) = self.pipeline.step(frame, sense, command);
         self.digest.add(duty, &status);
 
@@ -101,10 +95,7 @@ impl Run {
             // What is pressed refuses a tare; the zero before remains.
             let tared = !self.before.limits.has(Limits::NOT_TARED) && !status.limits.has(Limits::NOT_TARED);
             let pressed = tared && self.touched && !command.tare_forced;
-            let expected = match status.mode {
-                Mode::Tare => Taring::Running,
-                _ => Taring::Refused,
-            };
+            let expected = if status.mode == Mode::Tare { Taring::Running } else { Taring::Refused };
             assert_eq!(status.tare, expected, "{:?}", status.mode);
             assert!(status.mode == Mode::Tare || faulted || pressed, "{:?} refuses a tare", status.mode);
             if self.before.mode == Mode::Force && !command.tare_forced {
@@ -127,27 +118,19 @@ impl Run {
             // Accepted or refused; a fault may end it in its first frame.
             assert!(runs || status.measure.state == MeasureState::Ended, "{status:?}");
         }
-        assert!(
-            !runs || status.measure.task == if status.mode == Mode::Press { Task::Press } else { status.measure.task }
-        );
+        assert!(!runs || status.mode != Mode::Press || status.measure.task == Task::Press);
         assert!(!runs || matches!(status.mode, Mode::Press | Mode::Strokes), "{status:?}");
         assert!(runs || status.mode != Mode::Strokes);
-        assert_eq!(
-            status.measure.value != 0 || status.measure.ended != Ended::Complete,
-            status.measure.state == MeasureState::Ended
-        );
+        let early = status.measure.value != 0 || status.measure.ended != Ended::Complete;
+        assert_eq!(early, status.measure.state == MeasureState::Ended);
         if was_running && runs {
-            assert_eq!(
-                (status.mode, status.measure.task),
-                (self.before.mode, self.before.measure.task),
-                "another began"
-            );
+            let before = (self.before.mode, self.before.measure.task);
+            assert_eq!((status.mode, status.measure.task), before, "another began");
         }
         if status.mode == Mode::Press && !measures {
             assert!(was_running, "a press goes on after its answer: {status:?}");
         }
-        // Enabling torque starts from the present goal and touch, whatever was requested before; a measurement
-        // begins only with its request.
+        // Torque starts from the present goal and touch; a measurement begins only with its request.
         if drives(status.mode) && !drives(self.before.mode) && status.mode != Mode::Strokes {
             let sound = match status.mode {
                 Mode::Approach | Mode::Force => command.goal > Newtons::ZERO,
@@ -176,20 +159,8 @@ impl Run {
     }
 }
 
-fn drives(mode: Mode) -> bool {
-    match mode {
-        Mode::Off | Mode::Tare | Mode::Fault => false,
-        Mode::Approach | Mode::Force | Mode::Release | Mode::Press | Mode::Strokes => true,
-    }
-}
-
 proptest! {
-    #![proptest_config(crate::fixed(CASES))]
-
-    #[test]
-    fn any_run_keeps_to_the_rules(params in any_params(), tared in prop::bool::weighted(0.9), inputs in any_inputs(200)) {
-        Run::new(&params, tared).take(&inputs);
-    }
+    #![proptest_config(super::fixed(CASES))]
 
     #[test]
     fn the_same_run_gives_the_same_bits(params in any_params(), inputs in any_inputs(100)) {
@@ -201,8 +172,7 @@ proptest! {
         prop_assert_eq!(digest(), digest());
     }
 
-    /// Whatever was commanded before: with torque off nothing drives, and with torque on again the old goal is
-    /// forgotten.
+    /// Whatever was commanded before: nothing drives without torque, and torque on again forgets the old goal.
     #[test]
     fn nothing_commanded_acts_after_torque_off(params in any_params(), inputs in any_inputs(100)) {
         let mut run = Run::new(&params, true);
@@ -247,13 +217,13 @@ proptest! {
     }
 }
 
-/// The inputs are not so wild that everything ends at once: each mode, and each fault that a step can find, is reached.
+/// Any run keeps to the rules. They reach each mode, and each fault that a step can find.
 #[test]
-fn the_runs_come_everywhere() {
+fn any_run_keeps_to_the_rules_and_the_runs_come_everywhere() {
     let all = RefCell::new(Seen::default());
-    let inputs = (any_params(), any_inputs(200));
-    let outcome = TestRunner::new(crate::fixed(3 * CASES)).run(&inputs, |(params, inputs)| {
-        let mut run = Run::new(&params, true);
+    let inputs = (any_params(), prop::bool::weighted(0.9), any_inputs(200));
+    let outcome = TestRunner::new(super::fixed(3 * CASES)).run(&inputs, |(params, tared, inputs)| {
+        let mut run = Run::new(&params, tared);
         run.take(&inputs);
         for (all, seen) in all.borrow_mut().iter_mut().zip(run.seen) {
             all.extend(seen);
@@ -265,7 +235,6 @@ fn the_runs_come_everywhere() {
     assert_eq!(Vec::from_iter(modes), [0, 1, 2, 3, 4, 5, 6, 7]);
     assert_eq!(Vec::from_iter(tasks), [0, 1, 2, 3]);
     assert!([0, 1, 2, 3].iter().all(|number| ends.contains(number)), "{ends:?}");
-    // A repeated frame gives fault 1. Missing frames, damaged parameters, late steps and crashes are detected outside of
-    // the step.
+    // Fault 1 is a repeated frame. The others are detected outside of the step.
     assert_eq!(Vec::from_iter(faults), [0, 1, 2, 3, 4, 5, 6, 7, 9, 10, 11, 14, 15]);
 }

@@ -1,17 +1,13 @@
-//! Drawn fingers with arrays of other shapes and other frame rates: four promises of `ordinary` hold, and no finger stops
-//! with a fault. These fingers have no friction, play, hysteresis or creep, and their object is a plane.
+//! Drawn fingers with arrays of other shapes and other frame rates: four promises of `ordinary` hold, and no finger
+//! stops with a fault. These fingers have no friction, play, hysteresis or creep, and their object is a plane.
 
 use super::{Finger, normal};
-use fingertip::config::{Shaped, newtons};
-use fingertip::contact::FitLevel;
-use fingertip::params::Params;
+use crate::common::*;
+use fingertip::config::Shaped;
 use fingertip::pipeline::Pipeline;
-use fingertip::scan::Clocks;
-use fingertip::shipped::CLOCKS;
-use fingertip::state::Mode;
 
-/// Worst of a population: force above 1.3 times the goal and 0.15 N, distance from the goal beyond 15 % and 0.1 N, swing
-/// beyond 10 % and 50 mN, and force that is left 0.5 s after a release, N. 0 or less keeps a promise.
+/// Worst of a population: force above 1.3 times the goal and 0.15 N, distance from the goal beyond 15 % and 0.1 N,
+/// swing beyond 10 % and 50 mN, and force that is left 0.5 s after a release, N. 0 or less keeps a promise.
 type Worst = [f64; 4];
 
 /// Draws a finger, which holds three forces and then releases the object.
@@ -80,7 +76,7 @@ fn fingers<const ROWS: usize, const COLUMNS: usize>(pitch_um: i32, frames_per_s:
     (inside, worst)
 }
 
-/// More with `FINGERS=100 cargo test -p host-tests --profile host --test shapes drawn -- --nocapture`.
+/// More with `FINGERS=100 cargo test -p host-tests --profile host --test all shapes::drawn -- --nocapture`.
 #[test]
 fn the_envelope_holds_for_other_arrays_and_rates() {
     let count = std::env::var("FINGERS").map_or(4, |count| count.parse().expect("a number of fingers"));

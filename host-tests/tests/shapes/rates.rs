@@ -1,14 +1,9 @@
 //! The loop closed at chosen frame rates, with one converter and with two.
 
 use super::Finger;
-use fingertip::config::newtons;
-use fingertip::contact::FitLevel;
-use fingertip::scan::Clocks;
-use fingertip::shipped::CLOCKS;
-use fingertip::state::{Fault, Limits};
+use crate::common::*;
 
-/// Approaches a wall, and holds 1 N and 2 N, at this frame rate. Returns the largest force above the goal, N, and the
-/// largest distance from the goal at rest, N.
+/// Holds 1 N and 2 N at a wall. Returns the largest force above the goal and the largest error at rest, N.
 fn held<const ROWS: usize, const COLUMNS: usize>(pitch_um: i32, frames_per_s: u32, converters: u32) -> [f64; 2] {
     let clocks = Clocks { converters, frame_ns: Some(1_000_000_000 / frames_per_s), ..CLOCKS };
     let mut finger = Finger::<ROWS, COLUMNS>::with_clocks(pitch_um, [0.0, 0.0], FitLevel::AllRows, &clocks);

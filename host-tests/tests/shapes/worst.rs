@@ -1,21 +1,16 @@
 //! The worst that frames can bring: every code at the top, one corner, half of them, alternating ones, and any at all.
 //! Nothing may overflow, so these are worth most with overflow checks.
 
-use fastrand::Rng;
-use fingertip::command::Command;
-use fingertip::config::{Geometry, Shaped, newtons};
+use crate::common::*;
+use fingertip::config::{Geometry, Shaped};
 use fingertip::contact::parts::{
     CENTRE_BITS, Comparison, Equations, Guess, ONE, PeakScale, Prediction, SLOPE_BITS, SQUARE_BITS, ScaledImage,
 };
-use fingertip::contact::{self, Fit, FitLevel};
-use fingertip::frame::{Frame, Sense, Shape};
-use fingertip::params::Params;
+use fingertip::contact::{self, Fit};
+use fingertip::frame::{Frame, Shape};
 use fingertip::pipeline::Pipeline;
 use fingertip::pressure::{Array, Calibration, GAIN_MAX, TactileImage};
-use fingertip::units::{Celsius, CoreCycles};
 use images::single::{self, Refined};
-use proptest::prelude::*;
-use proptest::test_runner::{Config as Cases, RngSeed};
 
 /// The highest code that is not saturated.
 const TOP: u16 = 4_089;
@@ -24,35 +19,21 @@ const QUIET: u16 = 40;
 
 /// By parameters within their ranges.
 fn config<const ROWS: usize, const COLUMNS: usize>(params: &Params) -> Shaped<ROWS, COLUMNS> {
-    Shaped::<ROWS, COLUMNS>::new(params, &fingertip::shipped::CLOCKS).expect("parameters within their ranges")
+    Shaped::new(params, &CLOCKS).expect("parameters within their ranges")
 }
 
 /// Parameters at the limits that matter for the sums and the fit, with the largest sag that the shape allows.
 fn extremes<const ROWS: usize, const COLUMNS: usize>() -> Vec<Params> {
-    let sag = (0..=7_600).rev().step_by(4).find(|sag| {
-        Shaped::<ROWS, COLUMNS>::new(
-            &Params { row_sag_ppb_per_code: *sag, ..Params::DEFAULT },
-            &fingertip::shipped::CLOCKS,
-        )
-        .is_ok()
-    });
-    let row_sag_ppb_per_code = sag.expect("a sag that is allowed");
+    let with = |sag: &i32| Params { row_sag_ppb_per_code: *sag, ..Params::DEFAULT };
+    let allowed = |sag: &i32| Shaped::<ROWS, COLUMNS>::new(&with(sag), &CLOCKS).is_ok();
+    let row_sag_ppb_per_code = (0..=7_600).rev().step_by(4).find(allowed).expect("a sag that is allowed");
     let mut all = Vec::new();
     for (pitch_um, tip_radius_um) in [(500, 16_000), (4_000, 4_000), (1_500, 10_000), (500, 4_000)] {
         for (modulus_pa, codes_per_kpa_milli) in [(20_000, 200_000), (2_000_000, 1_000), (250_000, 24_000)] {
-            for row_sag_ppb_per_code in [0, row_sag_ppb_per_code] {
-                // The converter's whole range counts as sound.
-                let headroom_codes = 5;
-                let params = Params {
-                    pitch_um,
-                    tip_radius_um,
-                    modulus_pa,
-                    codes_per_kpa_milli,
-                    headroom_codes,
-                    ..Params::DEFAULT
-                };
-                all.push(Params { row_sag_ppb_per_code, ..params });
-            }
+            // The converter's whole range counts as sound.
+            let params = Params { pitch_um, tip_radius_um, headroom_codes: 5, ..Params::DEFAULT };
+            let params = Params { modulus_pa, codes_per_kpa_milli, ..params };
+            all.extend([0, row_sag_ppb_per_code].map(|sag| Params { row_sag_ppb_per_code: sag, ..params }));
         }
     }
     all
@@ -204,10 +185,8 @@ fn leaves_out<const ROWS: usize, const COLUMNS: usize>() {
             bad[row] = 1 << column;
             assert_eq!((picture.bad, picture.bad_count, array.bad_taxels(&spoilt, &config)), (bad, 1, 1));
             assert_eq!(picture.taxels[row][column], 0);
-            assert!(
-                picture.peak > 0
-                    && picture.taxels.iter().flatten().filter(|taxel| **taxel > 0).count() + 1 == ROWS * COLUMNS
-            );
+            let sound = picture.taxels.iter().flatten().filter(|taxel| **taxel > 0).count();
+            assert!(picture.peak > 0 && sound + 1 == ROWS * COLUMNS);
         }
     }
 }
@@ -239,11 +218,8 @@ fn any_frame<const ROWS: usize, const COLUMNS: usize>() -> impl Strategy<Value =
     let code = prop_oneof![8 => 0..4_096_u16, 2 => Just(TOP), 1 => Just(0), 1 => any::<u16>()];
     let sound = 30..4_080_u16;
     let count = Shape::<ROWS, COLUMNS>::SLOTS * COLUMNS;
-    let codes = prop_oneof![
-        prop::collection::vec(sound, count),
-        prop::collection::vec(code, count),
-        prop::collection::vec(30..200_u16, count)
-    ];
+    let all = prop::collection::vec;
+    let codes = prop_oneof![all(sound.boxed(), count), all(code.boxed(), count), all((30..200_u16).boxed(), count)];
     (codes, prop::bool::ANY, any::<u32>()).prop_map(|(codes, level, sequence)| {
         let mut frame = Frame { sequence, ..Frame::EMPTY };
         for (place, code) in codes.into_iter().enumerate() {
@@ -268,7 +244,6 @@ fn any_sense() -> impl Strategy<Value = Sense> {
 
 /// Frames and senses to a pipeline that is tared and driven; a fault is cleared at once.
 fn takes_anything<const ROWS: usize, const COLUMNS: usize>(cases: u32) {
-    let cases = Cases { cases, rng_seed: RngSeed::Fixed(2003), failure_persistence: None, ..Cases::default() };
     let steps = prop::collection::vec((any_frame::<ROWS, COLUMNS>(), any_sense(), 0..6_u8), 1..8);
     let test = |steps: Vec<(Frame<ROWS, COLUMNS>, Sense, u8)>| {
         let config = config::<ROWS, COLUMNS>(&Params::DEFAULT);
@@ -292,7 +267,7 @@ fn takes_anything<const ROWS: usize, const COLUMNS: usize>(cases: u32) {
         }
         Ok(())
     };
-    proptest::test_runner::TestRunner::new(cases).run(&steps, test).expect("no panic");
+    proptest::test_runner::TestRunner::new(seeded(cases, 2003)).run(&steps, test).expect("no panic");
 }
 
 #[test]
@@ -338,7 +313,7 @@ fn stays_within<const ROWS: usize, const COLUMNS: usize>(poses: u32) {
     for _ in 0..poses / 500 {
         let (pitch_um, tip_radius_um) = (between(&mut rng, 500, 4_000), between(&mut rng, 4_000, 16_000));
         let params = Params { pitch_um, tip_radius_um, ..Params::DEFAULT };
-        let config = Shaped::<ROWS, COLUMNS>::new(&params, &fingertip::shipped::CLOCKS).expect("allowed parameters");
+        let config = config::<ROWS, COLUMNS>(&params);
         let geometry = &config.geometry;
         let peak = between(&mut rng, 16, 4_095 * 16 * i32::from(GAIN_MAX >> 14));
         let Some(scale) = PeakScale::new(peak, geometry) else { continue };
@@ -376,11 +351,10 @@ fn a_rows_sums_fit_wherever_the_contact_is_and_however_deep() {
     stays_within::<16, 16>(100_000);
 }
 
-/// The finest array under the largest tip, with a row just within the rim and the indentation followed away from the
-/// rim: all taxels of the row are as steep as may be.
+/// The finest array under the largest tip, a row just within the rim: all its taxels are as steep as may be.
 fn stays_within_along_the_rim<const ROWS: usize, const COLUMNS: usize>() {
     let params = Params { pitch_um: 500, tip_radius_um: 16_000, modulus_pa: 20_000, ..Params::DEFAULT };
-    let config = Shaped::<ROWS, COLUMNS>::new(&params, &fingertip::shipped::CLOCKS).expect("allowed parameters");
+    let config = config::<ROWS, COLUMNS>(&params);
     let (geometry, picture) = (&config.geometry, TactileImage::<ROWS, COLUMNS>::EMPTY);
     let scale = PeakScale::new(4_095 * 16, geometry).expect("a peak that is high enough");
     let pitch = geometry.pitch >> (SQUARE_BITS - CENTRE_BITS);

@@ -1,11 +1,9 @@
 //! Power lost at every word of a save and of an erase, twice in a row, from every state that the sectors may be in.
 
-use crate::{OTHERS, Other};
-use fingertip::params::Params;
-use fingertip::shipped::{Loaded, Record, TAXELS};
+use super::{OTHERS, Other};
+use crate::common::*;
+use fingertip::shipped::{Loaded, Record};
 use fingertip::store::{Flash, Journal, SLOT_BYTES, SaveError, Sector};
-use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 use sim::encode;
 
 /// Slots of a small sector.
@@ -41,10 +39,8 @@ fn cuts(done: &[Done], words: usize, few: usize, thorough: bool) -> Vec<Cut> {
             }
             Done::Erase => {
                 let rests = if thorough { &RESTS[..] } else { &RESTS[2..] };
-                for (place, &rest) in
-                    (0..=words).step_by(few).flat_map(|place| rests.iter().map(move |rest| (place, rest)))
-                {
-                    cuts.push(Cut { words: place, rest, ..cut });
+                for words in (0..=words).step_by(few) {
+                    cuts.extend(rests.iter().map(|&rest| Cut { words, rest, ..cut }));
                 }
             }
         }
@@ -65,8 +61,7 @@ fn ops(board: &Board) -> Vec<Done> {
     board.nor.done
 }
 
-/// Two power cuts in a row: the first at every operation, the second at one operation in `few` of the following start
-/// and save, at other ones each time.
+/// Cuts the power at every operation, and again at one operation in `few` of the next start and save, others each time.
 fn tear_twice(board: &Board, words: usize, few: usize) -> [usize; 2] {
     let (mut cases, mut alarms) = (0, 0);
     for first in cuts(&ops(board), words, 1, true) {
@@ -90,14 +85,18 @@ fn tear_twice(board: &Board, words: usize, few: usize) -> [usize; 2] {
 }
 
 #[test]
-fn a_save_torn_twice_leaves_the_old_or_the_new_values() {
+fn what_is_torn_twice_leaves_the_old_or_the_new_values() {
     tear_saves(24);
+    tear_erases(240);
+    tear_layouts(72);
 }
 
 #[test]
 #[ignore = "long: cargo xtask test --long"]
-fn long_a_save_torn_twice_leaves_the_old_or_the_new_values() {
+fn long_what_is_torn_twice_leaves_the_old_or_the_new_values() {
     tear_saves(4);
+    tear_erases(40);
+    tear_layouts(12);
 }
 
 fn tear_saves(few: usize) {
@@ -111,17 +110,6 @@ fn tear_saves(few: usize) {
     }
     println!("{sum} cases of a save torn twice");
     assert!(sum > 80_000 / few.min(40));
-}
-
-#[test]
-fn an_erase_torn_twice_leaves_the_old_or_the_new_values() {
-    tear_erases(240);
-}
-
-#[test]
-#[ignore = "long: cargo xtask test --long"]
-fn long_an_erase_torn_twice_leaves_the_old_or_the_new_values() {
-    tear_erases(40);
 }
 
 fn tear_erases(few: usize) {
@@ -141,17 +129,6 @@ fn tear_erases(few: usize) {
     }
     println!("{sum} cases of an erase and a save torn twice; {alarms} faults with nothing lost");
     assert!(sum > 80_000 / few.min(40));
-}
-
-#[test]
-fn a_changed_layout_torn_twice_leaves_the_old_or_the_new_values() {
-    tear_layouts(72);
-}
-
-#[test]
-#[ignore = "long: cargo xtask test --long"]
-fn long_a_changed_layout_torn_twice_leaves_the_old_or_the_new_values() {
-    tear_layouts(12);
 }
 
 fn tear_layouts(few: usize) {
@@ -186,20 +163,12 @@ fn tear_layouts(few: usize) {
 fn sectors_of_the_real_size_are_torn_too() {
     const SIZE: usize = 128 << 10;
     let slots = SIZE / SLOT_BYTES;
-    let fill = |count: usize, first: u32| {
-        let mut bytes: Vec<u8> =
-            (0..count as u32).flat_map(|place| encode(&record((first + place) as i32), first + place)).collect();
-        bytes.resize(SIZE, 0xFF);
-        bytes
-    };
     let mut cases = 0;
     // The newest is nearly full, then full, with the other one older.
     for count in [slots - 1, slots] {
-        let first = 1_000;
-        let board = Board::new(
-            Nor::new([fill(slots, first - slots as u32), fill(count, first)]),
-            Some(record((first as usize + count - 1) as i32)),
-        );
+        let (older, _) = sector(SIZE, slots, 1_000 - slots as i32, Other::None);
+        let (newer, newest) = sector(SIZE, count, 1_000, Other::None);
+        let board = Board::new(Nor::new([older, newer]), newest);
         let ops = ops(&board);
         assert!(ops.contains(&Done::Erase), "room for less than a quarter is made");
         for cut in cuts(&ops, SIZE / 4, 501, true) {
@@ -215,8 +184,7 @@ fn sectors_of_the_real_size_are_torn_too() {
     assert!(cases > 1_000);
 }
 
-/// Records with gains are longer than records without. Wherever power is cut, the next start loads one complete record,
-/// the old or the new one.
+/// Wherever power is cut, the next start loads one complete record with or without gains, the old or the new one.
 #[test]
 fn gains_torn_anywhere_are_the_old_ones_or_the_new_ones() {
     let size = 4 * Record::SLOT_MAX;
@@ -257,10 +225,8 @@ fn nobody_erases_the_newest_record_while_a_board_lives() {
         erases += board.nor.done.iter().filter(|done| **done == Done::Erase).count();
         assert_eq!(board.save(record(number)), Ok(()));
         let newest = encode(&record(number), number as u32 + 1);
-        let held = [Sector::A, Sector::B]
-            .iter()
-            .any(|&sector| board.nor.sector(sector).windows(SLOT_BYTES).step_by(16).any(|place| place == newest));
-        assert!(held);
+        let holds = |sector: &Vec<u8>| sector.windows(SLOT_BYTES).step_by(16).any(|place| place == newest);
+        assert!(board.nor.sectors.iter().any(holds));
     }
     println!("{erases} erases in 200 saves");
     assert!((30..=45).contains(&erases), "one in {SLOTS} saves");
@@ -286,9 +252,7 @@ fn step(words: usize) -> impl Strategy<Value = Step> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig {
-        cases: 2000, rng_seed: RngSeed::Fixed(22), failure_persistence: None, ..ProptestConfig::default()
-    })]
+    #![proptest_config(seeded(2000, 22))]
 
     #[test]
     fn a_board_has_the_old_values_or_the_new_ones(
@@ -341,10 +305,9 @@ proptest! {
     }
 }
 
-// Two sectors of flash that lose power, and the start and the save of a board on them.
-//
-// Programming only clears bits, of words that are blank; erasing sets all bits of a sector. A loss of power leaves of
-// the word that was programmed any of its bits undone, and of an erase any mixture: see [`Cut`].
+// Two sectors of flash that lose power, and the start and the save of a board on them. Programming only clears bits of
+// blank words, and a cut leaves any of them undone; erasing sets all bits of a sector, and a cut leaves any mixture:
+// see [`Cut`].
 
 /// A record that another pitch does not make.
 pub fn record(number: i32) -> Record {
@@ -530,8 +493,7 @@ impl Board {
         }
     }
 
-    /// Starts like the board and checks the result: the old or the new values, and a fault if the new ones were begun
-    /// but are missing.
+    /// Starts like the board: it has the old or the new values, and a fault if the new ones were begun but are missing.
     pub fn start(&mut self, cut: Option<Cut>) {
         self.nor.power_on(cut);
         self.journal = Journal::new(&self.nor);

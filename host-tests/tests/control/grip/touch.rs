@@ -2,8 +2,7 @@
 
 use super::*;
 
-/// A force that vanishes in one frame is implausible, as no object moves at metres per second: the loop keeps the
-/// earlier force and does not press harder.
+/// No object moves at metres per second: of a force that vanishes in a frame the loop keeps the earlier value.
 #[test]
 fn a_force_that_falls_by_a_quarter_in_a_frame_is_withheld() {
     let config = config();
@@ -24,6 +23,14 @@ fn a_force_that_falls_by_a_quarter_in_a_frame_is_withheld() {
     }
 }
 
+/// Expects that this much force is withheld after these frames. Returns the stage of the touch.
+fn withholds(mut hand: Hand, frames: impl Iterator<Item = Contact>, travel: Millimetres, withheld_mn: i32) -> Stage {
+    frames.for_each(|seen| _ = hand.frame(1_000, &seen, at(travel), &config()));
+    let withheld_n: f64 = hand.touch.withheld().0.to_num();
+    assert!((1e3 * withheld_n - f64::from(withheld_mn)).abs() < 0.1, "{withheld_n} N, not {withheld_mn} mN");
+    hand.touch.stage()
+}
+
 /// The lesser of the last two frames counts: interference that adds to one frame leaves no step behind.
 #[test]
 fn a_frame_that_reads_too_much_is_no_reference() {
@@ -39,13 +46,8 @@ fn a_frame_that_reads_too_much_is_no_reference() {
         (&[5_000, 1_000, 700], 300),
         (&[5_000, 1_000, 720], 0),
     ] {
-        let mut hand = hand;
-        for force_mn in frames_mn {
-            hand.frame(1_000, &contact(*force_mn, &config), at(travel), &config);
-        }
-        let withheld_n: f64 = hand.touch.withheld().0.to_num();
-        assert!((1e3 * withheld_n - f64::from(withheld_mn)).abs() < 0.1, "{frames_mn:?} mN: {withheld_n} N");
-        assert_eq!(hand.touch.stage(), Stage::Held, "{frames_mn:?} mN");
+        let frames = frames_mn.iter().map(|force_mn| contact(*force_mn, &config));
+        assert_eq!(withholds(hand, frames, travel, withheld_mn), Stage::Held, "{frames_mn:?} mN");
     }
     // One frame of a contact is no reference either.
     let mut hand = Hand::free(&config);
@@ -59,7 +61,6 @@ fn a_frame_that_reads_too_much_is_no_reference() {
 fn a_step_with_other_bad_taxels_is_not_withheld() {
     let config = config();
     let (hand, _, travel) = Hand::pressing(&config);
-    let seen = |force_mn, bad_taxels| Contact { bad_taxels, ..contact(force_mn, &config) };
     for (frames, withheld_mn) in [
         (&[(500, 1)][..], 0),
         (&[(500, 1), (500, 1), (500, 1)], 0),
@@ -68,12 +69,9 @@ fn a_step_with_other_bad_taxels_is_not_withheld() {
         (&[(500, 1), (200, 2)], 0),
         (&[(500, 0)], 500),
     ] {
-        let mut hand = hand;
-        for (force_mn, bad_taxels) in frames {
-            hand.frame(1_000, &seen(*force_mn, *bad_taxels), at(travel), &config);
-        }
-        let withheld_n: f64 = hand.touch.withheld().0.to_num();
-        assert!((1e3 * withheld_n - f64::from(withheld_mn)).abs() < 0.1, "{frames:?}: {withheld_n} N");
+        let seen =
+            |(force_mn, bad_taxels): &(i32, u8)| Contact { bad_taxels: *bad_taxels, ..contact(*force_mn, &config) };
+        withholds(hand, frames.iter().map(seen), travel, withheld_mn);
     }
 }
 
@@ -90,8 +88,7 @@ fn a_step_in_a_slow_frame_is_not_withheld() {
     }
 }
 
-/// A doubtful touch whose force rises above its least by that of a contact is held again. It keeps its place and its
-/// largest force until the force rises further, and lasts for longer than noise.
+/// A doubtful touch is held again from a rise by a contact's force. It keeps place and peak until a further rise.
 #[test]
 fn a_force_that_returns_is_held_again() {
     let config = config();
@@ -128,8 +125,8 @@ fn a_force_that_returns_is_held_again() {
     }
 }
 
-/// After a step, up to a quarter of the largest force counts as a residue, and the touch becomes doubtful. It is held again
-/// only above the least force that was read since then.
+/// After a step, up to a quarter of the largest force counts as a residue, and the touch becomes doubtful. It is held
+/// again only above the least force that was read since then.
 #[test]
 fn a_residue_after_a_step_is_doubtful_until_the_force_rises() {
     let config = config();
@@ -139,12 +136,10 @@ fn a_residue_after_a_step_is_doubtful_until_the_force_rises() {
             hand.frame(1_000, &contact(force_mn, &config), at(travel), &config);
         }
     };
-    for (left_mn, stage) in
-        [(0, Stage::Doubtful), (14, Stage::Doubtful), (249, Stage::Doubtful), (251, Stage::Held), (600, Stage::Held)]
-    {
+    for (left_mn, doubtful) in [(0, true), (14, true), (249, true), (251, false), (600, false)] {
         let mut hand = pressing;
         frames(&mut hand, 4_000_000, left_mn);
-        assert_eq!(hand.touch.stage(), stage, "{left_mn} mN");
+        assert_eq!(hand.touch.stage(), if doubtful { Stage::Doubtful } else { Stage::Held }, "{left_mn} mN");
     }
     let mut hand = pressing;
     frames(&mut hand, 4_000_000, 200);
@@ -249,7 +244,7 @@ fn a_release_never_goes_forward_and_without_a_touch_nowhere() {
     assert_eq!(got.0.speed, MillimetresPerSecond::ZERO, "no surface is known");
 }
 
-/// The force that was there before torque may be a residue: it gets a place once it is exceeded, and its release is slow.
+/// The force that was there before torque may be a residue: it gets a place once it is exceeded; its release is slow.
 #[test]
 fn a_touch_from_before_torque_has_no_place_until_its_force_rises() {
     let config = config();
@@ -270,8 +265,7 @@ fn a_touch_from_before_torque_has_no_place_until_its_force_rises() {
         assert_eq!(hand.touch.surface(), Some(minus(mm(3.0), more.indentation)));
         let mut released = hand;
         assert!(!is_fast(released.frame(0, &more, at(mm(3.0)), &config).0));
-        // Above it by the force of a contact: from here on the surface stays. What this force presses deeper than the
-        // last one does not move it back.
+        // Above it by the force of a contact the surface stays, however much deeper this force presses.
         let surface = hand.touch.surface();
         for travel_mm in [3.0, 3.1] {
             hand.frame(7_000, &contact(force_mn + 41, &config), at(mm(travel_mm)), &config);
@@ -347,7 +341,6 @@ fn a_release_moves_back_while_the_force_falls() {
     }
 }
 
-/// A residue from before torque does not make the tip go back for ever.
 #[test]
 fn a_residue_from_before_torque_does_not_move_the_place_of_rest_for_ever() {
     let config = config();

@@ -6,16 +6,14 @@ mod recover;
 mod several;
 mod table;
 
-use crate::bench::{Bench, ID, answer, hex, packet, receive};
+use self::bench::{Bench, ID, answer, hex, packet, receive};
+use crate::common::*;
 use dynamixel2::instructions::{FactoryResetKind, SyncWriteData};
 use dynamixel2::serial2::SerialPort;
 use dynamixel2::{Bus, MotorError, ReadError, TransferError};
 use fingertip::link::Actions;
 use fingertip::link::packet::{CRC_START, Event, LENGTH_MAX, Receiver, update_crc};
 use fingertip::shipped::{REGISTERS, address};
-use fingertip::state::Fault;
-use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 
 // Packets on the wire: the examples that the protocol's manual prints, stuffing, and any slicing of any bytes.
 
@@ -97,9 +95,7 @@ fn impossible_ids_and_lengths_are_no_packets() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig {
-        cases: 2000, rng_seed: RngSeed::Fixed(20), failure_persistence: None, ..ProptestConfig::default()
-    })]
+    #![proptest_config(seeded(2000, 20))]
 
     #[test]
     fn what_is_sent_is_received(
@@ -223,9 +219,7 @@ fn any_packet() -> impl Strategy<Value = Vec<u8>> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig {
-        cases: 3000, rng_seed: RngSeed::Fixed(21), failure_persistence: None, ..ProptestConfig::default()
-    })]
+    #![proptest_config(seeded(3000, 21))]
 
     #[test]
     fn any_packets_keep_the_settings_sound(packets in prop::collection::vec(any_packet(), 1..30), slice in 1..40usize) {

@@ -3,45 +3,23 @@
 mod interrupted;
 mod series;
 
-use crate::series::{Record, decode};
-use fingertip::capture::{Capture, CaptureState, Ended as CaptureEnded};
-use fingertip::config::newtons;
-use fingertip::contact::Contact;
-use fingertip::control::SpeedLoop;
+use self::series::decode;
+use crate::common::*;
+use fingertip::capture::Ended as CaptureEnded;
 use fingertip::measure::press::{HOLDS_MS, PARTS, Press, PressInputs, ROWS_MAX, Step};
-use fingertip::measure::{Ended, MeasureState, MeasureStatus, Task};
-use fingertip::params::Params;
-use fingertip::pipeline::Status;
-use fingertip::shipped::{COLUMNS, Config, ROWS, TARE_FRAMES, TactileImage};
-use fingertip::units::Celsius;
-use host_tests::finger::config;
-use images::record::Record as Given;
-use sim::native::bench::Bench;
-use sim::setup::Setup;
+use fingertip::measure::{BuiltIn, MeasureStatus};
 
-// A finger whose motions are recorded as on the board.
-
-struct Finger<const BYTES: usize = { 44 << 10 }> {
-    bench: Bench,
-    capture: Box<Capture<ROWS, COLUMNS, BYTES>>,
-}
-
-fn params() -> Params {
-    Params { direction_confirmed: 1, ..Params::DEFAULT }
-}
-
-impl<const BYTES: usize> Finger<BYTES> {
+impl<const BYTES: usize> Recorded<BYTES> {
     /// 5 mm from the wall, not tared.
-    fn with(params: &Params) -> Self {
-        let config = Config::shipped(params).expect("allowed");
-        Self { bench: Bench::of(&Setup::default(), &config), capture: Box::new(Capture::NEW) }
+    fn untared() -> Self {
+        Self::of(&Setup::default(), &config())
     }
 
     /// Tared, torque off.
     fn tared() -> Self {
-        let mut finger = Self::with(&params());
+        let mut finger = Self::untared();
         finger.bench.command().tare_request += 1;
-        (0..TARE_FRAMES + 2).for_each(|_| _ = finger.frame());
+        finger.frames(TARE_FRAMES + 2);
         finger
     }
 
@@ -54,52 +32,20 @@ impl<const BYTES: usize> Finger<BYTES> {
 
     fn begin(&mut self, task: Task) {
         self.bench.command().torque = task == Task::Press;
-        for _ in 0..3_000 {
-            self.frame();
-        }
+        self.frames(3_000);
         self.bench.request(task);
-        let status = self.frame();
-        assert_eq!(
-            (status.measure.task, status.measure.state),
-            (task, fingertip::measure::MeasureState::Running),
-            "{status:?}"
-        );
-    }
-
-    fn frame(&mut self) -> Status {
-        self.frame_with(|_| {})
-    }
-
-    /// Steps a frame like the board, with changed inputs to the core.
-    fn frame_with(&mut self, change: impl FnOnce(&mut Given)) -> Status {
-        let Self { bench, capture } = self;
-        let due = capture.is_due(bench.status(), &bench.record().command);
-        if due {
-            capture.begin(bench.pipeline());
-        }
-        let mut given = bench.record();
-        let status = bench.step_with(|record| {
-            change(record);
-            given = *record;
-        });
-        capture.record(&given.frame, &given.sense, &given.command, &status);
-        capture.follow(bench.pipeline());
-        status
+        let MeasureStatus { task: begun, state, .. } = self.frame().measure;
+        assert_eq!((begun, state), (task, MeasureState::Running));
     }
 
     /// Steps until the motion ends; its last frame.
     fn ends(&mut self) -> Status {
-        for _ in 0..400_000 {
-            let status = self.frame();
-            if status.measure.state != fingertip::measure::MeasureState::Running {
-                return status;
-            }
-        }
-        panic!("no end: {:?}", self.bench.status());
+        let status = (0..400_000).map(|_| self.frame()).find(|status| status.measure.state != MeasureState::Running);
+        status.expect("an end")
     }
 
     /// The record, which must be closed.
-    fn record(&self) -> Record {
+    fn record(&self) -> series::Record {
         assert_eq!(self.capture.standing().state, CaptureState::Done);
         decode(self.capture.data())
     }
@@ -111,10 +57,8 @@ impl<const BYTES: usize> Finger<BYTES> {
         if task != Task::Jog {
             let record = self.record();
             assert_eq!((record.ended, record.value), (ended as u8, measure.value));
-            assert_eq!(
-                (record.kind, record.rows),
-                (if task == Task::Press { 1 } else { 2 }, self.capture.standing().frames)
-            );
+            let kind = if task == Task::Press { 1 } else { 2 };
+            assert_eq!((record.kind, record.rows), (kind, self.capture.standing().frames));
         }
     }
 }
@@ -123,7 +67,7 @@ impl<const BYTES: usize> Finger<BYTES> {
 
 #[test]
 fn a_press_is_recorded_whole() {
-    let mut finger = Finger::<{ 44 << 10 }>::begun(Task::Press);
+    let mut finger = Recorded::<CAPTURE_BYTES>::begun(Task::Press);
     finger.ends();
     finger.assert_ended(Task::Press, Ended::Complete);
     let record = finger.record();
@@ -131,15 +75,12 @@ fn a_press_is_recorded_whole() {
     // In and back twice, and a hold without motion.
     let turns = record.steps.windows(2).filter(|pair| pair[0].back != pair[1].back).count();
     assert_eq!(turns, 3);
-    let held = record
-        .steps
-        .windows(2)
-        .filter(|pair| {
-            pair[1].counts[0].abs_diff(pair[0].counts[1]) < 20
-                && !pair[1].back
-                && pair[1].counts[0].abs_diff(pair[1].counts[1]) < 20
-        })
-        .count();
+    let rests = |a: i32, b: i32| a.abs_diff(b) < 20;
+    let held = record.steps.windows(2).filter(|pair| {
+        let [begin, end] = pair[1].counts;
+        !pair[1].back && rests(begin, pair[0].counts[1]) && rests(begin, end)
+    });
+    let held = held.count();
     assert!(held + 1 >= HOLDS_MS.len(), "{held} rows of a hold");
     for pair in record.steps.windows(2) {
         // Those in which the step before is handed over are left out.
@@ -151,7 +92,7 @@ fn a_press_is_recorded_whole() {
 
 #[test]
 fn strokes_are_recorded_whole() {
-    let mut finger = Finger::<{ 44 << 10 }>::begun(Task::Strokes);
+    let mut finger = Recorded::<CAPTURE_BYTES>::begun(Task::Strokes);
     finger.ends();
     finger.assert_ended(Task::Strokes, Ended::Complete);
     let record = finger.record();
@@ -163,7 +104,7 @@ fn strokes_are_recorded_whole() {
 /// Rows that fit are stored, then the record is closed as full; the motion continues.
 #[test]
 fn a_memory_that_is_full_keeps_what_it_has() {
-    let mut finger = Finger::<{ 2 << 10 }>::begun(Task::Press);
+    let mut finger = Recorded::<{ 2 << 10 }>::begun(Task::Press);
     assert_eq!(finger.ends().measure.state, MeasureState::Done);
     let (record, standing) = (finger.record(), finger.capture.standing());
     assert_eq!((record.ended, record.value, record.rows), (Ended::Full as u8, 5, 5));
@@ -173,20 +114,20 @@ fn a_memory_that_is_full_keeps_what_it_has() {
 /// Armed: the motion takes the memory. Recording: the frames keep it, and the motion has no record.
 #[test]
 fn a_capture_and_a_motion_share_the_memory() {
-    let mut finger = Finger::<{ 44 << 10 }>::tared();
+    let mut finger = Recorded::<CAPTURE_BYTES>::tared();
     finger.capture.arm();
     finger.begin(Task::Press);
     finger.capture.arm();
     finger.ends();
     finger.assert_ended(Task::Press, Ended::Complete);
 
-    let mut finger = Finger::<{ 44 << 10 }>::tared();
+    let mut finger = Recorded::<CAPTURE_BYTES>::tared();
     finger.capture.arm();
     finger.bench.command().tare_request += 1;
-    (0..330).for_each(|_| _ = finger.frame());
+    finger.frames(330);
     assert_eq!(finger.capture.standing().state, CaptureState::Recording);
     finger.bench.request(Task::Strokes);
-    (0..5).for_each(|_| _ = finger.frame());
+    finger.frames(5);
     assert_eq!(finger.bench.status().measure.state, MeasureState::Running);
     finger.capture.end(CaptureEnded::Asked);
     assert_eq!(finger.capture.data()[..3], *b"FTC");
@@ -210,7 +151,7 @@ fn a_press_has_no_more_rows_than_stated() {
         let (mut step, mut picture) = (Step::<ROWS, COLUMNS>::NONE, TactileImage::EMPTY);
         let mut contact = Contact::default();
         motion.observe(0, &config);
-        let mut press = Press::begin(&motion, fingertip::measure::BuiltIn::PROOF.expect("it is built in"));
+        let mut press = Press::begin(&motion, BuiltIn::PROOF.expect("it is built in"));
         let (mut encoder, mut rows, mut sequence) = (0_i32, 0, 0_u32);
         let stride = [3, 60, 600, 40_000][random.usize(0..4)];
         while press.running() && sequence < 40_000 {
@@ -225,15 +166,9 @@ fn a_press_has_no_more_rows_than_stated() {
             encoder = encoder.wrapping_add(random.i32(-stride..=stride));
             motion.observe(encoder, &config);
             let chip = random.bool().then(|| Celsius::from_bits(random.i32(..)));
-            let view = PressInputs {
-                sequence,
-                picture: &picture,
-                contact: &contact,
-                encoder,
-                motion: &motion,
-                applied_mv: random.i32(-20_000..20_000),
-                chip,
-            };
+            let (picture, contact, motion) = (&picture, &contact, &motion);
+            let applied_mv = random.i32(-20_000..20_000);
+            let view = PressInputs { sequence, picture, contact, encoder, motion, applied_mv, chip };
             press.observe(&view, &mut step, &mut standing, &config);
             rows += usize::from(press.part() == Some(0));
         }
@@ -244,14 +179,13 @@ fn a_press_has_no_more_rows_than_stated() {
     assert!(most > ROWS_MAX / 2, "{most} rows at most: the inputs show nothing");
 }
 
-/// Arbitrary codes, counts and supplies during a motion.
 #[test]
 fn a_motion_takes_anything_and_closes_its_record() {
     for seed in 0..60 {
         let mut random = fastrand::Rng::with_seed(seed);
         let task = [Task::Jog, Task::Strokes, Task::Press][seed as usize % 3];
-        let mut finger = Finger::<{ 44 << 10 }>::begun(task);
-        (0..random.u32(0..30_000)).for_each(|_| _ = finger.frame());
+        let mut finger = Recorded::<CAPTURE_BYTES>::begun(task);
+        finger.frames(random.u32(0..30_000));
         let odd = random.u32(2..200);
         for _ in 0..3_000 {
             finger.frame_with(|record| {

@@ -4,18 +4,12 @@
 
 mod steps;
 
-use fingertip::command::Command;
+use crate::common::*;
 use fingertip::config::{ConfigError, Gains};
-use fingertip::frame::Sense;
-use fingertip::params::Params;
-use fingertip::shipped::{COLUMNS, Config, Frame, ROWS, SLOTS};
-use fingertip::units::Newtons;
-use proptest::prelude::*;
-use proptest::test_runner::{Config as Cases, RngSeed};
 
 /// The same cases on every run.
-fn fixed(cases: u32) -> Cases {
-    Cases { cases, rng_seed: RngSeed::Fixed(20_030_914), failure_persistence: None, ..Cases::default() }
+fn fixed(cases: u32) -> ProptestConfig {
+    seeded(cases, 20_030_914)
 }
 
 // What a step may be given: frames, senses and commands, likely ones and any others.
@@ -34,9 +28,9 @@ enum Codes {
     /// All alike.
     Flat(u16),
     /// Two codes in turns.
-    Checkerboard(u16, u16),
+    Checkerboard([u16; 2]),
     /// Two codes, alternating by row, as from a scan out of step.
-    Stripes(u16, u16),
+    Stripes([u16; 2]),
     /// Anything.
     Noise(u64),
 }
@@ -56,20 +50,8 @@ impl Codes {
                         if (slot, column) == (odd_slot, odd_column) { code } else { sound }
                     }
                     Self::Flat(code) => code,
-                    Self::Checkerboard(even, odd) => {
-                        if (slot + column) % 2 == 0 {
-                            even
-                        } else {
-                            odd
-                        }
-                    }
-                    Self::Stripes(even, odd) => {
-                        if slot % 2 == 0 {
-                            even
-                        } else {
-                            odd
-                        }
-                    }
+                    Self::Checkerboard(codes) => codes[(slot + column) % 2],
+                    Self::Stripes(codes) => codes[slot % 2],
                     Self::Noise(_) => random.u16(..),
                 };
             frame.set_code(slot, column, code);
@@ -91,55 +73,38 @@ struct Input {
     /// Sequence numbers left out.
     missed: u32,
     turn: Turn,
-    supply_mv: u16,
-    bus_silent_ms: u16,
-    bridge_fault: bool,
-    torque: bool,
-    goal_bits: i32,
-    bus_watchdog_ms: u16,
-    /// Added to the numbers of the requests: tare, clear, measure.
-    requests: [u8; 3],
-}
-
-/// The arguments of a step.
-#[derive(Clone, Debug)]
-struct Arguments {
-    frame: Frame,
+    /// What is sensed besides the encoder.
     sense: Sense,
+    /// The command, where the numbers of the requests are added to those before.
     command: Command,
 }
 
-impl Arguments {
-    fn new() -> Self {
-        let mut frame = Frame::EMPTY;
-        Codes::Contact { row: 0, column: 0, codes: 0 }.fill(&mut frame);
-        let sense = Sense { supply_mv: 6_000, ..Sense::default() };
-        Self { frame, sense, command: Command::default() }
-    }
+/// The arguments of the first step.
+fn at_rest() -> Record {
+    let mut frame = Frame::EMPTY;
+    Codes::Contact { row: 0, column: 0, codes: 0 }.fill(&mut frame);
+    Record { frame, sense: Sense { supply_mv: 6_000, ..Sense::default() }, command: Command::default() }
+}
 
-    fn next(&mut self, input: &Input) {
-        input.codes.fill(&mut self.frame);
-        self.frame.sequence = self.frame.sequence.wrapping_add(1).wrapping_add(input.missed);
-        let sense = &mut self.sense;
-        sense.encoder = match input.turn {
-            Turn::By(counts) => sense.encoder.wrapping_add(counts),
-            Turn::To(count) => count,
-        };
-        sense.supply_mv = input.supply_mv;
-        sense.bus_silent_ms = input.bus_silent_ms;
-        sense.bridge_fault = input.bridge_fault;
-        let command = &mut self.command;
-        command.torque = input.torque;
-        command.goal = Newtons::from_bits(input.goal_bits);
-        command.bus_watchdog_ms = input.bus_watchdog_ms;
-        let [tare, clear, measure] = input.requests;
-        command.tare_request = command.tare_request.wrapping_add(tare);
+/// The arguments of the next step.
+fn next(Record { frame, sense, command }: &mut Record, input: &Input) {
+    input.codes.fill(frame);
+    frame.sequence = frame.sequence.wrapping_add(1).wrapping_add(input.missed);
+    let encoder = match input.turn {
+        Turn::By(counts) => sense.encoder.wrapping_add(counts),
+        Turn::To(count) => count,
+    };
+    *sense = Sense { encoder, ..input.sense };
+    let tare_request = command.tare_request.wrapping_add(input.command.tare_request);
+    *command = Command {
+        tare_request,
         // One of four tares is forced.
-        command.tare_forced = command.tare_request.is_multiple_of(4);
-        command.clear_request = command.clear_request.wrapping_add(clear);
+        tare_forced: tare_request.is_multiple_of(4),
+        clear_request: command.clear_request.wrapping_add(input.command.clear_request),
         // Its lowest bits name a task.
-        command.measure_request = command.measure_request.wrapping_add(measure);
-    }
+        measure_request: command.measure_request.wrapping_add(input.command.measure_request),
+        ..input.command
+    };
 }
 
 fn code() -> impl Strategy<Value = u16> {
@@ -152,8 +117,8 @@ fn codes() -> impl Strategy<Value = Codes> {
             .prop_map(|(row, column, codes)| Codes::Contact { row, column, codes }),
         3 => (0..SLOTS, 0..COLUMNS, code()).prop_map(|(slot, column, code)| Codes::Odd { slot, column, code }),
         1 => code().prop_map(Codes::Flat),
-        1 => (code(), code()).prop_map(|(even, odd)| Codes::Checkerboard(even, odd)),
-        1 => (code(), code()).prop_map(|(even, odd)| Codes::Stripes(even, odd)),
+        1 => [code(), code()].prop_map(Codes::Checkerboard),
+        1 => [code(), code()].prop_map(Codes::Stripes),
         1 => any::<u64>().prop_map(Codes::Noise),
     ]
 }
@@ -168,16 +133,10 @@ fn turn() -> impl Strategy<Value = Turn> {
     ]
 }
 
+/// Numbers added to those of the requests: tare, clear, measure.
 fn requests() -> impl Strategy<Value = [u8; 3]> {
-    [
-        // Each takes the motor away for many frames.
-        prop_oneof![400 => Just(0), 1 => any::<u8>()],
-        prop_oneof![5 => Just(0), 1 => any::<u8>()],
-        prop_oneof![
-            10 => Just(0),
-            1 => any::<u8>()
-        ],
-    ]
+    // A tare takes the motor away for many frames.
+    [400, 5, 10].map(|none| prop_oneof![none => Just(0), 1 => any::<u8>()])
 }
 
 /// Any input; sound ones more often, so that the loop also gets somewhere.
@@ -197,19 +156,11 @@ fn any_input() -> impl Strategy<Value = Input> {
     let missed = prop_oneof![20 => Just(0), 1 => any::<u32>()];
     (codes(), missed, sense, command).prop_map(
         |(codes, missed, (turn, supply_mv, bus_silent_ms, bridge_fault), command)| {
-            let (torque, goal_bits, bus_watchdog_ms, requests) = command;
-            Input {
-                codes,
-                missed,
-                turn,
-                supply_mv,
-                bus_silent_ms,
-                bridge_fault,
-                torque,
-                goal_bits,
-                bus_watchdog_ms,
-                requests,
-            }
+            let (torque, goal_bits, bus_watchdog_ms, [tare_request, clear_request, measure_request]) = command;
+            let requests = Command { tare_request, clear_request, measure_request, ..Command::default() };
+            let command = Command { torque, goal: Newtons::from_bits(goal_bits), bus_watchdog_ms, ..requests };
+            let sense = Sense { supply_mv, bus_silent_ms, bridge_fault, ..Sense::default() };
+            Input { codes, missed, turn, sense, command }
         },
     )
 }
@@ -218,10 +169,8 @@ fn any_input() -> impl Strategy<Value = Input> {
 fn any_inputs(most: usize) -> impl Strategy<Value = Vec<Input>> {
     // Held inputs let the integrators run up; changing ones jerk them.
     let held = (any_input(), 1..400_usize).prop_map(|(input, times)| vec![input; times]);
-    prop_oneof![
-        prop::collection::vec(any_input(), 1..most),
-        prop::collection::vec(held, 1..6).prop_map(|runs| runs.concat()),
-    ]
+    let runs = prop::collection::vec(held, 1..6);
+    prop_oneof![prop::collection::vec(any_input(), 1..most), runs.prop_map(|runs| runs.concat())]
 }
 
 // Parameters at and between the ends of their ranges, and the configurations they make.
@@ -289,9 +238,7 @@ fn place() -> impl Strategy<Value = Place> {
     prop_oneof![Just(Place::Least), Just(Place::Largest), Just(Place::Default), (0.0..=1.0).prop_map(Place::Between),]
 }
 
-/// Any valid parameters, with the limits of the ranges more often than values in between.
-///
-/// The direction is confirmed in nine of ten, because nothing drives the motor otherwise.
+/// Valid parameters, more often at the ends of their ranges; the direction is confirmed in nine of ten.
 fn any_params() -> impl Strategy<Value = Params> {
     let params = prop_oneof![
         1 => Just(Params::DEFAULT),
@@ -304,9 +251,10 @@ fn any_params() -> impl Strategy<Value = Params> {
 
 /// Configuration, after checks of the properties that the loop's arithmetic needs.
 fn config(params: &Params) -> Config {
-    let config = Config::shipped(params).expect("allowed");
+    let config = allowed(*params);
     let positive = [config.mm_per_count_q40, config.newtons_per_sum_q48, config.pascals_per_sum_q32];
     assert!(positive.iter().all(|value| (1..1 << 61).contains(value)), "{config:?}");
+    assert!(config.force_seen > Newtons::ZERO && config.force_seen <= config.tip.force_max(), "{config:?}");
     // Room for the rounding of its quotient; a motor too weak for the acceleration's resolution is not driven.
     assert!((1..u32::MAX - 65_535).contains(&config.duty_gain) || config.voltage_max_q8_mm_per_s2 == 0, "{config:?}");
     let positive = [config.frame_s_q37, config.counts_max, config.calm_band.to_bits(), config.bounds.leak];
@@ -318,13 +266,8 @@ fn config(params: &Params) -> Config {
     // Below the limit of their type: they were not clamped.
     assert!(positive.into_iter().chain(gains).all(|value| (1..i32::MAX).contains(&value)), "{config:?}");
     // 0 where the motor is too weak for the acceleration's resolution: then it is not driven.
-    let limits = [
-        config.voltage_max_q8_mm_per_s2,
-        config.current_max_q8_mm_per_s2,
-        config.slew_max_q8_mm_per_s2,
-        config.damping_q17_per_s,
-    ];
-    assert!(limits.iter().all(|value| *value >= 0), "{config:?}");
+    assert!(config.voltage_max_q8_mm_per_s2 >= 0 && config.current_max_q8_mm_per_s2 >= 0, "{config:?}");
+    assert!(config.slew_max_q8_mm_per_s2 >= 0 && config.damping_q17_per_s >= 0, "{config:?}");
     config
 }
 
@@ -343,7 +286,7 @@ fn every_corner_of_the_parameters_makes_a_configuration() {
 }
 
 proptest! {
-    #![proptest_config(crate::fixed(4_000))]
+    #![proptest_config(self::fixed(4_000))]
 
     #[test]
     fn any_allowed_parameters_make_a_configuration(params in any_params()) {

@@ -1,34 +1,20 @@
-//! Arrays of other shapes than the shipped one, through the whole core: closed loops, and the worst that a frame can
-//! bring.
+//! Arrays of other shapes through the whole core: closed loops, and the worst that a frame can bring.
 
 mod drawn;
 mod rates;
 mod worst;
 
-use fingertip::command::Command;
-use fingertip::config::{Shaped, newtons};
-use fingertip::contact::FitLevel;
-use fingertip::frame::{Frame, Sense, Shape};
-use fingertip::params::Params;
-use fingertip::pipeline::{Pipeline, Status};
-use fingertip::scan::Clocks;
-use fingertip::shipped::CLOCKS;
-use fingertip::state::Mode;
-use fingertip::units::CoreCycles;
+use crate::common::*;
+use fingertip::config::Shaped;
+use fingertip::frame::{Frame, Shape};
+use fingertip::pipeline::Pipeline;
 use images::record::Digest;
 use sim::bridge::Bridge;
 use sim::mechanics::pressures::Cell;
 use sim::mechanics::rotor::{Dynamics, Shaft, Source};
 use sim::native::DUTY_DELAY_SLOTS;
-use sim::setup::Setup;
 
-// A finger with an array of any shape: an ideal hemisphere on a plane by the paper's model, the reference front end
-// and motor.
-
-/// A draw with mean 0 and deviation 1: twelve uniform ones.
-fn normal(random: &mut fastrand::Rng) -> f64 {
-    (0..12).map(|_| random.f64()).sum::<f64>() - 6.0
-}
+// A finger with an array of any shape: a hemisphere on a plane by the paper's model, the reference front end and motor.
 
 /// The finger with its controller.
 struct Finger<const ROWS: usize, const COLUMNS: usize> {
@@ -153,12 +139,10 @@ impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
         let turns = self.shaft.angle_rad / core::f64::consts::TAU;
         let encoder = (turns * self.setup.motor.encoder_counts_per_turn).floor() as i32;
         let supply_mv = (self.setup.supply.source_v * 1e3) as u16;
-        let sense =
-            Sense { encoder, supply_mv, bus_silent_ms: 0, bridge_fault: false, chip: None, answer: CoreCycles(0) };
+        let sense = Sense { encoder, supply_mv, ..Sense::default() };
         let (duty, status) = self.pipeline.step(&self.frame, &sense, &self.command);
-        let status = *status;
-        self.digest.add(duty, &status);
-        status
+        self.digest.add(duty, status);
+        *status
     }
 
     /// Runs for the given time, s, and returns the last status.
@@ -179,9 +163,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
     fn hold(&mut self, goal_mn: i32, seconds: f64) -> ([f64; 2], Status) {
         self.command.goal = newtons(goal_mn);
         self.run(seconds - 0.05);
-        let end = 0.05 / self.frame_s();
         let mut forces = [f64::INFINITY, 0.0_f64];
-        for _ in 0..end as u32 {
+        for _ in 0..(0.05 / self.frame_s()) as u32 {
             self.step();
             forces = [forces[0].min(self.force_n()), forces[1].max(self.force_n())];
         }
@@ -238,42 +221,17 @@ fn holds<const ROWS: usize, const COLUMNS: usize>(pitch_um: i32) {
 }
 
 #[test]
-fn three_by_three() {
+fn an_array_of_any_shape_holds_a_force() {
     holds::<3, 3>(4_000);
-}
-
-#[test]
-fn three_by_five() {
     holds::<3, 5>(4_000);
-}
-
-#[test]
-fn four_by_four() {
     holds::<4, 4>(3_500);
-}
-
-#[test]
-fn eight_by_eight() {
     holds::<8, 8>(1_750);
-}
-
-#[test]
-fn ten_by_ten() {
     holds::<10, 10>(1_500);
-}
-
-#[test]
-fn sixteen_by_sixteen() {
     holds::<16, 16>(900);
-}
-
-#[test]
-fn sixteen_by_thirty_two() {
     holds::<16, 32>(900);
 }
 
-/// A contact partly off the array: the sum over the array is too low, and the fit must estimate the rest. Returns the
-/// share of the force that is off the array.
+/// The sum is too low for a contact partly off the array: the fit estimates the rest. Returns the share that is off.
 fn over_the_edge<const ROWS: usize, const COLUMNS: usize>(
     pitch_um: i32,
     centre_mm: [f64; 2],

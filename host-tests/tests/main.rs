@@ -1,0 +1,49 @@
+//! Tests of the core as one program: it is linked once, and both cores of this machine have work until the end. One
+//! file of them: `cargo test -p host-tests --test all winding::`.
+
+mod bad_input;
+mod baseline_touched;
+mod bridge;
+mod budget;
+mod calibration;
+mod capture;
+mod common;
+mod control;
+mod doubt;
+mod faults;
+mod fit;
+mod fit_levels;
+mod force_loop;
+mod frame_pass;
+mod guard;
+mod guard_limits;
+mod let_go;
+mod link;
+mod long_run;
+mod measure;
+mod model_hard_cases;
+mod model_properties;
+mod monitor;
+mod order;
+mod pages;
+mod pipeline_properties;
+mod requests;
+mod same_bits;
+mod sensing;
+mod shapes;
+mod store;
+mod temperature;
+mod warnings;
+mod winding;
+
+/// A file that is not in the list above would never be compiled.
+#[test]
+fn every_file_is_taken() {
+    let folder = std::path::Path::new(env!("FINGERTIP_ROOT")).join("host-tests/tests");
+    for entry in folder.read_dir().expect("the sources are there") {
+        let path = entry.expect("an entry").path();
+        let name = path.file_stem().expect("its name").display().to_string();
+        let taken = include_str!("main.rs").contains(&format!("\nmod {name};\n"));
+        assert!(taken || ["main", "qemu"].contains(&name.as_str()), "{name}");
+    }
+}

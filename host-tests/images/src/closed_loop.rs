@@ -13,11 +13,11 @@ use fingertip::pipeline::{Pipeline, Taring};
 use fingertip::shipped::CLOCKS;
 use fingertip::units::{Duty, Millimetres};
 
-/// Frames of a run: 1 s at 10 kHz.
+/// Frames of a run.
 pub const FRAMES: u32 = 10_000;
 /// Distance from the tip to the plate.
 const PLATE_MM: i64 = 1;
-/// Travel per millimetre. At 10 kHz a speed in nm/s is a travel per frame in this unit.
+/// Travel per millimetre. A speed in nm/s, kept for 100 us, is a travel in this unit.
 const TRAVEL_PER_MM: i64 = 10_000_000_000;
 
 /// Results of a run.
@@ -44,7 +44,8 @@ pub fn run<const ROWS: usize, const COLUMNS: usize>(
     let mut finger = Pipeline::new(&config);
     let mut digest = Digest::new();
     let mut command = Command { tare_request: 1, ..Command::default() };
-    let (mut travel, mut speed_nm_per_s, mut depth) = (0_i64, 0_i32, Millimetres::ZERO);
+    let (mut travel, mut speed_nm_per_s, mut depth) = (0_i64, 0_i64, Millimetres::ZERO);
+    let frame_ns = i64::from(config.timing.frame_ns);
     for sequence in 1..=FRAMES {
         depth = depth_q24((travel - PLATE_MM * TRAVEL_PER_MM).max(0));
         let mut frame = Frame { sequence, ..Frame::EMPTY };
@@ -66,8 +67,8 @@ pub fn run<const ROWS: usize, const COLUMNS: usize>(
         let duty = step(&mut finger, &frame, &sense, &command);
         digest.add(duty, finger.status());
         // The motor: 43 mm/s per volt, so 8,530 nm/s per unit of the duty; a time constant of 7 ms.
-        speed_nm_per_s += (8_530 * i32::from(duty.0) - speed_nm_per_s) / 70;
-        travel += i64::from(speed_nm_per_s);
+        speed_nm_per_s += (8_530 * i64::from(duty.0) - speed_nm_per_s) * frame_ns / 7_000_000;
+        travel += speed_nm_per_s * frame_ns / 100_000;
         command.torque = finger.status().tare == Taring::Done;
         command.goal = newtons(1_000);
     }

@@ -17,7 +17,7 @@
 use crate::joint::{YIELD_USUAL, joint};
 use crate::judge::{Judgement, Verdict};
 use crate::memory::without_creep;
-use crate::model::{Pose, UNKNOWNS};
+use crate::model::Pose;
 use crate::modulus::each;
 use crate::press::Press;
 use crate::record::{Ended, Reason};
@@ -70,12 +70,8 @@ impl Gain {
 pub struct Posed {
     /// The pose.
     pub pose: Pose,
-    /// Standard uncertainties, in the order of the fields.
-    pub sigma: [f64; UNKNOWNS],
     /// Force of each step of the press, N.
     pub forces_n: Vec<f64>,
-    /// Root mean square residual of the sound taxels, as a share of the step's highest reading.
-    pub misfit: f64,
     /// Was it a press onto a hard plate that stood still?
     pub judgement: Judgement,
 }
@@ -155,7 +151,7 @@ pub(crate) fn settle(presses: &[Press]) -> Result<Settled, NoGains> {
     for press in presses.chunks(1).filter(|press| fault(&press[0]).is_none()) {
         let Ok(first) = joint(press, 0.0) else { continue };
         for one in each(press, &first).into_iter().flatten() {
-            let weight = one.memory_sigma[1].powi(-2);
+            let weight = one.creep_sigma.powi(-2);
             (sum, weights) = (sum + weight * one.memory.creep, weights + weight);
         }
     }

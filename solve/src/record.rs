@@ -8,7 +8,7 @@
 pub use fingertip::measure::Ended as Reason;
 
 use crate::Value;
-use crate::press::{Array, Branch, Press, Reading, Step, Tip};
+use crate::press::{Array, Branch, Press, Reading, Step};
 use crate::strokes::{Record, Sample, Stroke};
 use fingertip::measure::series::{HEAD, VERSION, check, step_bytes};
 use fingertip::measure::strokes::SAMPLE_FRAMES;
@@ -36,11 +36,13 @@ const ZERO_K: f64 = -273.15;
 const RESISTANCE_PART: f64 = 0.022;
 
 /// Kind of a series.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Kind {
     /// Steps of a press.
+    #[error("a press")]
     Press = 1,
     /// Samples of strokes in the air.
+    #[error("strokes")]
     Strokes = 2,
 }
 
@@ -126,8 +128,9 @@ pub fn press(bytes: &[u8], params: &Params) -> Result<Press, NoRecord> {
         let frames = [cursor.u32(), cursor.u32()];
         let counts = [cursor.i32(), cursor.i32()];
         let [averaged, branch] = [cursor.u16(), u16::from(cursor.u8())];
-        cursor.u8();
-        let (bridge_mv, chip) = (cursor.u16().cast_signed(), cursor.u16());
+        // A zero, and the mean voltage at the bridge.
+        let _: [u8; 3] = cursor.take();
+        let chip = cursor.u16();
         if frames[0] > frames[1] || frames[0] < before {
             return Err(NoRecord::Order(index));
         } else if averaged == 0 {
@@ -153,13 +156,10 @@ pub fn press(bytes: &[u8], params: &Params) -> Result<Press, NoRecord> {
             frames: averaged.into(),
             branch,
             taxels,
-            bridge_v: 1e-3 * f64::from(bridge_mv),
             chip_c: (chip > 0).then(|| 0.1 * f64::from(chip) + ZERO_K),
         });
     }
-    let tip =
-        Tip { radius_mm: 1e-3 * f64::from(params.tip_radius_um), modulus_kpa: 1e-3 * f64::from(params.modulus_pa) };
-    Ok(Press { tip, array, steps, ended: head.ended })
+    Ok(Press { radius_mm: 1e-3 * f64::from(params.tip_radius_um), array, steps, ended: head.ended })
 }
 
 /// Strokes of a series. The resistance is that of the parameters, with an uncertainty of 2.2 %; a caller with a better

@@ -103,7 +103,7 @@ fn solved(args: &Args, session: &mut Session) -> Result<Found, Error> {
     let mut row = |name, unit: f64, value: Value| found.row(name, unit * value.value, Some(unit * value.sigma));
     row("torque_constant_unm_per_a", 1e6, drive.torque_constant);
     row("inertia_ug_m2", 1e9, drive.inertia_kg_m2);
-    let [forward, back] = drive.friction.map(|friction| friction.torque_nm);
+    let [forward, back] = drive.friction_nm;
     let mean = Value { value: (forward.value + back.value) / 2.0, sigma: forward.sigma.max(back.sigma) };
     row("friction_unm", 1e6, mean);
     let (tau, force) = (drive.time_constant_s, drive.force_n);

@@ -138,8 +138,6 @@ pub struct Rig {
     supply_v: f64,
     /// Friction of this motion as a share of the mean.
     unrest: f64,
-    /// Time that went by.
-    pub time_s: f64,
     /// Largest distance from the start and largest force so far.
     pub travel_mm: f64,
     pub force_n: f64,
@@ -159,7 +157,6 @@ impl Rig {
             speed: 0.0,
             current: 0.0,
             unrest: 1.0,
-            time_s: 0.0,
             duty: 0.0,
             supply_v,
             travel_mm: 0.0,
@@ -177,7 +174,6 @@ impl Rig {
             self.unrest = 1.0 + self.drive.unrest * uniform(&mut self.rng, -1.0, 1.0);
         }
         self.duty = duty;
-        self.time_s += FRAME_S;
     }
 
     pub fn view(&mut self) -> RigReading {

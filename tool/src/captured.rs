@@ -6,17 +6,17 @@
 //! | metadata `fingertip.capture` | whose it is: board, firmware, image, notes, licence; and for people parameters, gains, frame time |
 //! | `/fingerN/scalars`, `/fingerN/frame`, N the ID less one | as in a scene's recording: what the core on this machine makes of the frames |
 
+use crate::commands::params::named;
 use crate::messages::{Topic, topic};
 use crate::state::{Stamp, State};
 use fingertip::capture::Head;
-use fingertip::params::Params;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{CLOCKS, COLUMNS, ROWS, SLOTS, TAXELS};
 use mcap::records::{MessageHeader, Metadata, Record};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{Attachment, McapError, WriteOptions, Writer};
 use replay::{CapturedFrame, ReplayError, Replayed, replay};
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::fs;
 use std::io::{Seek, Write};
@@ -154,11 +154,9 @@ fn put(
         data: Cow::Borrowed(bytes),
     };
     out.attach(&attached)?;
-    let names = Params::RANGES.iter().map(|(name, ..)| (*name).to_owned());
-    let params: Map<String, Value> = names.zip(head.params.to_array().map(Value::from)).collect();
     let gains: Vec<u16> = (0..TAXELS).map(|place| head.gains.get(place)).collect();
     let more = [
-        ("params", Value::Object(params).to_string()),
+        ("params", Value::Object(named(&head.params)).to_string()),
         ("gains_q14", json!(gains).to_string()),
         ("codes_per_kpa_milli", head.params.codes_per_kpa_milli.to_string()),
         ("frame_ns", head.frame_ns.to_string()),

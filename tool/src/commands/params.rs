@@ -74,10 +74,7 @@ pub enum Command {
 /// A stored register and its value.
 pub type Value = (&'static Register, i64);
 
-/// Does it.
-///
-/// # Errors
-/// See [`Error`]; nothing is half done without a word.
+/// Does it; nothing is half done without a word.
 pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Error> {
     match command {
         Command::Get { names } => get(names, client, json),
@@ -148,11 +145,22 @@ fn restore(
     if client.number(address::TORQUE_ENABLE)? != 0 {
         return Err("torque is on: parameters are set with torque off. Nothing was changed".into());
     }
+    with_gains(gains, client, |client, new| {
+        if new && !json {
+            say("the taxels' gains are others now: tare");
+        }
+        change(values, save, client, json)
+    })
+}
+
+/// Sets the taxels' gains, then does `set`, which gets whether they are new; puts them back if that fails.
+pub(super) fn with_gains(
+    gains: Option<&[Vec<u16>]>,
+    client: &mut Client,
+    set: impl FnOnce(&mut Client, bool) -> Result<(), Error>,
+) -> Result<(), Error> {
     let before = gains.map_or(Ok(None), |gains| file::set_gains(gains, client))?;
-    if before.is_some() && !json {
-        say("the taxels' gains are others now: tare");
-    }
-    change(values, save, client, json).map_err(|why| match before.map(|before| file::set_gains(&before, client)) {
+    set(client, before.is_some()).map_err(|why| match before.map(|before| file::set_gains(&before, client)) {
         None => why,
         Some(Ok(_)) => Error::Other(format!("{why}; the taxels' gains are put back")),
         Some(Err(second)) => Error::Other(format!("{why}; and the taxels' gains could not be put back: {second}")),
@@ -304,7 +312,10 @@ pub(in crate::commands) fn set(values: &[Value], client: &mut Client) -> Result<
         let at = usize::from(register.address - address::PARAMS);
         after[at..at + 4].copy_from_slice(&table::encode(register, *value));
     }
-    check_together(&after)?;
+    // Parameters that contradict each other are refused by the core's own check.
+    let config = Config::shipped(&of_bytes(&after));
+    let config = config.map_err(|why| format!("these do not go together: {why}; nothing was changed"))?;
+    config.warnings().for_each(|warning| eprintln!("warning: {warning}"));
     if client.number(address::TORQUE_ENABLE)? != 0 {
         return Err("torque is on: parameters are set with torque off. Nothing was changed".into());
     }
@@ -370,17 +381,19 @@ fn wrong((register, value): &Value) -> Option<String> {
     (!(min..=max).contains(value)).then(|| format!("{} of {value}: {min} to {max} are allowed", name(register)))
 }
 
-/// Refuses parameters that contradict each other, by the core's own check.
-fn check_together(bytes: &[u8]) -> Result<(), Error> {
+/// The parameters of their registers' bytes.
+pub(super) fn of_bytes(bytes: &[u8]) -> Params {
     let mut values = [0; Params::COUNT];
     for (value, bytes) in values.iter_mut().zip(bytes.as_chunks::<4>().0) {
         *value = i32::from_le_bytes(*bytes);
     }
-    let checked = Config::shipped(&Params::from_array(&values));
-    let config =
-        checked.map_err(|why| Error::Other(format!("these do not go together: {why}; nothing was changed")))?;
-    config.warnings().for_each(|warning| eprintln!("warning: {warning}"));
-    Ok(())
+    Params::from_array(&values)
+}
+
+/// Parameters by their names.
+pub fn named(params: &Params) -> Map<String, serde_json::Value> {
+    let names = Params::RANGES.iter().map(|(name, ..)| (*name).to_owned());
+    names.zip(params.to_array().map(serde_json::Value::from)).collect()
 }
 
 /// Undoes what was set; the error has the result.

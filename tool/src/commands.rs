@@ -20,7 +20,7 @@ pub mod stream;
 pub mod tare;
 pub mod view;
 
-use crate::client::Reach;
+use crate::client::{Pong, Reach};
 use crate::{Client, Error, table};
 use fingertip::link::packet::BROADCAST;
 use fingertip::measure::MeasureState;
@@ -72,7 +72,7 @@ pub fn each(reach: &Reach, titled: bool, command: impl Fn(&mut Client) -> Result
     let mut ids = reach.ids.clone();
     if ids.contains(&BROADCAST) {
         let found = client.ping_all()?;
-        ids = found.into_iter().filter(|pong| i64::from(pong.model) == table::model()).map(|pong| pong.id).collect();
+        ids = found.into_iter().filter(Pong::is_fingertip).map(|pong| pong.id).collect();
         if ids.is_empty() {
             return Err("no fingertip answers: is it powered, and is the baud rate right?".into());
         }

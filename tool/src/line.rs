@@ -33,9 +33,6 @@ pub fn ports() -> Vec<String> {
 
 impl Line {
     /// Opens it.
-    ///
-    /// # Errors
-    /// The port does not exist, another program uses it, or it does not support this speed.
     pub fn open(port: &str, baud: u32) -> io::Result<Self> {
         if let Some(address) = port.strip_prefix(TCP) {
             let stream = TcpStream::connect(address)?;

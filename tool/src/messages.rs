@@ -7,6 +7,7 @@ use base64::prelude::{BASE64_STANDARD, Engine as _};
 use fingertip::shipped::address;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
+use std::io::{Seek, Write};
 
 /// The names of a scene's scalars that a controller knows, and what they are.
 const SCALARS: [(&str, &str); 13] = [
@@ -58,10 +59,26 @@ impl Topic {
 
     /// Schema of the topic, as JSON Schema.
     pub fn schema(self) -> Vec<u8> {
+        let number = |(name, about): (&str, &str)| (name.to_owned(), json!({ "type": "number", "description": about }));
         match self {
-            Self::Scalars => scalars_schema().to_string().into_bytes(),
+            Self::Scalars => {
+                let properties: Map<_, _> = SCALARS.map(number).into_iter().collect();
+                let schema = json!({ "title": "fingertip.Scalars", "type": "object", "properties": properties });
+                schema.to_string().into_bytes()
+            }
             Self::Image => IMAGE_SCHEMA.into(),
         }
+    }
+
+    /// Adds the topic of a controller to a file.
+    pub fn add_to<W: Write + Seek>(
+        self,
+        out: &mut mcap::Writer<W>,
+        id: u8,
+        device: &BTreeMap<String, String>,
+    ) -> mcap::McapResult<u16> {
+        let schema = out.add_schema(self.schema_name(), "jsonschema", &self.schema())?;
+        out.add_channel(schema, &self.name(id), "json", device)
     }
 
     /// A state's message, in JSON.
@@ -123,10 +140,4 @@ fn image(time_ns: u64, state: &State) -> Value {
         "frame_id": "array", "width": columns, "height": rows, "encoding": "mono8", "step": columns,
         "data": BASE64_STANDARD.encode(data),
     })
-}
-
-fn scalars_schema() -> Value {
-    let number = |about: &str| json!({ "type": "number", "description": about });
-    let properties: Map<_, _> = SCALARS.iter().map(|(name, about)| ((*name).to_owned(), number(about))).collect();
-    json!({ "title": "fingertip.Scalars", "type": "object", "properties": properties })
 }

@@ -33,9 +33,9 @@ pub fn goal_mn(text: &str) -> Result<i64, String> {
     within(text, &(0.001..=150.0)).map(|newtons| (newtons * 1e3).round() as i64)
 }
 
-/// Force in mN that a scale shows, of a number in N.
-pub fn shown_mn(text: &str) -> Result<i64, String> {
-    within(text, &(0.0..=150.0)).map(|newtons| (newtons * 1e3).round() as i64)
+/// Force that a scale shows, N, to a mN.
+pub fn shown_n(text: &str) -> Result<f64, String> {
+    within(text, &(0.0..=150.0)).map(|newtons| (newtons * 1e3).round() * 1e-3)
 }
 
 fn within(text: &str, range: &RangeInclusive<f64>) -> Result<f64, String> {

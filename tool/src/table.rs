@@ -2,7 +2,6 @@
 
 use fingertip::link::table::{Access, Kind, Register};
 use fingertip::shipped::{REGISTERS, address};
-use std::fmt;
 
 /// Registers side by side, as they were read.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -29,20 +28,6 @@ impl Block {
         let bytes = self.bytes.get(offset..).unwrap_or_default();
         let words = bytes.chunks_exact(usize::from(width)).take(usize::from(register.count));
         words.map(|word| decode(register.kind, word).unwrap_or(0) * i64::from(register.scale)).collect()
-    }
-}
-
-/// A number with its unit, for people.
-pub struct Value<'a> {
-    /// Whose.
-    pub register: &'a Register,
-    /// Bytes as on the bus.
-    pub value: i64,
-}
-
-impl fmt::Display for Value<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.value)
     }
 }
 

@@ -1,6 +1,6 @@
 //! `fingertip calibrate`.
 
-use super::guided::hold::{self, HOLDS, WEIGHT};
+use super::guided::hold::{HOLDS, WEIGHT};
 use super::guided::motion::press_name;
 use super::guided::{Options, Presses, Procedure};
 use super::press::direction_confirmed;
@@ -32,7 +32,7 @@ pub struct Args {
     #[arg(long)]
     no_scale: bool,
     /// Numbers that the scale shows, N, in the order of --scale-n; without it the command asks
-    #[arg(long, value_name = "NEWTONS", value_delimiter = ',', value_parser = hold::newtons, conflicts_with = "no_scale")]
+    #[arg(long, value_name = "NEWTONS", value_delimiter = ',', value_parser = numbers::shown_n, conflicts_with = "no_scale")]
     shown_n: Vec<f64>,
     /// Also measure creep, by a weight that lies on the tip for this time
     #[arg(long, value_name = "SECONDS", value_parser = numbers::seconds)]

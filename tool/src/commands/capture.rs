@@ -70,9 +70,6 @@ impl Args {
 }
 
 /// Arms a capture, tares and, where asked to, presses; reads what the board kept, and writes it as a file.
-///
-/// # Errors
-/// The controller is in fault, torque is on, the capture does not start, or the file cannot be written.
 pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     no_fault_nor_motion(client)?;
     if client.number(address::TORQUE_ENABLE)? != 0 {

@@ -188,7 +188,7 @@ pub(super) fn save(client: &mut Client, json: bool) -> Result<(), Error> {
     let meant = read_all(client)?;
     client.set(address::SAVE_PARAMETERS, 1)?;
     // The core halts while the flash is written, and may stay silent for that long.
-    let timeout = client.set_timeout(SAVE_WITHIN);
+    let timeout = std::mem::replace(&mut client.timeout, SAVE_WITHIN);
     let begun = Instant::now();
     let saved = loop {
         match client.number(address::SAVED_STATE) {
@@ -196,7 +196,7 @@ pub(super) fn save(client: &mut Client, json: bool) -> Result<(), Error> {
             other => break other,
         }
     };
-    client.set_timeout(timeout);
+    client.timeout = timeout;
     let saved = saved?;
     // A controller that restarted has the values of the flash, and reports no difference.
     if saved == SAME && read_all(client)? != meant {
@@ -293,11 +293,8 @@ fn told(json: bool, values: &[Value], text: &str) {
 /// A register, its old value, and its new one.
 pub(in crate::commands) type Changed = (&'static Register, i64, i64);
 
-/// Sets parameters; returns those that changed.
-///
-/// # Errors
-/// Something is wrong with a value, or torque is on: nothing was changed. Or the controller refused: the text says
-/// what was changed nevertheless.
+/// Sets parameters; returns those that changed. Where a value is wrong or torque is on, nothing was changed; where the
+/// controller refused, the error says what was changed nevertheless.
 pub(in crate::commands) fn set(values: &[Value], client: &mut Client) -> Result<Vec<Changed>, Error> {
     let wrong: Vec<String> = values.iter().filter_map(wrong).chain(twice(values)).collect();
     if !wrong.is_empty() {
@@ -360,7 +357,7 @@ fn unsure(why: &Error) -> Error {
 }
 
 fn set_one(register: &'static Register, value: i64, client: &mut Client) -> Result<(), Error> {
-    client.set_register(register, value)?;
+    client.set(register.address, value)?;
     match register.address {
         address::ID => client.id = value as u8,
         address::BAUD_RATE => {

@@ -22,9 +22,6 @@ pub struct Args {
 }
 
 /// Streams until Ctrl-C.
-///
-/// # Errors
-/// The port is taken, or this build cannot.
 pub fn run(args: &Args, client: &mut Client) -> Result<(), Error> {
     #[cfg(feature = "foxglove")]
     return server::run(args, client);

@@ -73,7 +73,7 @@ pub fn run(args: &Args, client: &mut Client) -> Result<(), Error> {
         return Err("the output is no terminal: `fingertip record` writes states to a file or a pipe".into());
     }
     let period = Duration::from_secs_f64(1.0 / args.rate_hz.clamp(0.1, 1e3));
-    let mut seen = Seen { name: format!("ID {} on {}", client.id, client.port()), ..Seen::default() };
+    let mut seen = Seen { name: format!("ID {} on {}", client.id, client.port), ..Seen::default() };
     let failed = |why: io::Error| Error::Other(format!("the terminal: {why}"));
     let mut terminal = ratatui::try_init().map_err(failed)?;
     let watched = watch(args, period, client, &mut seen, &mut terminal).map_err(failed);
@@ -92,7 +92,7 @@ fn watch(
     let (mut due, mut counted, mut updates) = (begun, begun, 0);
     loop {
         let read = State::read_picture(client);
-        if matches!(read, Err(Error::Port { .. })) {
+        if matches!(read, Err(Error::Port(..))) {
             // The port may come back. Until then the screen shows the last state and the reason.
             let _ = client.reopen();
         }
@@ -177,8 +177,6 @@ fn draw_words(state: &State, area: Rect, buffer: &mut Buffer) {
     let millimetres = |um: i64| um as f64 * 1e-3;
     let newtons = |mn: i64| mn as f64 * 1e-3;
     let fault = state.fault_name();
-    let limits = state.limit_names();
-    let limits = if limits.is_empty() { "none".into() } else { limits.join(", ") };
     let lines = vec![
         Line::from(vec!["force   ".into(), format!("{:8.3} N", newtons(state.force_mn)).bold()]),
         Line::from(format!("goal    {:8.3} N", newtons(state.goal_mn))),
@@ -195,7 +193,7 @@ fn draw_words(state: &State, area: Rect, buffer: &mut Buffer) {
             millimetres(state.speed_um_per_s)
         )),
         Line::from(format!("duty    {:8.1} %", state.duty_permille as f64 * 0.1)),
-        Line::from(format!("limits    {limits}")),
+        Line::from(format!("limits    {}", state.limits_text())),
     ];
     Paragraph::new(lines).wrap(ratatui::widgets::Wrap { trim: false }).render(area, buffer);
 }

@@ -135,7 +135,7 @@ fn hold(goals_mn: &[i64], shown_n: &[f64], run: &Run<'_>, client: &mut Client) -
             Some(shown) => *shown,
             None => {
                 let question = format!("{goal_n} N are held: what does the scale show, in N (1 g is 0.00981 N)?");
-                run.parsed(&question, "--shown-n", newtons, &mut || same_goal(*goal_mn, client).map(drop))?
+                run.parsed(&question, "--shown-n", numbers::shown_n, &mut || same_goal(*goal_mn, client).map(drop))?
             }
         };
         let until = Instant::now() + AVERAGED;
@@ -159,11 +159,6 @@ fn hold(goals_mn: &[i64], shown_n: &[f64], run: &Run<'_>, client: &mut Client) -
         }));
     }
     Ok(held)
-}
-
-/// A number in N.
-pub fn newtons(text: &str) -> Result<f64, String> {
-    numbers::shown_mn(text).map(|shown_mn| shown_mn as f64 * 1e-3)
 }
 
 /// Waits until the force has been held for a second.

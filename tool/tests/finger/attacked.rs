@@ -1,10 +1,8 @@
 //! Robustness of the host's program against any request and any failure of the controller.
 
-use crate::served::Served;
-use crate::stopped::client;
+use crate::served::{Served, ended};
 use fingertip::link::packet::instruction::REBOOT;
 use std::fs;
-use std::io::{BufRead as _, BufReader, Read as _};
 use std::os::unix::fs::FileTypeExt as _;
 
 #[test]
@@ -47,18 +45,6 @@ fn numbers_that_are_none_are_not_understood() {
 }
 
 #[test]
-fn a_pause_between_states_ends_at_once() {
-    let finger = Served::begin("wall");
-    let file = finger.file("slow.csv");
-    // A state in a quarter of an hour.
-    let mut child = finger.start(&["record", "--rate-hz", "0.001", &file]);
-    Served::begun(&format!("{file}.part"));
-    Served::interrupt(&child);
-    assert!(child.wait().expect("it ends").success());
-    assert!(fs::read_to_string(&file).expect("it is there").starts_with("time_s,"));
-}
-
-#[test]
 fn a_controller_that_starts_anew_ends_a_recording_and_a_press() {
     let finger = Served::begin("wall");
     finger.done(&["tare"]);
@@ -68,9 +54,8 @@ fn a_controller_that_starts_anew_ends_a_recording_and_a_press() {
         std::thread::yield_now();
     }
     finger.command(&format!("raw {REBOOT}"));
-    let output = child.wait_with_output().expect("it ends");
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(1), "{said}");
+    let (code, said) = ended(&child.wait_with_output().expect("it ends"));
+    assert_eq!(code, Some(1), "{said}");
     assert!(said.contains("the recording ends after") && said.contains("restarted"), "{said}");
     // What it had is whole, and its times are.
     let text = fs::read_to_string(&file).expect("it is there");
@@ -79,19 +64,11 @@ fn a_controller_that_starts_anew_ends_a_recording_and_a_press() {
     assert!(times.windows(2).all(|pair| pair[0] < pair[1]) && times.last() < Some(&4_000.0), "{:?}", times.last());
 
     finger.done(&["tare"]);
-    let mut child = finger.start(&["press", "1", "--seconds", "1000000", "--within-s", "3600"]);
-    let mut reader = BufReader::new(child.stderr.take().expect("it was asked for"));
-    let mut line = String::new();
-    while !line.starts_with("force") {
-        line.clear();
-        reader.read_line(&mut line).expect("it reports its status");
-    }
+    let child = finger.start(&["press", "1", "--seconds", "1000000", "--within-s", "3600"]);
+    finger.until("Force:");
     finger.command(&format!("raw {REBOOT}"));
-    let mut rest = String::new();
-    reader.read_to_string(&mut rest).expect("it says why it ends");
-    let output = child.wait_with_output().expect("it ends");
-    assert_eq!(output.status.code(), Some(1), "{rest}{}", String::from_utf8_lossy(&output.stdout));
-    assert!(rest.contains("restarted"), "{rest}");
+    let (code, said) = ended(&child.wait_with_output().expect("it ends"));
+    assert!(code == Some(1) && said.contains("restarted"), "{said}");
 }
 
 #[test]
@@ -151,9 +128,7 @@ fn an_address_that_another_has_is_refused() {
 fn recover_says_torque_is_off_only_where_it_is() {
     let finger = Served::begin("wall");
     finger.done(&["tare"]);
-    let mut client = client(&finger);
-    client.set(fingertip::shipped::address::TORQUE_ENABLE, 1).expect("it is taken");
-    drop(client);
+    finger.set(&[(fingertip::shipped::address::TORQUE_ENABLE, 1)]);
     let said = finger.done(&["recover"]);
     assert!(said.starts_with("there was nothing to recover from; torque is on"), "{said}");
     assert!(said.contains("`fingertip stop`"), "{said}");
@@ -197,15 +172,12 @@ fn a_full_disk_is_told_and_a_closed_pipe_is_no_error() {
     drop(reader);
     let output = finger.writing_to(&["record", "--seconds", "1000000", "-"], writer);
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-    let full = fs::OpenOptions::new().write(true).open("/dev/full").expect("Linux has it");
-    let output = finger.writing_to(&["record", "--seconds", "1000000", "-"], full);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.code() == Some(1) && said.contains("cannot write -: No space left"), "{said}");
+    let full = || fs::OpenOptions::new().write(true).open("/dev/full").expect("Linux has it");
+    let (code, said) = ended(&finger.writing_to(&["record", "--seconds", "1000000", "-"], full()));
+    assert!(code == Some(1) && said.contains("cannot write -: No space left"), "{said}");
     for arguments in [&["info"][..], &["info", "--json"], &["params", "get"], &["completions", "bash"]] {
-        let full = fs::OpenOptions::new().write(true).open("/dev/full").expect("Linux has it");
-        let output = finger.writing_to(arguments, full);
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(output.status.code() == Some(1) && said.contains("the output cannot be written"), "{said}");
+        let (code, said) = ended(&finger.writing_to(arguments, full()));
+        assert!(code == Some(1) && said.contains("the output cannot be written"), "{said}");
         let (reader, writer) = std::io::pipe().expect("a pipe");
         drop(reader);
         assert_eq!(finger.writing_to(arguments, writer).status.code(), Some(0), "{arguments:?}");

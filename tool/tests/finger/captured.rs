@@ -1,7 +1,6 @@
 //! Captures from the host's side: taken, kept as files, replayed; and files that are not as they were written.
 
 use crate::served::Served;
-use crate::stopped::client;
 use fingertip::shipped::address;
 use fingertip_cli::captured;
 use fingertip_cli::captured::{of_bytes, through_the_core};
@@ -29,7 +28,7 @@ fn a_capture_is_taken_and_replays() {
     let told = finger.json(&["replay", &file]);
     assert_eq!((told[0]["frames"].as_u64(), told[0]["difference"].is_null()), (Some(frames), true));
     // The finger released.
-    assert_eq!(client(&finger).number(address::TORQUE_ENABLE).expect("it answers"), 0);
+    assert_eq!(finger.client().number(address::TORQUE_ENABLE).expect("it answers"), 0);
     let full = fs::OpenOptions::new().write(true).open("/dev/full").expect("Linux has it");
     let why = captured::write(full, &kept.bytes, &kept.about).expect_err("it is full");
     assert!(why.contains("No space left"), "{why}");
@@ -44,17 +43,16 @@ fn a_press_from_a_tip_that_touches_is_told_and_ends() {
     let finger = Served::begin("wall");
     finger.done(&["tare"]);
     // Torque goes off while it presses: the tip rests on the wall.
-    let mut bus = client(&finger);
-    bus.set(address::TORQUE_ENABLE, 1).expect("it obeys");
-    bus.set(address::GOAL_FORCE_MN, 1_000).expect("it obeys");
-    while bus.number(address::PRESENT_FORCE_MN).expect("it answers") < 900 {}
-    bus.set(address::TORQUE_ENABLE, 0).expect("it obeys");
-    drop(bus);
+    finger.set(&[(address::TORQUE_ENABLE, 1), (address::GOAL_FORCE_MN, 1_000)]);
+    while finger.true_force_n() < 0.9 {
+        finger.command("state");
+    }
+    finger.set(&[(address::TORQUE_ENABLE, 0)]);
     let file = finger.file("touching.mcap");
     let why = finger.refused(&["capture", "--press", "1", "--out", &file]);
     assert!(why.contains("something seemed to touch"), "{why}");
     assert!(fs::metadata(&file).is_err(), "nothing was written");
-    assert_eq!(client(&finger).number(address::TORQUE_ENABLE).expect("it answers"), 0);
+    assert_eq!(finger.client().number(address::TORQUE_ENABLE).expect("it answers"), 0);
 }
 
 #[test]
@@ -67,12 +65,12 @@ fn what_cannot_be_captured_is_told() {
     assert!(why.contains("`fingertip commission`"), "{why}");
     finger.done(&["params", "set", "direction_confirmed=1"]);
     finger.done(&["tare"]);
-    client(&finger).set(address::TORQUE_ENABLE, 1).expect("it obeys");
+    finger.set(&[(address::TORQUE_ENABLE, 1)]);
     let why = finger.refused(&["capture", "--out", &file]);
     assert!(why.contains("torque is on"), "{why}");
-    client(&finger).set(address::TORQUE_ENABLE, 0).expect("it obeys");
+    finger.set(&[(address::TORQUE_ENABLE, 0)]);
     finger.command("fault supply-low");
-    client(&finger).set(address::TORQUE_ENABLE, 1).expect("it obeys");
+    finger.set(&[(address::TORQUE_ENABLE, 1)]);
     finger.command("state");
     let why = finger.refused(&["capture", "--out", &file]);
     assert!(why.contains("fault 9") && why.contains("`fingertip recover`"), "{why}");

@@ -1,7 +1,6 @@
 //! State after a killed command: KILL after each of its packets, or after some of them where there are hundreds.
 
 use crate::served::Served;
-use crate::stopped::client;
 use fingertip::link::packet::instruction::REBOOT;
 use fingertip::shipped::address;
 use std::fs;
@@ -146,7 +145,7 @@ fn a_controller_that_starts_anew_was_not_commissioned() {
 fn a_motion_that_somebody_else_began_is_left_alone() {
     let finger = Served::begin("wall");
     finger.done(&["tare"]);
-    client(&finger).set(address::MEASURE, 2).expect("it obeys");
+    finger.set(&[(address::MEASURE, 2)]);
     finger.until_alone("Strokes");
     let (identify, file) = (["identify", "--no-wait", "--pause-s", "0"], finger.file("other.mcap"));
     for command in [&["commission", "--forward", "yes"][..], &identify, &["tare"], &["capture", "--out", &file]] {

@@ -1,6 +1,6 @@
 //! Recordings: their times, their owners, and the rest of one whose program was killed.
 
-use crate::served::Served;
+use crate::served::{Served, ended};
 use mcap::read::Options;
 use mcap::{MessageStream, Summary};
 use std::fs;
@@ -63,8 +63,8 @@ fn states_are_recorded_with_the_controllers_times() {
 fn a_recording_that_is_interrupted_is_whole() {
     let finger = Served::begin("wall");
     let file = finger.file("stopped.csv");
-    let mut child = finger.start(&["record", &file]);
-    // Until something is on its way.
+    // A state in a quarter of an hour: the pause between states ends at once.
+    let mut child = finger.start(&["record", "--rate-hz", "0.001", &file]);
     Served::begun(&format!("{file}.part"));
     Served::interrupt(&child);
     assert!(child.wait().expect("it ends").success());
@@ -77,9 +77,8 @@ fn a_recording_that_is_interrupted_is_whole() {
     let child = finger.start(&["record", &lost]);
     Served::begun(&format!("{lost}.part"));
     finger.end();
-    let output = child.wait_with_output().expect("it ends");
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(1), "{said}");
+    let (code, said) = ended(&child.wait_with_output().expect("it ends"));
+    assert_eq!(code, Some(1), "{said}");
 }
 
 #[test]
@@ -194,9 +193,8 @@ fn no_file_is_written_over_without_force() {
     Served::begun(&part);
     fs::write(&file, "mine").expect("a file");
     Served::interrupt(&child);
-    let output = child.wait_with_output().expect("it ends");
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.code() == Some(1) && said.contains(&part), "{said}");
+    let (code, said) = ended(&child.wait_with_output().expect("it ends"));
+    assert!(code == Some(1) && said.contains(&part), "{said}");
     assert_eq!(fs::read(&file).expect("it is there"), b"mine");
     assert!(fs::read_to_string(&part).expect("it is there").starts_with("time_s,"));
 }

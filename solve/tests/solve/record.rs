@@ -1,7 +1,7 @@
 //! The bytes of a series: read to the last bit, and never a panic.
 
 use crate::finger::{Draw, FRAME_NS, cycle, presses};
-use crate::{deviation, sealed};
+use crate::sealed;
 use fingertip::measure::series::{HEAD, Head, check, step_bytes};
 use fingertip::params::Params;
 use proptest::prelude::*;
@@ -200,13 +200,6 @@ proptest! {
         prop_assert_eq!(read.is_err(), !matches!(at, 7 | 16..HEAD) || (at == 7 && 1 << bit > 13), "{:?}", read);
     }
 
-    #[test]
-    fn a_deviation_keeps_twelve_percent_of_its_variance(codes in 0.25f64..4000.0) {
-        let mut body = STEP[..56].to_vec();
-        body[42] = deviation(codes);
-        let read = press(&sealed(&press_head([3, 3], 1), &body), PARAMS).expect("a press").steps[0].taxels[0].deviation;
-        prop_assert!(read <= codes && read * read > codes * codes / 1.126 - 0.0625, "{} {}", read, codes);
-    }
 }
 
 proptest! {

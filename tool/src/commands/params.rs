@@ -79,13 +79,11 @@ pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Err
     match command {
         Command::Get { names } => get(names, client, json),
         Command::Set { values, save } => change(values, *save, client, json),
-        Command::Save => {
-            save(client, json)?;
+        Command::Save => save(client, json).map(|()| {
             if json {
                 say_json(&json!({ "saved": true }));
             }
-            Ok(())
-        }
+        }),
         Command::Backup { file, force } => {
             let kept = file::Kept { values: read_all(client)?, gains: Some(file::read_gains(client)?) };
             file::write(file, *force, client, &kept)?;
@@ -104,11 +102,9 @@ pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Err
 }
 
 fn get(wanted: &[&'static Register], client: &mut Client, json: bool) -> Result<(), Error> {
-    let values = if wanted.is_empty() {
-        read_all(client)?
-    } else {
-        wanted.iter().map(|register| Ok((*register, client.number(register.address)?))).collect::<Result<_, Error>>()?
-    };
+    let one = |register: &&'static Register| Ok((*register, client.number(register.address)?));
+    let values: Vec<Value> =
+        if wanted.is_empty() { read_all(client)? } else { wanted.iter().map(one).collect::<Result<_, Error>>()? };
     if json {
         say_json(&as_json(&values));
         return Ok(());
@@ -176,9 +172,9 @@ fn change(values: &[Value], save_too: bool, client: &mut Client, json: bool) -> 
     let what = if lines.is_empty() { "nothing differs: nothing was changed".into() } else { lines.join("\n") };
     told(json, &now, &what);
     if save_too {
-        save(client, json)?;
+        return save(client, json);
     }
-    if !save_too && !json && !changed.is_empty() {
+    if !json && !changed.is_empty() {
         say("set until the next reset; `fingertip params save` keeps it");
     }
     Ok(())
@@ -203,9 +199,10 @@ pub(super) fn save(client: &mut Client, json: bool) -> Result<(), Error> {
         return Err(format!("not saved: {RESTARTED}, and has what the flash holds. Set them again").into());
     }
     match saved {
-        SAME if json => Ok(()),
         SAME => {
-            say("saved: a reset keeps them");
+            if !json {
+                say("saved: a reset keeps them");
+            }
             Ok(())
         }
         CHANGED => Err("not saved within 5 s: the flash still holds what it did".into()),

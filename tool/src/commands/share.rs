@@ -191,13 +191,10 @@ impl Bus {
                 return Ok(if packet.id == BROADCAST { Vec::new() } else { refusal(packet.id) });
             };
             commander.ids.extend(targets(packet));
-            if covers(packet, address::BUS_WATCHDOG)
-                && let Some(steps @ 1..) = packet.params.get(2)
-            {
-                let watchdog = Duration::from_millis(20 * u64::from(*steps));
-                commander.watchdog = Some(commander.watchdog.map_or(watchdog, |shortest| shortest.min(watchdog)));
-            } else if covers(packet, address::BUS_WATCHDOG) {
-                commander.watchdog = None;
+            if covers(packet, address::BUS_WATCHDOG) {
+                let set = packet.params.get(2).filter(|steps| **steps > 0);
+                let set = set.map(|steps| Duration::from_millis(20 * u64::from(*steps)));
+                commander.watchdog = set.map(|set| commander.watchdog.map_or(set, |shortest| shortest.min(set)));
             }
         }
         if let Some(commander) = self.commander.as_mut().filter(|commander| commander.from == from) {
@@ -241,14 +238,14 @@ fn stop(client: &mut Client) -> Result<bool, Error> {
     Ok(drives)
 }
 
-/// Returns whether a packet only stops a finger.
+/// True if a packet only stops a finger.
 fn is_stop(packet: &Packet<'_>) -> bool {
     STOPS.into_iter().any(|register| covers(packet, register))
         && packet.params.len() > 2
         && packet.params.iter().skip(2).all(|byte| *byte == 0)
 }
 
-/// Returns whether a packet writes a register from its first byte on.
+/// True if a packet writes a register from its first byte on.
 fn covers(packet: &Packet<'_>, register: u16) -> bool {
     packet.instruction == instruction::WRITE && packet.params.starts_with(&register.to_le_bytes())
 }

@@ -174,24 +174,23 @@ fn draw_map(state: &State, area: Rect, buffer: &mut Buffer) {
 }
 
 fn draw_words(state: &State, area: Rect, buffer: &mut Buffer) {
-    let millimetres = |um: i64| um as f64 * 1e-3;
-    let newtons = |mn: i64| mn as f64 * 1e-3;
+    // Of a mN and of a um.
+    let thousandths = |number: i64| number as f64 * 1e-3;
     let fault = state.fault_name();
+
+    let [x_mm, y_mm, travel_mm, mm_per_s] =
+        [state.centre_x_um, state.centre_y_um, state.travel_um, state.speed_um_per_s].map(thousandths);
     let lines = vec![
-        Line::from(vec!["force   ".into(), format!("{:8.3} N", newtons(state.force_mn)).bold()]),
-        Line::from(format!("goal    {:8.3} N", newtons(state.goal_mn))),
+        Line::from(vec!["force   ".into(), format!("{:8.3} N", thousandths(state.force_mn)).bold()]),
+        Line::from(format!("goal    {:8.3} N", thousandths(state.goal_mn))),
         Line::from(vec!["mode    ".into(), Span::from(format!("  {}", state.mode_name())).cyan()]),
         Line::from(vec![
             "fault   ".into(),
             fault.map_or("  none".into(), |name| format!("  {} {name}", state.fault).red().bold()),
         ]),
-        Line::from(format!("centre  {:8.2} {:.2} mm", millimetres(state.centre_x_um), millimetres(state.centre_y_um))),
-        Line::from(format!("depth   {:8.3} mm", millimetres(state.indentation_um))),
-        Line::from(format!(
-            "travel  {:8.2} mm at {:.1} mm/s",
-            millimetres(state.travel_um),
-            millimetres(state.speed_um_per_s)
-        )),
+        Line::from(format!("centre  {x_mm:8.2} {y_mm:.2} mm")),
+        Line::from(format!("depth   {:8.3} mm", thousandths(state.indentation_um))),
+        Line::from(format!("travel  {travel_mm:8.2} mm at {mm_per_s:.1} mm/s")),
         Line::from(format!("duty    {:8.1} %", state.duty_permille as f64 * 0.1)),
         Line::from(format!("limits    {}", state.limits_text())),
     ];

@@ -18,8 +18,7 @@ fn the_exit_codes_are_those_of_the_documentation() {
         let cells: Vec<&str> = row.trim_matches('|').split('|').collect();
         let code: i32 = cells[0].trim().parse().expect("a code");
         codes.push(code);
-        let examples = cells[2].split('`').filter_map(|text| text.strip_prefix("fingertip "));
-        let examples: Vec<&str> = examples.collect();
+        let examples: Vec<&str> = cells[2].split('`').filter_map(|text| text.strip_prefix("fingertip ")).collect();
         assert!(!examples.is_empty(), "{row}");
         for example in examples {
             let mut child = finger.start(&example.split_whitespace().collect::<Vec<_>>());

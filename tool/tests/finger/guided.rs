@@ -75,10 +75,11 @@ fn a_program_commissions_and_calibrates_a_finger() {
     assert_eq!(finger.json(&calibrate), array, "a session that is complete gives the same again");
     assert!(finger.heard() - heard < 60, "nothing moves");
     finger.done(&["params", "set", "tip_radius_um=9000"]);
-    let why = finger.refused(&calibrate);
-    assert!(why.contains("tip_radius_um changed since this session began"), "{why}");
-    let why = finger.refused(&["commission", "--forward", "yes", "--session", &session]);
-    assert!(why.contains("a session of the command \"calibrate\""), "{why}");
+    finger.refuses(&calibrate, &["tip_radius_um changed since this session began"]);
+    finger.refuses(
+        &["commission", "--forward", "yes", "--session", &session],
+        &["a session of the command \"calibrate\""],
+    );
 }
 
 #[test]
@@ -123,8 +124,7 @@ fn a_killed_session_resumes_where_it_was() {
     assert_eq!((&weighed["after"]["creep_permille"], &weighed["refused"]), (&0.into(), &json!([])), "{weighed}");
     // A damaged record is not solved.
     fs::write(&record, &bytes[..bytes.len() - 4]).expect("a file");
-    let why = finger.refused(&calibrate);
-    assert!(why.contains("press-1.fts: the series has"), "{why}");
+    finger.refuses(&calibrate, &["press-1.fts: the series has"]);
 }
 
 /// KILL after each packet of a session that has all records: what is left are the write and the tare.
@@ -171,8 +171,7 @@ fn a_wrong_answer_changes_nothing() {
     let (code, text) = answered(&finger, &["commission"], "no\n");
     assert!(text.contains("swap the motor's leads") && code == Some(1), "{text}");
     assert_eq!(parameters(&finger)["direction_confirmed"], 0, "torque is refused from here on");
-    let why = finger.refused(&["identify", "--no-wait"]);
-    assert!(why.contains("`fingertip commission`"), "{why}");
+    finger.refuses(&["identify", "--no-wait"], &["`fingertip commission`"]);
     finger.done(&["params", "set", "direction_confirmed=1"]);
 
     // What the scale shows is ten times what is read.

@@ -270,6 +270,13 @@ impl Served {
         complained(&self.fingertip(arguments).output().expect("it starts"))
     }
 
+    /// Asserts that a command fails, and that its error has these words.
+    #[track_caller]
+    pub fn refuses(&self, arguments: &[&str], words: &[&str]) {
+        let said = self.refused(arguments);
+        assert!(words.iter().all(|word| said.contains(word)), "{arguments:?}: {said}");
+    }
+
     /// The same without a port.
     pub fn nobody(arguments: &[&str]) -> String {
         let mut command = Command::new(env!("CARGO_BIN_EXE_fingertip"));

@@ -26,23 +26,18 @@ pub struct Creep {
 
 /// Reason why there is no creep or temperature coefficient, with the number behind it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "their texts say it")]
 pub enum NoDrift {
-    /// Number of readings of the hold.
     #[error("the hold has {0} readings; 10 are needed")]
     Readings(usize),
-    /// Duration of the hold, s.
     #[error("the hold lasts {0:.1} s; 5 s are needed")]
     Short(f64),
-    /// No step of a press has the chip's temperature.
     #[error("the chip's temperature is unknown in one of the presses")]
     Temperature,
-    /// Difference of the chip's temperature between the presses, K.
     #[error("the presses differ by {0:.1} K; 3 K are needed")]
     Warming(f64),
-    /// A press gave no modulus.
     #[error("{0}")]
     Press(#[from] NoModulus),
-    /// The fit has no solution.
     #[error("the fit has no solution")]
     Fit,
 }

@@ -95,26 +95,20 @@ pub struct Gains {
 
 /// Reason why a press, or all of them, do not count, with the number behind it.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "their texts say it")]
 pub enum NoGains {
-    /// No press was given.
     #[error("no press was given")]
     NoPress,
-    /// The chip ended the press early.
     #[error("the press was ended early: {0}")]
     Ended(#[from] Ended),
-    /// Rows and columns of the array of the press, and of the first press.
     #[error("the press has an array of {0:?} rows and columns, the first press one of {1:?}")]
     Shape([usize; 2], [usize; 2]),
-    /// The judgement of a press.
     #[error("{0}")]
     Judged(Verdict),
-    /// Number of loading steps that touch.
     #[error("{0} loading steps touch the plate; 5 are needed: press deeper")]
     Steps(usize),
-    /// Number of sound taxels that were pressed.
     #[error("{0} sound taxels were pressed; 8 are needed: press deeper or nearer the middle")]
     Taxels(usize),
-    /// Change of the poses after the last round, in tip radii.
     #[error("the poses still change by {0} radii after the last round; 0.02 is allowed")]
     Unsettled(f64),
 }

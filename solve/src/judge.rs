@@ -40,23 +40,18 @@ pub struct Judgement {
 
 /// Verdict on a press, with the number behind it.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "their texts say it")]
 pub enum Verdict {
-    /// The press counts.
     #[error("the press counts")]
     Good,
-    /// Yield of the plate, mm/N. The press counts, and the yield is taken off.
     #[error("the plate yields by {0:.3} mm/N, more than 2.5 % of the depth: the yield is taken off")]
     Soft(f64),
-    /// Speed of the plate away from the tip, mm/s.
     #[error("the plate moves by {0:.3} mm/s; 0.01 is allowed: hold plate and finger fast")]
     Moving(f64),
-    /// Least force, as a share of the force by the depth.
     #[error("the force fell to {0:.2} of what the depth says: the contact was lost")]
     Lost(f64),
-    /// Indentation, mm.
     #[error("the tip was indented by {0:.2} mm; 0.3 is needed: press deeper")]
     TooLittle(f64),
-    /// Roundness of the gap between tip and plate.
     #[error(
         "the gap is rounder than the tip's radius says by {0:.2}; 0.1 is allowed: is the plate flat, the radius right?"
     )]

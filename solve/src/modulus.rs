@@ -74,11 +74,10 @@ pub struct Parts {
 
 /// Reason why there is no modulus.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "their texts say it")]
 pub enum NoModulus {
-    /// No press counts.
     #[error("{0}")]
     Gains(#[from] NoGains),
-    /// The fit of force over travel has no solution for any of this number of presses.
     #[error("force over travel of {0} presses does not follow the model")]
     Fit(usize),
 }

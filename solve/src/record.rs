@@ -59,52 +59,38 @@ impl std::error::Error for Ended {}
 
 /// Reason why bytes are not a series, with the number behind it.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "their texts say it")]
 pub enum NoRecord {
-    /// Number of bytes.
     #[error("the series has {0} bytes; its head alone has {HEAD}")]
     Short(usize),
-    /// First bytes.
     #[error("the bytes begin with {0:02x?}, not with \"FTS\": they are not a series")]
     Magic([u8; 3]),
-    /// Version of the format.
     #[error("the series has format {0}; this program reads format {VERSION}")]
     Version(u8),
-    /// Kind that was requested, and number of the kind in the series.
     #[error("the series does not hold {0}: its kind is {1} (1 is a press, 2 are strokes)")]
     Kind(Kind, u8),
-    /// Number of the reason.
     #[error("the series ended early for reason {0}, which this program does not know")]
     Reason(u8),
-    /// Rows and columns.
     #[error("the array has {0} rows and {1} columns; both must be at least 1")]
     Shape(u8, u8),
-    /// Bytes by the head, and bytes of the series.
     #[error("the series has {1} bytes where its head says {0}: it was cut or joined")]
     Length(u64, usize),
-    /// Check by the head, and check of the body.
     #[error("the check of the body is {1:08x} where the head says {0:08x}: bytes were changed in transfer")]
     Check(u32, u32),
-    /// The frame time is 0.
     #[error("the head says a frame time of 0")]
     FrameTime,
-    /// Number of the step.
     #[error("step {0} ends before it begins, or begins before the step before it ended")]
     Order(usize),
-    /// Number of the step.
     #[error("step {0} has no frames")]
     Frames(usize),
-    /// Number of the step, and number of the branch.
     #[error("step {0} has branch {1}; 0 (in or held) and 1 (back) are known")]
     Branch(usize, u8),
-    /// Number of the record.
     #[error("sample {0} belongs to no stroke, or marks the start of a stroke with a voltage")]
     Stroke(usize),
-    /// Number of the record, its count and its voltage in quarters of a mV.
     #[error(
         "sample {0} holds count {1} and voltage {2}: the chip clips both at 32767; take an encoder or a gear with fewer counts for each mm, or a lower supply"
     )]
     Clipped(usize, i16, i16),
-    /// Parameter out of its range.
     #[error("the controller's parameters are not valid: {0}")]
     Params(#[from] ParamError),
 }

@@ -122,31 +122,24 @@ pub struct Record {
 
 /// Reason why there is no drive, with the number behind it.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "their texts say it")]
 pub enum NoDrive {
-    /// The chip ended the motions early.
     #[error("the strokes were ended early: {0}")]
     Ended(#[from] Ended),
-    /// Counts of the longest stroke.
     #[error("the longest stroke has {0} counts; 12 are needed: check the encoder and the motor's cables")]
     Still(i32),
-    /// Counts against the voltage.
     #[error("a stroke went {0} counts against its voltage: exchange the leads of the motor or of the encoder")]
     Reversed(i32),
-    /// Counts of a jump.
     #[error("the count jumped by {0}, which no voltage of these strokes can do: check encoder and coupling")]
     Astray(i32),
-    /// Largest force that depends on the place, N.
     #[error("a force of {0:.3} N depends on the place of the tip: clear its way")]
     Pushed(f64),
-    /// Number of strokes in one direction.
     #[error("{0} strokes in one direction can be used; 3 are needed")]
     Few(usize),
-    /// Speed of the fastest stroke over that of the slowest.
     #[error(
         "the fastest stroke is {0:.1} times as fast as the slowest; 2 times are needed to tell back-EMF from friction"
     )]
     Slow(f64),
-    /// Number of rounds.
     #[error("the fit did not converge in {0} rounds: the samples do not follow the model of a motor with friction")]
     Unsolved(usize),
 }

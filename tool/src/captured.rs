@@ -22,9 +22,7 @@ use std::fs;
 use std::io::{self, Seek, Write};
 use std::path::Path;
 
-/// Name of the attachment.
 const ATTACHED: &str = "capture.bin";
-/// Name of the metadata record.
 const ABOUT: &str = "fingertip.capture";
 /// Entry of the metadata: host's time of the last frame, ns since 1970.
 pub const ENDED: &str = "ended_unix_ns";
@@ -45,7 +43,6 @@ pub fn through_the_core(
 pub struct Kept {
     /// The capture, as the board kept it.
     pub bytes: Vec<u8>,
-    /// Metadata.
     pub about: About,
 }
 

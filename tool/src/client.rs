@@ -50,7 +50,6 @@ pub struct Client {
     line: Line,
     pub port: String,
     pub baud: u32,
-    /// ID of the controller.
     pub id: u8,
     /// Longest wait for an answer.
     pub timeout: Duration,
@@ -116,7 +115,6 @@ impl Client {
         Ok(())
     }
 
-    /// Pings the controller.
     pub fn ping(&mut self) -> Result<Pong, Error> {
         let data = self.ask("ping", instruction::PING, &[], 3)?;
         Ok(Pong { id: self.id, model: u16::from_le_bytes([data[0], data[1]]), firmware: data[2] })
@@ -138,7 +136,6 @@ impl Client {
         }
     }
 
-    /// Pings all devices on the bus.
     pub fn ping_all(&mut self) -> Result<Vec<Pong>, Error> {
         let heard = self.pass(&packet(BROADCAST, instruction::PING, &[]), None, usize::MAX)?;
         let (mut receiver, mut found) = (Receiver::new(), Vec::new());
@@ -164,7 +161,6 @@ impl Client {
         ask(self)
     }
 
-    /// Reads bytes of the table.
     pub fn read(&mut self, address: u16, length: u16) -> Result<Vec<u8>, Error> {
         let doing = format!("read {}", table::place(address));
         let params = [address.to_le_bytes(), length.to_le_bytes()].concat();
@@ -182,7 +178,6 @@ impl Client {
         Ok(self.block(address, address)?.number(address))
     }
 
-    /// Writes bytes of the table.
     pub fn write(&mut self, address: u16, data: &[u8]) -> Result<(), Error> {
         let doing = format!("write {}", table::place(address));
         self.ask(&doing, instruction::WRITE, &[&address.to_le_bytes(), data].concat(), 0).map(drop)

@@ -24,7 +24,6 @@ pub enum Topic {
 }
 
 impl Topic {
-    /// Name of the topic for a controller.
     pub fn name(self, id: u8) -> String {
         let kind = match self {
             Self::Scalars => "scalars",
@@ -33,7 +32,6 @@ impl Topic {
         topic(id, kind)
     }
 
-    /// Name of the topic's schema.
     pub fn schema_name(self) -> &'static str {
         match self {
             Self::Scalars => "fingertip.Scalars",
@@ -41,7 +39,6 @@ impl Topic {
         }
     }
 
-    /// Schema of the topic, as JSON Schema.
     pub fn schema(self) -> Vec<u8> {
         match self {
             Self::Scalars => {

@@ -8,12 +8,10 @@ const SECONDS: RangeInclusive<f64> = 0.0..=1e9;
 /// Range of rates, Hz: from one in a quarter of an hour to more than there are frames.
 const RATES_HZ: RangeInclusive<f64> = 0.001..=1e6;
 
-/// A time in s.
 pub fn seconds(text: &str) -> Result<f64, String> {
     within(text, &SECONDS)
 }
 
-/// A rate in Hz.
 pub fn rate_hz(text: &str) -> Result<f64, String> {
     within(text, &RATES_HZ)
 }
@@ -23,7 +21,6 @@ pub fn rate_hz_or_all(text: &str) -> Result<f64, String> {
     if text.parse() == Ok(0.0) { Ok(0.0) } else { rate_hz(text).map_err(|why| format!("{why}, or 0")) }
 }
 
-/// A share in percent.
 pub fn percent(text: &str) -> Result<f64, String> {
     within(text, &(0.0..=100.0))
 }

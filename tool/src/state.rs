@@ -30,7 +30,6 @@ pub struct State {
     pub travel_um: i64,
     pub speed_um_per_s: i64,
     pub duty_permille: i64,
-    /// A mode's number.
     pub mode: i64,
     /// Number of the fault; 0 without one.
     pub fault: i64,
@@ -79,7 +78,6 @@ impl State {
         }
     }
 
-    /// The mode in words.
     pub fn mode_name(&self) -> String {
         table::meaning(address::PRESENT_MODE, self.mode)
     }
@@ -89,7 +87,6 @@ impl State {
         (self.fault != 0).then(|| table::meaning(address::FAULT, self.fault))
     }
 
-    /// The limits in words.
     pub fn limit_names(&self) -> Vec<String> {
         table::bits(address::LIMITS, self.limits)
     }

@@ -6,9 +6,7 @@ use fingertip::shipped::{REGISTERS, address};
 /// Registers side by side, as they were read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Block {
-    /// First address.
     pub first: u16,
-    /// Bytes as received.
     pub bytes: Vec<u8>,
 }
 
@@ -51,7 +49,6 @@ pub fn place(address: u16) -> String {
     register_at(address).map_or_else(|| format!("address {address}"), name)
 }
 
-/// A register by its name.
 pub fn find(wanted: &str) -> Result<&'static Register, String> {
     let found = REGISTERS.iter().find(|register| register.name.eq_ignore_ascii_case(wanted));
     found.ok_or_else(|| {
@@ -104,7 +101,6 @@ fn decode(kind: Kind, bytes: &[u8]) -> Option<i64> {
     })
 }
 
-/// The model number of a fingertip.
 pub fn model() -> i64 {
     register_at(address::MODEL_NUMBER).map_or(0, |register| register.min)
 }

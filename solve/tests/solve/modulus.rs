@@ -26,18 +26,14 @@ fn solved(draw: &Draw, presses: &[Press]) -> (Modulus, [f64; 2]) {
     (found, errors)
 }
 
-/// Median, worst, standard deviation, standard uncertainty, and how many are within two.
+/// Median, worst, standard deviation, standard uncertainty, and how many are within two; printed too.
 fn summary(name: &str, errors: &[[f64; 2]]) -> [f64; 5] {
     let mut sizes: Vec<f64> = errors.iter().map(|[error, _]| error.abs()).collect();
     sizes.sort_by(f64::total_cmp);
     let rms = |at: usize| (errors.iter().map(|one| one[at] * one[at]).sum::<f64>() / errors.len() as f64).sqrt();
     let within = errors.iter().filter(|[error, sigma]| error.abs() <= 2.0 * sigma).count();
     let summary = [sizes[sizes.len() / 2], sizes[sizes.len() - 1], rms(0), rms(1), within as f64];
-    let [median, worst, deviation, sigma, within] = summary;
-    println!(
-        "{name}: {} tips, median {median:.2} %, worst {worst:.2} %, deviation {deviation:.2} %, uncertainty {sigma:.2} %, {within} within two",
-        errors.len()
-    );
+    println!("{name}: {} tips, {summary:.2?}", errors.len());
     summary
 }
 

@@ -91,7 +91,6 @@ const POLL_NS: i64 = 50_000_000;
 const TRIES: u32 = 3;
 
 impl Run<'_> {
-    /// Reports progress to people.
     pub fn report(&self, text: impl std::fmt::Display) {
         if !self.json {
             aside(text);
@@ -123,12 +122,10 @@ impl Run<'_> {
         Err(format!("{why}. {TRIES} answers to \"{question}\" were not understood; {option} gives the answer").into())
     }
 
-    /// Asks for yes or no.
     pub fn yes(&self, question: &str, option: &str) -> Result<bool, Error> {
         self.parsed(&format!("{question} [yes/no]"), option, yes_or_no, &mut || Ok(()))
     }
 
-    /// Waits for Enter.
     pub fn enter(&self, question: &str, option: &str) -> Result<(), Error> {
         self.parsed(&format!("{question}; then press Enter"), option, |_| Ok(()), &mut || Ok(()))
     }
@@ -184,7 +181,6 @@ pub fn yes_or_no(text: &str) -> Result<bool, String> {
 // A file is written beside its place and renamed once it is whole. A record is listed in `session.json` after it was
 // written: a kill between the two repeats the motion.
 
-/// Version of `session.json`.
 const VERSION: u64 = 1;
 
 /// Parameters and gains of the controller at one time.
@@ -201,7 +197,6 @@ impl Settings {
         Ok(Self { params: params::of_bytes(&bytes), gains: file::read_gains(client)? })
     }
 
-    /// Value of a parameter by its name.
     fn get(&self, name: &str) -> Option<i32> {
         let index = Params::RANGES.iter().position(|(known, ..)| *known == name)?;
         self.params.to_array().get(index).copied()
@@ -282,13 +277,11 @@ impl Session {
         self.steps.get(step).and_then(Value::as_array).map(Vec::as_slice).unwrap_or_default()
     }
 
-    /// Keeps a step.
     pub fn done(&mut self, name: &str, value: Value) -> Result<(), Error> {
         self.steps.insert(name.into(), value);
         self.keep()
     }
 
-    /// Keeps a record.
     pub fn recorded(&mut self, name: &str, bytes: Vec<u8>) -> Result<(), Error> {
         if let Some(folder) = &self.folder {
             whole::write(&folder.join(name), true, &bytes)?;

@@ -28,7 +28,6 @@ const CLEAR_MN: i64 = 10;
 /// a killed program or a lost cable ends in fault 7. Every other end releases the object and turns torque off.
 #[derive(Debug)]
 pub struct Moving<'a> {
-    /// The controller.
     pub client: &'a mut Client,
     /// Watchdog to put back at the end; none once the finger was stopped.
     watchdog: Option<i64>,

@@ -5,7 +5,7 @@ mod server;
 #[cfg(feature = "foxglove")]
 pub use server::run;
 
-use crate::{Client, Error, numbers};
+use crate::numbers;
 
 /// Address of the stream.
 #[derive(Debug, clap::Args)]
@@ -25,6 +25,6 @@ pub struct Args {
 
 /// Refuses to stream.
 #[cfg(not(feature = "foxglove"))]
-pub fn run(_: &Args, _: &mut Client) -> Result<(), Error> {
+pub fn run(_: &Args, _: &mut crate::Client) -> Result<(), crate::Error> {
     Err("this build does not stream: `cargo install --path tool --features foxglove` makes one that does".into())
 }

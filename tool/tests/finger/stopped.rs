@@ -25,9 +25,7 @@ const MOTIONS: [(&[&str], &str); 4] = [
 /// Starts a command and waits until it is in the middle of its motion: a press until it presses.
 fn caught(finger: &Served, arguments: &[&str], mode: &str) -> Child {
     finger.done(&["tare"]);
-    let file = finger.file("caught.mcap");
-    let out: &[&str] = if arguments[0] == "capture" { &[&file] } else { &[] };
-    let child = finger.start(&[arguments, out].concat());
+    let child = finger.start(&with_file(arguments, &finger.file("caught.mcap")));
     finger.until(mode);
     while mode == "Press:" && finger.true_force_n() < 0.5 {
         std::thread::sleep(Served::LOOK);

@@ -95,7 +95,13 @@ pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Err
             let file::Kept { mut values, gains } = file::read(file)?;
             // Who moves a device to another address or speed means it, and says so by `set`.
             values.retain(|(register, _)| !is_bus(register));
-            restore(&values, gains.as_deref(), *save, client, json)
+            torque_is_off(client)?;
+            with_gains(gains.as_deref(), client, |client, new| {
+                if new && !json {
+                    say("the taxels' gains are others now: tare");
+                }
+                change(&values, *save, client, json)
+            })
         }
         Command::Diff { file } => diff(file.as_deref(), client, json),
     }
@@ -128,25 +134,6 @@ fn read_all(client: &mut Client) -> Result<Vec<Value>, Error> {
         Ok((register, value))
     };
     table::stored().map(read).collect()
-}
-
-/// Like [`change`], with the taxels' gains.
-fn restore(
-    values: &[Value],
-    gains: Option<&[Vec<u16>]>,
-    save: bool,
-    client: &mut Client,
-    json: bool,
-) -> Result<(), Error> {
-    if client.number(address::TORQUE_ENABLE)? != 0 {
-        return Err("torque is on: parameters are set with torque off. Nothing was changed".into());
-    }
-    with_gains(gains, client, |client, new| {
-        if new && !json {
-            say("the taxels' gains are others now: tare");
-        }
-        change(values, save, client, json)
-    })
 }
 
 /// Sets the taxels' gains, then does `set`, which gets whether they are new; puts them back if that fails.
@@ -310,9 +297,7 @@ pub(in crate::commands) fn set(values: &[Value], client: &mut Client) -> Result<
     let config = Config::shipped(&of_bytes(&after));
     let config = config.map_err(|why| format!("these do not go together: {why}; nothing was changed"))?;
     config.warnings().for_each(|warning| eprintln!("warning: {warning}"));
-    if client.number(address::TORQUE_ENABLE)? != 0 {
-        return Err("torque is on: parameters are set with torque off. Nothing was changed".into());
-    }
+    torque_is_off(client)?;
     for (_, id) in others.iter().filter(|(register, _)| register.address == address::ID) {
         if *id != i64::from(client.id) && client.is_taken(*id as u8)? {
             let why = "two with one ID cannot be told apart, nor set apart again";
@@ -346,6 +331,13 @@ pub(in crate::commands) fn set(values: &[Value], client: &mut Client) -> Result<
         }
     }
     Ok(changed)
+}
+
+fn torque_is_off(client: &mut Client) -> Result<(), Error> {
+    if client.number(address::TORQUE_ENABLE)? == 0 {
+        return Ok(());
+    }
+    Err("torque is on: parameters are set with torque off. Nothing was changed".into())
 }
 
 /// Error after a lost answer.

@@ -80,10 +80,12 @@ fn stop(client: &mut Client, releases: bool, json: bool) -> Result<Value, Error>
     if !json {
         let was = |state: &State| format!("mode {}, {} mN", state.mode_name(), state.force_mn);
         say(format_args!("ID {id}: {} -> {}", was(&before), was(&after)));
-        say(format_args!(
-            "torque is off, measurements are aborted, the bus watchdog is off (it was {})",
-            shown(watchdog)
-        ));
+        let shown = match watchdog {
+            0 => "off".into(),
+            ..0 => "tripped".into(),
+            steps => format!("{} ms", 20 * steps),
+        };
+        say(format_args!("torque is off, measurements are aborted, the bus watchdog is off (it was {shown})"));
         if let Some(fault) = after.fault_name() {
             say(format_args!("fault {} ({fault}) remains: `fingertip recover` clears it", after.fault));
         }
@@ -99,13 +101,4 @@ fn stop(client: &mut Client, releases: bool, json: bool) -> Result<Value, Error>
         "force_mn": after.force_mn, "fault": after.fault, "fault_name": after.fault_name(),
         "watchdog_before": watchdog, "at_rest": true,
     }))
-}
-
-/// The watchdog's number for people.
-fn shown(watchdog: i64) -> String {
-    match watchdog {
-        0 => "off".into(),
-        ..0 => "tripped".into(),
-        steps => format!("{} ms", 20 * steps),
-    }
 }

@@ -1,6 +1,6 @@
 //! The joint least squares over all strokes.
 
-use super::model::{ALL, FITTED, Form, Law, Parameters, Path, index};
+use super::model::{ALL, FITTED, FORMS, Law, Parameters, Path, index};
 use super::{NoDrive, Record};
 use nalgebra::{Cholesky, Matrix3, SMatrix, SVector, Vector3};
 
@@ -225,8 +225,8 @@ impl Fit {
         let mut failed = NoDrive::Unsolved(0);
         for even in [true, false] {
             let mut fits = Vec::new();
-            for form in Form::ALL {
-                match Self::new(paths, Law { form, slowest }, record, even) {
+            for share in FORMS {
+                match Self::new(paths, Law { share, slowest }, record, even) {
                     Ok(fit) => fits.push(fit),
                     Err(refusal) => failed = refusal,
                 }

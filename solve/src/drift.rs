@@ -3,7 +3,7 @@
 use crate::Value;
 use crate::modulus::{NoModulus, modulus};
 use crate::press::Press;
-use crate::robust::{Fit, minimise};
+use crate::robust::minimise;
 use nalgebra::DVector;
 
 /// Readings under a force that does not change: a weight, or a loop that holds a scale's number.
@@ -20,31 +20,24 @@ pub struct Creep {
     pub share: Value,
     /// Time constant, s (`creep_time_ms`).
     pub time_s: Value,
-    /// Growth for each decade of time, as a share: what remains of it where the hold lasts longer than was seen.
-    pub per_decade: Value,
     /// Root mean square of what the share and its time constant leave, as a share of the reading.
     pub left: f64,
 }
 
 /// Reason why there is no creep or temperature coefficient, with the number behind it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "their texts say it")]
 pub enum NoDrift {
-    /// Number of readings of the hold.
     #[error("the hold has {0} readings; 10 are needed")]
     Readings(usize),
-    /// Duration of the hold, s.
     #[error("the hold lasts {0:.1} s; 5 s are needed")]
     Short(f64),
-    /// No step of a press has the chip's temperature.
     #[error("the chip's temperature is unknown in one of the presses")]
     Temperature,
-    /// Difference of the chip's temperature between the presses, K.
     #[error("the presses differ by {0:.1} K; 3 K are needed")]
     Warming(f64),
-    /// A press gave no modulus.
     #[error("{0}")]
     Press(#[from] NoModulus),
-    /// The fit has no solution.
     #[error("the fit has no solution")]
     Fit,
 }
@@ -64,26 +57,20 @@ pub fn creep(series: &HeldSeries) -> Result<Creep, NoDrift> {
         return Err(NoDrift::Short(long_s));
     }
     let first_n = readings[0][1];
-    let off = |model: &dyn Fn(f64) -> f64| {
-        let off = readings.iter().map(|[time_s, force_n]| (model(time_s - begin_s) - force_n / first_n) / 1e-3);
-        DVector::from_iterator(readings.len(), off)
-    };
-    // A weak prior keeps the time constant near the length of the hold.
     let lag = |x: &DVector<f64>| {
         let model = |time_s: f64| x[0] * (1.0 + x[1] * (1.0 - (-time_s / x[2].exp()).exp()));
-        off(&model).push((x[2] - (0.3 * long_s).ln()) / 2.0)
+        let off = readings.iter().map(|[time_s, force_n]| (model(time_s - begin_s) - force_n / first_n) / 1e-3);
+        // A weak prior keeps the time constant near the length of the hold.
+        DVector::from_iterator(readings.len(), off).push((x[2] - (0.3 * long_s).ln()) / 2.0)
     };
     let fit = minimise(&[1.0, 0.03, (0.3 * long_s).ln()], &[1e-5, 1e-5, 1e-3], lag).ok_or(NoDrift::Fit)?;
-    let log = |x: &DVector<f64>| off(&|time_s: f64| x[0] + x[1] * (1.0 + time_s / 0.1).log10());
-    let slope = minimise(&[1.0, 0.03], &[1e-5, 1e-5], log).ok_or(NoDrift::Fit)?;
-    let scale = |fit: &Fit| (fit.cost / (readings.len() - fit.unknowns.len()) as f64).sqrt();
-    let sigma = |fit: &Fit, at: usize| scale(fit) * fit.covariance[(at, at)].sqrt();
+    let scale = (fit.cost / (readings.len() - fit.unknowns.len()) as f64).sqrt();
+    let sigma = |at: usize| scale * fit.covariance[(at, at)].sqrt();
     let time_s = fit.unknowns[2].exp();
     Ok(Creep {
-        share: Value { value: fit.unknowns[1], sigma: sigma(&fit, 1) },
-        time_s: Value { value: time_s, sigma: sigma(&fit, 2) * time_s },
-        per_decade: Value { value: slope.unknowns[1] / slope.unknowns[0], sigma: sigma(&slope, 1) },
-        left: 1e-3 * scale(&fit),
+        share: Value { value: fit.unknowns[1], sigma: sigma(1) },
+        time_s: Value { value: time_s, sigma: sigma(2) * time_s },
+        left: 1e-3 * scale,
     })
 }
 

@@ -17,7 +17,7 @@
 use crate::joint::{YIELD_USUAL, joint};
 use crate::judge::{Judgement, Verdict};
 use crate::memory::without_creep;
-use crate::model::{Pose, UNKNOWNS};
+use crate::model::Pose;
 use crate::modulus::each;
 use crate::press::Press;
 use crate::record::{Ended, Reason};
@@ -70,12 +70,8 @@ impl Gain {
 pub struct Posed {
     /// The pose.
     pub pose: Pose,
-    /// Standard uncertainties, in the order of the fields.
-    pub sigma: [f64; UNKNOWNS],
     /// Force of each step of the press, N.
     pub forces_n: Vec<f64>,
-    /// Root mean square residual of the sound taxels, as a share of the step's highest reading.
-    pub misfit: f64,
     /// Was it a press onto a hard plate that stood still?
     pub judgement: Judgement,
 }
@@ -99,26 +95,20 @@ pub struct Gains {
 
 /// Reason why a press, or all of them, do not count, with the number behind it.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "their texts say it")]
 pub enum NoGains {
-    /// No press was given.
     #[error("no press was given")]
     NoPress,
-    /// The chip ended the press early.
     #[error("the press was ended early: {0}")]
     Ended(#[from] Ended),
-    /// Rows and columns of the array of the press, and of the first press.
     #[error("the press has an array of {0:?} rows and columns, the first press one of {1:?}")]
     Shape([usize; 2], [usize; 2]),
-    /// The judgement of a press.
     #[error("{0}")]
     Judged(Verdict),
-    /// Number of loading steps that touch.
     #[error("{0} loading steps touch the plate; 5 are needed: press deeper")]
     Steps(usize),
-    /// Number of sound taxels that were pressed.
     #[error("{0} sound taxels were pressed; 8 are needed: press deeper or nearer the middle")]
     Taxels(usize),
-    /// Change of the poses after the last round, in tip radii.
     #[error("the poses still change by {0} radii after the last round; 0.02 is allowed")]
     Unsettled(f64),
 }
@@ -155,7 +145,7 @@ pub(crate) fn settle(presses: &[Press]) -> Result<Settled, NoGains> {
     for press in presses.chunks(1).filter(|press| fault(&press[0]).is_none()) {
         let Ok(first) = joint(press, 0.0) else { continue };
         for one in each(press, &first).into_iter().flatten() {
-            let weight = one.memory_sigma[1].powi(-2);
+            let weight = one.creep_sigma.powi(-2);
             (sum, weights) = (sum + weight * one.memory.creep, weights + weight);
         }
     }

@@ -129,8 +129,9 @@ impl<'a> Joint<'a> {
     }
 
     fn squares(&self) -> Vec<Vec<Square>> {
-        let square =
-            |index: usize, taxel| Square::new(&self.now.poses[index], &self.presses[index].tip, &self.array, taxel);
+        let square = |index: usize, taxel| {
+            Square::new(&self.now.poses[index], self.presses[index].radius_mm, &self.array, taxel)
+        };
         (0..self.presses.len())
             .map(|index| (0..self.array.taxels()).map(|taxel| square(index, taxel)).collect())
             .collect()
@@ -259,7 +260,7 @@ impl<'a> Joint<'a> {
             usual(at + 3, pose.tilt[0], TILT_USUAL);
             usual(at + 4, pose.tilt[1], TILT_USUAL);
             usual(at + 5, pose.roundness, ROUNDNESS_USUAL);
-            let radius_mm = self.presses[index].tip.radius_mm;
+            let radius_mm = self.presses[index].radius_mm;
             usual(at + 6, pose.yields_mm_per_n / radius_mm, self.yield_usual / radius_mm);
         }
         let [_, stiffness_at, gains_at] = self.places();
@@ -312,7 +313,7 @@ impl<'a> Joint<'a> {
         let [_, stiffness_at, gains_at] = self.places();
         let mut largest: f64 = 0.0;
         for (index, pose) in self.now.poses.iter_mut().enumerate() {
-            let radius_mm = self.presses[index].tip.radius_mm;
+            let radius_mm = self.presses[index].radius_mm;
             let mut unknowns = pose.unknowns(radius_mm);
             for (unknown, change) in unknowns.iter_mut().zip(change.rows(index * UNKNOWNS, UNKNOWNS).iter()) {
                 *unknown += change.clamp(-0.05, 0.05);
@@ -385,8 +386,7 @@ impl<'a> Joint<'a> {
         let known = || taxels.iter().filter(|gain| gain.condition == Condition::Sound);
         let variance = known().map(|gain| (gain.reads - 1.0).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
         let common = (variance / count).sqrt();
-        let presses =
-            (0..self.presses.len()).map(|index| self.posed(index, &residuals, &covariance, &change, &taxels)).collect();
+        let presses = (0..self.presses.len()).map(|index| self.posed(index, &covariance, &change, &taxels)).collect();
         Ok(Gains {
             columns: self.array.columns,
             taxels,
@@ -432,29 +432,12 @@ impl<'a> Joint<'a> {
         reached
     }
 
-    fn posed(
-        &self,
-        index: usize,
-        residuals: &[Residual],
-        covariance: &DMatrix<f64>,
-        change: &DVector<f64>,
-        taxels: &[Gain],
-    ) -> Posed {
-        let (pose, press) = (self.now.poses[index], &self.presses[index]);
-        let radius_mm = press.tip.radius_mm;
-        let at = |unknown: usize, unit: f64| {
-            covariance[(index * UNKNOWNS + unknown, index * UNKNOWNS + unknown)].sqrt() * unit
-        };
-        let units = [radius_mm, radius_mm, radius_mm, 1.0, 1.0, 1.0, radius_mm];
-        let sigma = core::array::from_fn(|unknown| at(unknown, units[unknown]));
-        let own =
-            residuals.iter().filter(|residual| self.used[residual.step].press == index && residual.share.value > 0.0);
-        let highest = |step: usize| self.used[step].step.taxels.iter().map(|taxel| taxel.mean).fold(0.0, f64::max);
-        let parts = own.map(|r| r.value * r.sigma * self.array.codes_per_kpa / highest(r.step));
-        let misfit = spread(parts);
+    fn posed(&self, index: usize, covariance: &DMatrix<f64>, change: &DVector<f64>, taxels: &[Gain]) -> Posed {
+        let (pose, press, yields_at) = (self.now.poses[index], &self.presses[index], index * UNKNOWNS + 6);
         let forces_n = forces(press, &pose, taxels);
-        let yields = pose.yields_mm_per_n + radius_mm * change[index * UNKNOWNS + 6];
-        let judgement = judge(&pose, [yields, sigma[6]], &shifts(press, &pose, taxels, &forces_n));
-        Posed { pose, sigma, forces_n, misfit, judgement }
+        let yields = pose.yields_mm_per_n + press.radius_mm * change[yields_at];
+        let sigma = covariance[(yields_at, yields_at)].sqrt() * press.radius_mm;
+        let judgement = judge(&pose, [yields, sigma], &shifts(press, &pose, taxels, &forces_n));
+        Posed { pose, forces_n, judgement }
     }
 }

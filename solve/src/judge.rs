@@ -34,31 +34,24 @@ pub struct Shift {
 pub struct Judgement {
     /// Yield of the plate, mm/N, and its standard uncertainty.
     pub yields_mm_per_n: [f64; 2],
-    /// Speed of the plate away from the tip, mm/s, and its standard uncertainty.
-    pub moves_mm_per_s: [f64; 2],
     /// Verdict.
     pub verdict: Verdict,
 }
 
 /// Verdict on a press, with the number behind it.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "their texts say it")]
 pub enum Verdict {
-    /// The press counts.
     #[error("the press counts")]
     Good,
-    /// Yield of the plate, mm/N. The press counts, and the yield is taken off.
     #[error("the plate yields by {0:.3} mm/N, more than 2.5 % of the depth: the yield is taken off")]
     Soft(f64),
-    /// Speed of the plate away from the tip, mm/s.
     #[error("the plate moves by {0:.3} mm/s; 0.01 is allowed: hold plate and finger fast")]
     Moving(f64),
-    /// Least force, as a share of the force by the depth.
     #[error("the force fell to {0:.2} of what the depth says: the contact was lost")]
     Lost(f64),
-    /// Indentation, mm.
     #[error("the tip was indented by {0:.2} mm; 0.3 is needed: press deeper")]
     TooLittle(f64),
-    /// Roundness of the gap between tip and plate.
     #[error(
         "the gap is rounder than the tip's radius says by {0:.2}; 0.1 is allowed: is the plate flat, the radius right?"
     )]
@@ -79,7 +72,7 @@ const LOST_FROM: f64 = 0.5;
 /// Shifts of the contact, by the image, for all steps of a press that touch.
 pub fn shifts(press: &Press, pose: &Pose, taxels: &[Gain], forces_n: &[f64]) -> Vec<Shift> {
     let array = &press.array;
-    let squares: Vec<_> = (0..array.taxels()).map(|taxel| Square::new(pose, &press.tip, array, taxel)).collect();
+    let squares: Vec<_> = (0..array.taxels()).map(|taxel| Square::new(pose, press.radius_mm, array, taxel)).collect();
     let depth2 = |step: &Step| (step.middle_mm() - pose.touch_mm).max(0.0).powi(2);
     let stiffnesses = press.steps.iter().zip(forces_n).filter(|(step, _)| depth2(step) > 0.01);
     let usual = median(stiffnesses.map(|(step, force)| force / depth2(step)).collect());
@@ -105,7 +98,7 @@ pub fn shifts(press: &Press, pose: &Pose, taxels: &[Gain], forces_n: &[f64]) -> 
             down += slope * slope;
             off2 += (read - stiffness * value).powi(2);
         }
-        let radius_mm = press.tip.radius_mm;
+        let radius_mm = press.radius_mm;
         shifts.push(Shift {
             time_s: step.middle_s(),
             travel_mm: step.middle_mm(),
@@ -143,7 +136,7 @@ pub fn judge(pose: &Pose, yields_mm_per_n: [f64; 2], shifts: &[Shift]) -> Judgem
     } else {
         Verdict::Good
     };
-    Judgement { yields_mm_per_n, moves_mm_per_s, verdict }
+    Judgement { yields_mm_per_n, verdict }
 }
 
 /// Slope of the shift by time, beside one by the force, with its standard uncertainty.

@@ -10,7 +10,7 @@
 //! with r from the tip's axis, d = x - x_c - e F the indentation at the axis (travel x, touch x_c, yield e of the plate), t the plate's tilt and k the roundness. A taxel reads the
 //! mean over its square.
 
-use crate::press::{Array, Tip};
+use crate::press::Array;
 
 /// Number of unknowns of a pose.
 pub const UNKNOWNS: usize = 7;
@@ -91,11 +91,11 @@ pub struct Square {
 
 impl Square {
     /// Square of a taxel.
-    pub fn new(pose: &Pose, tip: &Tip, array: &Array, taxel: usize) -> Self {
-        let unknowns = pose.unknowns(tip.radius_mm);
+    pub fn new(pose: &Pose, radius_mm: f64, array: &Array, taxel: usize) -> Self {
+        let unknowns = pose.unknowns(radius_mm);
         let [touch, axis_x, axis_y, tilt_x, tilt_y, roundness, _] = unknowns;
-        let [x, y] = array.place_mm(taxel).map(|place_mm| place_mm / tip.radius_mm);
-        let side = array.pitch_mm / tip.radius_mm / SIDE as f64;
+        let [x, y] = array.place_mm(taxel).map(|place_mm| place_mm / radius_mm);
+        let side = array.pitch_mm / radius_mm / SIDE as f64;
         let offset = |index: usize| (index as f64 - 0.5 * (SIDE - 1) as f64) * side;
         let parts = (0..SIDE * SIDE).filter_map(|part| {
             let [x, y] = [x + offset(part % SIDE) - axis_x, y + offset(part / SIDE) - axis_y];
@@ -106,7 +106,7 @@ impl Square {
             let spread = 0.5 * side * (tilt_x - x * round).hypot(tilt_y - y * round);
             (length > SHORTEST).then_some(Part { length, gap, spread, from_axis: [x, y] })
         });
-        Self { parts: parts.collect(), unknowns, radius_mm: tip.radius_mm }
+        Self { parts: parts.collect(), unknowns, radius_mm }
     }
 
     /// Mean pressure as a share of Y.

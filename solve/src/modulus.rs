@@ -40,10 +40,8 @@ pub struct OfPress {
     pub touch_mm: f64,
     /// Memory of tip and ink.
     pub memory: Memory,
-    /// Standard uncertainties of hysteresis, creep and relaxation.
-    pub memory_sigma: [f64; 3],
-    /// Root mean square residual as a share of the force.
-    pub misfit: f64,
+    /// Standard uncertainty of the creep.
+    pub creep_sigma: f64,
 }
 
 /// Modulus of the tip.
@@ -76,11 +74,10 @@ pub struct Parts {
 
 /// Reason why there is no modulus.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "their texts say it")]
 pub enum NoModulus {
-    /// No press counts.
     #[error("{0}")]
     Gains(#[from] NoGains),
-    /// The fit of force over travel has no solution for any of this number of presses.
     #[error("force over travel of {0} presses does not follow the model")]
     Fit(usize),
 }
@@ -125,7 +122,7 @@ pub(crate) fn each(presses: &[Press], gains: &Gains) -> Vec<Option<OfPress>> {
 }
 
 fn of_press(press: &Press, pose: &Pose, measured: &[f64]) -> Option<OfPress> {
-    let (radius_mm, touch_mm) = (press.tip.radius_mm, pose.touch_mm);
+    let (radius_mm, touch_mm) = (press.radius_mm, pose.touch_mm);
     // Travel into the tip: less what the plate yields.
     let mut press = press.clone();
     for (step, force_n) in press.steps.iter_mut().zip(measured) {
@@ -180,13 +177,6 @@ fn of_press(press: &Press, pose: &Pose, measured: &[f64]) -> Option<OfPress> {
         }
     }
     let (kpa, touch_mm, memory) = read(&mean, mean[UNKNOWNS].exp());
-    let [kpa_sigma, _, hysteresis, creep, relaxation] = variance.map(f64::sqrt);
-    Some(OfPress {
-        kpa,
-        sigma_kpa: kpa_sigma * kpa,
-        touch_mm,
-        memory,
-        memory_sigma: [hysteresis, creep, relaxation],
-        misfit: scale * FORCE_PART,
-    })
+    let [kpa_sigma, _, _, creep_sigma, _] = variance.map(f64::sqrt);
+    Some(OfPress { kpa, sigma_kpa: kpa_sigma * kpa, touch_mm, memory, creep_sigma })
 }

@@ -7,15 +7,6 @@ use crate::gains::{Condition, Gain};
 use crate::model::{At, Pose, Square};
 use crate::record::Ended;
 
-/// Soft tip of the finger, as configured.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tip {
-    /// Radius a, mm.
-    pub radius_mm: f64,
-    /// Young's modulus Y in the parameters, kPa. It is a start value: no result leans on it.
-    pub modulus_kpa: f64,
-}
-
 /// Tactile array: square taxels that touch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Array {
@@ -75,8 +66,6 @@ pub struct Step {
     pub branch: Branch,
     /// Readings of all taxels, row by row.
     pub taxels: Vec<Reading>,
-    /// Mean voltage at the bridge, V.
-    pub bridge_v: f64,
     /// Temperature of the microcontroller, degrees Celsius; None where it is unknown.
     pub chip_c: Option<f64>,
 }
@@ -112,8 +101,8 @@ impl Step {
 /// A press: steps in order of time, from the air into the plate and back.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Press {
-    /// Tip as configured.
-    pub tip: Tip,
+    /// Radius of the tip as configured, mm.
+    pub radius_mm: f64,
     /// Array.
     pub array: Array,
     /// Steps in order of time.
@@ -153,10 +142,10 @@ const BESIDE: usize = 4;
 /// Near the contact and in the air, the ratio is the one at a quarter of the depth: the readings that creep leaves
 /// there count as forces too, and [`crate::modulus()`] needs them to separate creep from relaxation.
 pub fn forces(press: &Press, pose: &Pose, taxels: &[Gain]) -> Vec<f64> {
-    let Press { tip, array, .. } = press;
+    let Press { radius_mm, array, .. } = press;
     let sound = |taxel: usize| matches!(taxels[taxel].condition, Condition::Sound | Condition::Unreached);
     let wide = Array { rows: array.rows + 2 * BESIDE, columns: array.columns + 2 * BESIDE, ..*array };
-    let squares: Vec<_> = (0..wide.taxels()).map(|taxel| Square::new(pose, tip, &wide, taxel)).collect();
+    let squares: Vec<_> = (0..wide.taxels()).map(|taxel| Square::new(pose, *radius_mm, &wide, taxel)).collect();
     let inner = |taxel: usize| (taxel / array.columns + BESIDE) * wide.columns + taxel % array.columns + BESIDE;
     let least_mm = pose.touch_mm + 0.25 * (press.deepest_mm() - pose.touch_mm).max(0.0);
     let force = |step: &Step| {

@@ -8,7 +8,7 @@
 pub use fingertip::measure::Ended as Reason;
 
 use crate::Value;
-use crate::press::{Array, Branch, Press, Reading, Step, Tip};
+use crate::press::{Array, Branch, Press, Reading, Step};
 use crate::strokes::{Record, Sample, Stroke};
 use fingertip::measure::series::{HEAD, VERSION, check, step_bytes};
 use fingertip::measure::strokes::SAMPLE_FRAMES;
@@ -36,11 +36,13 @@ const ZERO_K: f64 = -273.15;
 const RESISTANCE_PART: f64 = 0.022;
 
 /// Kind of a series.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Kind {
     /// Steps of a press.
+    #[error("a press")]
     Press = 1,
     /// Samples of strokes in the air.
+    #[error("strokes")]
     Strokes = 2,
 }
 
@@ -57,52 +59,38 @@ impl std::error::Error for Ended {}
 
 /// Reason why bytes are not a series, with the number behind it.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "their texts say it")]
 pub enum NoRecord {
-    /// Number of bytes.
     #[error("the series has {0} bytes; its head alone has {HEAD}")]
     Short(usize),
-    /// First bytes.
     #[error("the bytes begin with {0:02x?}, not with \"FTS\": they are not a series")]
     Magic([u8; 3]),
-    /// Version of the format.
     #[error("the series has format {0}; this program reads format {VERSION}")]
     Version(u8),
-    /// Kind that was requested, and number of the kind in the series.
     #[error("the series does not hold {0}: its kind is {1} (1 is a press, 2 are strokes)")]
     Kind(Kind, u8),
-    /// Number of the reason.
     #[error("the series ended early for reason {0}, which this program does not know")]
     Reason(u8),
-    /// Rows and columns.
     #[error("the array has {0} rows and {1} columns; both must be at least 1")]
     Shape(u8, u8),
-    /// Bytes by the head, and bytes of the series.
     #[error("the series has {1} bytes where its head says {0}: it was cut or joined")]
     Length(u64, usize),
-    /// Check by the head, and check of the body.
     #[error("the check of the body is {1:08x} where the head says {0:08x}: bytes were changed in transfer")]
     Check(u32, u32),
-    /// The frame time is 0.
     #[error("the head says a frame time of 0")]
     FrameTime,
-    /// Number of the step.
     #[error("step {0} ends before it begins, or begins before the step before it ended")]
     Order(usize),
-    /// Number of the step.
     #[error("step {0} has no frames")]
     Frames(usize),
-    /// Number of the step, and number of the branch.
     #[error("step {0} has branch {1}; 0 (in or held) and 1 (back) are known")]
     Branch(usize, u8),
-    /// Number of the record.
     #[error("sample {0} belongs to no stroke, or marks the start of a stroke with a voltage")]
     Stroke(usize),
-    /// Number of the record, its count and its voltage in quarters of a mV.
     #[error(
         "sample {0} holds count {1} and voltage {2}: the chip clips both at 32767; take an encoder or a gear with fewer counts for each mm, or a lower supply"
     )]
     Clipped(usize, i16, i16),
-    /// Parameter out of its range.
     #[error("the controller's parameters are not valid: {0}")]
     Params(#[from] ParamError),
 }
@@ -126,8 +114,9 @@ pub fn press(bytes: &[u8], params: &Params) -> Result<Press, NoRecord> {
         let frames = [cursor.u32(), cursor.u32()];
         let counts = [cursor.i32(), cursor.i32()];
         let [averaged, branch] = [cursor.u16(), u16::from(cursor.u8())];
-        cursor.u8();
-        let (bridge_mv, chip) = (cursor.u16().cast_signed(), cursor.u16());
+        // A zero, and the mean voltage at the bridge.
+        let _: [u8; 3] = cursor.take();
+        let chip = cursor.u16();
         if frames[0] > frames[1] || frames[0] < before {
             return Err(NoRecord::Order(index));
         } else if averaged == 0 {
@@ -153,13 +142,10 @@ pub fn press(bytes: &[u8], params: &Params) -> Result<Press, NoRecord> {
             frames: averaged.into(),
             branch,
             taxels,
-            bridge_v: 1e-3 * f64::from(bridge_mv),
             chip_c: (chip > 0).then(|| 0.1 * f64::from(chip) + ZERO_K),
         });
     }
-    let tip =
-        Tip { radius_mm: 1e-3 * f64::from(params.tip_radius_um), modulus_kpa: 1e-3 * f64::from(params.modulus_pa) };
-    Ok(Press { tip, array, steps, ended: head.ended })
+    Ok(Press { radius_mm: 1e-3 * f64::from(params.tip_radius_um), array, steps, ended: head.ended })
 }
 
 /// Strokes of a series. The resistance is that of the parameters, with an uncertainty of 2.2 %; a caller with a better

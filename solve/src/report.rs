@@ -1,11 +1,8 @@
 //! Results and refusals in sentences.
 
-use crate::drift::{Creep, Temperature};
 use crate::gains::{Condition, Gains};
 use crate::modulus::Modulus;
-use crate::record::{Ended, Kind, Reason};
-use crate::scale::Scale;
-use crate::strokes::MeasuredDrive;
+use crate::record::{Ended, Reason};
 use std::fmt::{Display, Formatter, Result};
 
 /// The uncertainty with two digits, the value with as many decimals.
@@ -17,20 +14,6 @@ impl Display for Value {
         }
         let decimals = (1.0 - sigma.log10().floor()).max(0.0) as usize;
         write!(f, "{value:.decimals$} +- {sigma:.decimals$}")
-    }
-}
-
-/// The value in another unit.
-fn times(value: &Value, factor: f64) -> Value {
-    Value { value: factor * value.value, sigma: factor.abs() * value.sigma }
-}
-
-impl Display for Kind {
-    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
-        f.write_str(match self {
-            Self::Press => "a press",
-            Self::Strokes => "strokes",
-        })
     }
 }
 
@@ -151,60 +134,6 @@ impl Display for Modulus {
             )?;
         }
         write!(f, " {gains}")
-    }
-}
-
-impl Display for Scale {
-    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
-        write!(f, "The force is {} times what the array reads.", self.factor)?;
-        if let Some(offset) = self.offset_n.filter(Value::differs) {
-            write!(f, " The scale shows {offset} N where the array reads nothing: was it set to zero?")?;
-        }
-        if let Some(curve) = self.curve.filter(Value::differs) {
-            let curve = times(&curve, 100.0);
-            write!(
-                f,
-                " The factor changes by {curve} % up to the largest force: the array's characteristic is not a line."
-            )?;
-        }
-        Ok(())
-    }
-}
-
-impl Display for Creep {
-    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
-        let (share, decade, left) = (times(&self.share, 100.0), times(&self.per_decade, 100.0), 100.0 * self.left);
-        write!(
-            f,
-            "A held reading grows by {share} % with a time constant of {} s, which leaves {left:.2} % of this hold. By the \
-             logarithm of time it grows by {decade} % per decade.",
-            self.time_s
-        )
-    }
-}
-
-impl Display for Temperature {
-    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
-        let (per_k, [cold_c, warm_c]) = (times(&self.per_k, 100.0), self.chip_c);
-        write!(
-            f,
-            "The array's gain changes by {per_k} % per kelvin, between {cold_c:.1} and {warm_c:.1} degrees Celsius."
-        )
-    }
-}
-
-impl Display for MeasuredDrive {
-    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
-        let [forward, back] = self.friction.each_ref().map(|friction| times(&friction.torque_nm, 1e6));
-        let [slowest, fastest] = self.speeds_rad_per_s;
-        write!(
-            f,
-            "The torque constant is {} mN m/A, the time constant {} ms, the inertia {} g cm^2, the friction {forward} uN m \
-             forward and {back} uN m back. The strokes had {slowest:.0} to {fastest:.0} rad/s.",
-            times(&self.torque_constant, 1e3),
-            times(&self.time_constant_s, 1e3),
-            times(&self.inertia_kg_m2, 1e7),
-        )
     }
 }
 

@@ -45,14 +45,11 @@ pub struct Fit {
     pub cost: f64,
 }
 
-/// Residuals in standard deviations, by the unknowns.
-pub trait Residuals: Fn(&DVector<f64>) -> DVector<f64> {}
-impl<F: Fn(&DVector<f64>) -> DVector<f64>> Residuals for F {}
-
 /// Levenberg and Marquardt's method with Huber's weights and numerical slopes, for few unknowns.
 ///
-/// `sizes` are the steps of the slopes: a hundredth of what an unknown may change by.
-pub fn minimise(start: &[f64], sizes: &[f64], residuals: impl Residuals) -> Option<Fit> {
+/// `residuals` are in standard deviations. `sizes` are the steps of the slopes: a hundredth of what an unknown may
+/// change by.
+pub fn minimise(start: &[f64], sizes: &[f64], residuals: impl Fn(&DVector<f64>) -> DVector<f64>) -> Option<Fit> {
     let mut unknowns = DVector::from_column_slice(start);
     let mut now = residuals(&unknowns);
     let mut damping = 1e-3;
@@ -90,7 +87,7 @@ fn equations(
     unknowns: &DVector<f64>,
     now: &DVector<f64>,
     sizes: &[f64],
-    residuals: &impl Residuals,
+    residuals: &impl Fn(&DVector<f64>) -> DVector<f64>,
 ) -> (DMatrix<f64>, DVector<f64>) {
     let slopes = DMatrix::from_columns(&Vec::from_iter(sizes.iter().enumerate().map(|(i, size)| {
         let mut aside = unknowns.clone();

@@ -41,11 +41,10 @@ pub struct Scale {
 
 /// Reason why there is no scale, with the number behind it.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "their texts say it")]
 pub enum NoScale {
-    /// Largest force that was held, N.
     #[error("the largest force is {0:.3} N; 0.1 N is needed")]
     TooLittle(f64),
-    /// Force shown over force read.
     #[error("the scale shows {0:.2} of what the array reads; a half to two is allowed")]
     Range(f64),
 }

@@ -34,13 +34,10 @@
 mod fit;
 mod model;
 
-pub use model::Form;
-
 use crate::Value;
 use crate::record::{Ended, Reason};
 use fit::Fit;
 use model::{Path, SPAN, index};
-use nalgebra::SVector;
 
 /// Relative standard uncertainty of a voltage: the supply's divider and reference.
 pub const VOLTAGE: f64 = 0.008;
@@ -125,44 +122,26 @@ pub struct Record {
 
 /// Reason why there is no drive, with the number behind it.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "their texts say it")]
 pub enum NoDrive {
-    /// The chip ended the motions early.
     #[error("the strokes were ended early: {0}")]
     Ended(#[from] Ended),
-    /// Counts of the longest stroke.
     #[error("the longest stroke has {0} counts; 12 are needed: check the encoder and the motor's cables")]
     Still(i32),
-    /// Counts against the voltage.
     #[error("a stroke went {0} counts against its voltage: exchange the leads of the motor or of the encoder")]
     Reversed(i32),
-    /// Counts of a jump.
     #[error("the count jumped by {0}, which no voltage of these strokes can do: check encoder and coupling")]
     Astray(i32),
-    /// Largest force that depends on the place, N.
     #[error("a force of {0:.3} N depends on the place of the tip: clear its way")]
     Pushed(f64),
-    /// Number of strokes in one direction.
     #[error("{0} strokes in one direction can be used; 3 are needed")]
     Few(usize),
-    /// Speed of the fastest stroke over that of the slowest.
     #[error(
         "the fastest stroke is {0:.1} times as fast as the slowest; 2 times are needed to tell back-EMF from friction"
     )]
     Slow(f64),
-    /// Number of rounds.
     #[error("the fit did not converge in {0} rounds: the samples do not follow the model of a motor with friction")]
     Unsolved(usize),
-}
-
-/// Friction in one direction.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Friction {
-    /// V_c: friction voltage at high speed, V.
-    pub voltage_v: Value,
-    /// V_s: additional friction voltage at standstill, V.
-    pub standstill_v: Value,
-    /// Friction torque at high speed, N m, with the caller's resistance.
-    pub torque_nm: Value,
 }
 
 /// A drive as measured.
@@ -174,18 +153,10 @@ pub struct MeasuredDrive {
     pub time_constant_s: Value,
     /// J at the motor's shaft, kg m^2, with the caller's resistance.
     pub inertia_kg_m2: Value,
-    /// Friction forward and back.
-    pub friction: [Friction; 2],
-    /// The form in which friction falls with speed that fits best.
-    pub form: Form,
-    /// w_s: the Stribeck speed of that form, rad/s.
-    pub stribeck_rad_per_s: Value,
+    /// Friction torque at high speed, forward and back, N m, with the caller's resistance.
+    pub friction_nm: [Value; 2],
     /// Largest force at the foremost place that depends on the place, N.
     pub force_n: Value,
-    /// Root mean square of the residuals, rad.
-    pub residual_rad: f64,
-    /// Speeds of the slowest and the fastest stroke, rad/s.
-    pub speeds_rad_per_s: [f64; 2],
 }
 
 /// Drive that a record shows.
@@ -263,48 +234,24 @@ pub fn solve(record: &Record) -> Result<MeasuredDrive, NoDrive> {
         unseen[index::COULOMB + side] = -slope * 0.5 * (slowest + fastest) / volts;
     }
     // Values are functions of ln k, ln a, ln V_c...; each is given by its gradient.
-    let spread = |gradient: &[(usize, f64)], reference: f64| {
-        let gradient = gradient.iter().fold(SVector::zeros(), |mut all: fit::Vector, (at, factor)| {
-            all[*at] = *factor;
-            all
-        });
-        (best.variance(&gradient, &fits) + unseen.dot(&gradient).powi(2) + reference * reference).sqrt()
+    let logarithm = |value: f64, factors: &[(usize, f64)], reference: f64| {
+        let mut gradient = fit::Vector::zeros();
+        factors.iter().for_each(|(at, factor)| gradient[*at] = *factor);
+        let variance = best.variance(&gradient, &fits) + unseen.dot(&gradient).powi(2) + reference * reference;
+        Value { value, sigma: value * variance.sqrt() }
     };
     let weights = best.weights(&fits);
     let p = |at: usize| fits.iter().zip(&weights).map(|(fit, weight)| weight * fit.p[at]).sum::<f64>();
-    let logarithm = |value: f64, gradient: &[(usize, f64)], reference: f64| Value {
-        value,
-        sigma: value * spread(gradient, reference),
-    };
     let (k, a) = (p(index::K).exp(), p(index::A).exp());
-    let friction = [0, 1].map(|side| {
-        let (coulomb, stribeck) = (index::COULOMB + side, index::STRIBECK + side);
-        let standstill = |p: &model::Parameters| best.law.form.standstill_v(p, side, best.law.slowest);
-        let slope = |at: usize| {
-            let mut other = best.p;
-            other[at] += 1e-6;
-            (standstill(&other) - standstill(&best.p)) * 1e6
-        };
-        let (voltage_v, reference) = (p(coulomb).exp(), resistance.relative().hypot(2.0 * VOLTAGE));
-        Friction {
-            voltage_v: logarithm(voltage_v, &[(coulomb, 1.0)], VOLTAGE),
-            standstill_v: Value {
-                value: standstill(&best.p),
-                sigma: spread(&[(stribeck, slope(stribeck)), (index::SPEED, slope(index::SPEED))], 0.0),
-            },
-            torque_nm: logarithm(voltage_v * k / resistance.value, &[(coulomb, 1.0), (index::K, 1.0)], reference),
-        }
+    let reference = resistance.relative().hypot(2.0 * VOLTAGE);
+    let friction_nm = [index::COULOMB, index::COULOMB + 1].map(|coulomb| {
+        logarithm(p(coulomb).exp() * k / resistance.value, &[(coulomb, 1.0), (index::K, 1.0)], reference)
     });
-    let both = [(index::A, 1.0), (index::K, 1.0)];
     Ok(MeasuredDrive {
         torque_constant: logarithm(k, &[(index::K, 1.0)], VOLTAGE),
         time_constant_s: logarithm(a / k, &[(index::A, 1.0), (index::K, -1.0)], TIMING_S * k / a),
-        inertia_kg_m2: logarithm(a * k / resistance.value, &both, resistance.relative().hypot(2.0 * VOLTAGE)),
-        friction,
-        form: best.law.form,
-        stribeck_rad_per_s: logarithm(p(index::SPEED).exp(), &[(index::SPEED, 1.0)], 0.0),
+        inertia_kg_m2: logarithm(a * k / resistance.value, &[(index::A, 1.0), (index::K, 1.0)], reference),
+        friction_nm,
         force_n,
-        residual_rad: best.residual_rad,
-        speeds_rad_per_s: [slowest, fastest],
     })
 }

@@ -6,25 +6,23 @@
 //! | metadata `fingertip.capture` | whose it is: board, firmware, image, notes, licence; and for people parameters, gains, frame time |
 //! | `/fingerN/scalars`, `/fingerN/frame`, N the ID less one | as in a scene's recording: what the core on this machine makes of the frames |
 
+use crate::commands::params::named;
 use crate::messages::{Topic, topic};
 use crate::state::{Stamp, State};
 use fingertip::capture::Head;
-use fingertip::params::Params;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{CLOCKS, COLUMNS, ROWS, SLOTS, TAXELS};
 use mcap::records::{MessageHeader, Metadata, Record};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{Attachment, McapError, WriteOptions, Writer};
 use replay::{CapturedFrame, ReplayError, Replayed, replay};
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::fs;
-use std::io::{Seek, Write};
+use std::io::{self, Seek, Write};
 use std::path::Path;
 
-/// Name of the attachment.
 const ATTACHED: &str = "capture.bin";
-/// Name of the metadata record.
 const ABOUT: &str = "fingertip.capture";
 /// Entry of the metadata: host's time of the last frame, ns since 1970.
 pub const ENDED: &str = "ended_unix_ns";
@@ -45,14 +43,10 @@ pub fn through_the_core(
 pub struct Kept {
     /// The capture, as the board kept it.
     pub bytes: Vec<u8>,
-    /// Metadata.
     pub about: About,
 }
 
 /// Reads a file; every byte of it is under a check sum, and all are looked at.
-///
-/// # Errors
-/// The file cannot be read, is damaged or cut off, or holds no capture.
 pub fn open(path: &Path) -> Result<Kept, String> {
     of_bytes(&fs::read(path).map_err(|why| format!("cannot be read: {why}"))?)
 }
@@ -118,24 +112,26 @@ const CODES_EVERY: u32 = 50;
 /// Schema of a frame; recordings of scenes include the same file.
 const FRAME_SCHEMA: [&str; 2] = ["fingertip.Frame", include_str!("messages/frame.json")];
 
-type Captured<'a> = (&'a CapturedFrame<ROWS, COLUMNS>, &'a Status);
-
 /// Writes a capture with what is known of it.
-///
-/// # Errors
-/// The bytes are no capture of this version, or the file cannot be written.
 pub fn write(to: impl Write + Seek, bytes: &[u8], about: &About) -> Result<(), String> {
     let mut shown = Vec::new();
     let replayed =
         through_the_core(bytes, |taken, status| shown.push((*taken, *status))).map_err(|why| why.to_string())?;
-    let options = WriteOptions::new().profile("").library(concat!("fingertip/", env!("CARGO_PKG_VERSION")));
-    let out = options.create(to).map_err(|why| in_words(&why))?;
-    put(out, bytes, about, &replayed.head, &shown).map_err(|why| in_words(&why))
+    let out = write_options().create(to).and_then(|out| put(out, bytes, about, &replayed.head, &shown));
+    out.map_err(|why| in_words(why).to_string())
 }
 
 /// The system's reason if there is one, for example a full disk.
-fn in_words(why: &McapError) -> String {
-    if let McapError::Io(why) = why { why.to_string() } else { why.to_string() }
+pub fn in_words(why: McapError) -> io::Error {
+    match why {
+        McapError::Io(why) => why,
+        other => io::Error::other(other),
+    }
+}
+
+/// How this program writes MCAP.
+pub fn write_options() -> WriteOptions {
+    WriteOptions::new().profile("").library(concat!("fingertip/", env!("CARGO_PKG_VERSION")))
 }
 
 fn put(
@@ -154,11 +150,9 @@ fn put(
         data: Cow::Borrowed(bytes),
     };
     out.attach(&attached)?;
-    let names = Params::RANGES.iter().map(|(name, ..)| (*name).to_owned());
-    let params: Map<String, Value> = names.zip(head.params.to_array().map(Value::from)).collect();
     let gains: Vec<u16> = (0..TAXELS).map(|place| head.gains.get(place)).collect();
     let more = [
-        ("params", Value::Object(params).to_string()),
+        ("params", Value::Object(named(&head.params)).to_string()),
         ("gains_q14", json!(gains).to_string()),
         ("codes_per_kpa_milli", head.params.codes_per_kpa_milli.to_string()),
         ("frame_ns", head.frame_ns.to_string()),
@@ -169,35 +163,37 @@ fn put(
     let metadata = about.clone().into_iter().chain(metadata).collect();
     out.write_metadata(&Metadata { name: ABOUT.into(), metadata })?;
     let id = about.get("id").and_then(|id| id.parse().ok()).unwrap_or(1);
-    let scalars = out.add_schema(Topic::Scalars.schema_name(), "jsonschema", &Topic::Scalars.schema())?;
-    let scalars = out.add_channel(scalars, &Topic::Scalars.name(id), "json", about)?;
+    let scalars = Topic::Scalars.add_to(&mut out, id, about)?;
     let codes = out.add_schema(FRAME_SCHEMA[0], "jsonschema", FRAME_SCHEMA[1].as_bytes())?;
     let codes = out.add_channel(codes, &topic(id, "frame"), "json", about)?;
-    let sequence =
-        |shown: Option<&(CapturedFrame<ROWS, COLUMNS>, Status)>| shown.map_or(0, |(taken, _)| taken.frame.sequence);
-    let (first, frame_ns) = (sequence(shown.first()), u64::from(head.frame_ns));
-    let since_ns = |sequence: u32| u64::from(sequence.wrapping_sub(first)) * frame_ns;
-    let begun_ns = ended_ns.saturating_sub(since_ns(sequence(shown.last())));
-    for (frame, captured) in (0..).zip(shown) {
-        let since_ns = since_ns(captured.0.frame.sequence);
+    let first = shown.first().map_or(0, |(taken, _)| taken.frame.sequence);
+    let since_ns = |taken: &CapturedFrame<ROWS, COLUMNS>| {
+        u64::from(taken.frame.sequence.wrapping_sub(first)) * u64::from(head.frame_ns)
+    };
+    let begun_ns = ended_ns.saturating_sub(shown.last().map_or(0, |(taken, _)| since_ns(taken)));
+    for (frame, (taken, status)) in (0..).zip(shown) {
+        let since_ns = since_ns(taken);
         let log_time = begun_ns + since_ns;
         let mut message = |channel_id, message: &[u8]| {
             let header = MessageHeader { channel_id, sequence: frame, log_time, publish_time: log_time };
             out.write_to_known_channel(&header, message)
         };
         if frame % SCALARS_EVERY == 0 {
-            let state = state((&captured.0, &captured.1), head.frame_ns);
+            let state = state(taken, status, head.frame_ns);
             let stamp = Stamp { time_s: since_ns as f64 * 1e-9, read_ns: log_time, frame_ns: log_time };
             message(scalars, &Topic::Scalars.message(&stamp, &state))?;
         }
         if frame % CODES_EVERY == 0 {
-            message(codes, codes_of(&captured.0).to_string().as_bytes())?;
+            let row = |slot| (0..COLUMNS).map(|column| taken.frame.code(slot, column)).collect();
+            let rows: Vec<Vec<u16>> = (0..SLOTS).map(row).collect();
+            let frame = json!({ "sequence": taken.frame.sequence, "codes": rows });
+            message(codes, frame.to_string().as_bytes())?;
         }
     }
     out.finish().map(drop)
 }
 
-fn state((taken, status): Captured<'_>, frame_ns: u32) -> State {
+fn state(taken: &CapturedFrame<ROWS, COLUMNS>, status: &Status, frame_ns: u32) -> State {
     let thousandths = |value: f64| (value * 1e3).round() as i64;
     let contact = &status.contact;
     State {
@@ -217,10 +213,4 @@ fn state((taken, status): Captured<'_>, frame_ns: u32) -> State {
         period_ns: frame_ns.into(),
         ..State::default()
     }
-}
-
-fn codes_of(taken: &CapturedFrame<ROWS, COLUMNS>) -> Value {
-    let codes: Vec<Vec<u16>> =
-        (0..SLOTS).map(|slot| (0..COLUMNS).map(|column| taken.frame.code(slot, column)).collect()).collect();
-    json!({ "sequence": taken.frame.sequence, "codes": codes })
 }

@@ -2,10 +2,9 @@
 
 use crate::error::Error;
 use crate::line::Line;
-use crate::table::{self, Value};
+use crate::table;
 use fingertip::link::Reply;
 use fingertip::link::packet::{BROADCAST, Event, Packet, Receiver, Sender, instruction};
-use fingertip::link::table::Register;
 use std::time::{Duration, Instant};
 
 /// The alert's bit of a status packet's error.
@@ -49,11 +48,11 @@ fn id(text: &str) -> Result<u8, String> {
 #[derive(Debug)]
 pub struct Client {
     line: Line,
-    port: String,
-    baud: u32,
-    /// ID of the controller.
+    pub port: String,
+    pub baud: u32,
     pub id: u8,
-    timeout: Duration,
+    /// Longest wait for an answer.
+    pub timeout: Duration,
     /// An answer was not waited for: it may come yet.
     owed: bool,
 }
@@ -61,34 +60,34 @@ pub struct Client {
 /// Answer to a Ping.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pong {
-    /// Who answered.
     pub id: u8,
-    /// The model's number.
     pub model: u16,
-    /// The firmware's.
     pub firmware: u8,
+}
+
+impl Pong {
+    pub fn is_fingertip(&self) -> bool {
+        i64::from(self.model) == table::model()
+    }
 }
 
 impl Client {
     /// Opens the port; asks nothing yet.
     pub fn open(reach: &Reach) -> Result<Self, Error> {
         let port = reach.port.clone().ok_or(Error::NoPort)?;
-        let line = Line::open(&port, reach.baud).map_err(|why| Error::Open { port: port.clone(), why })?;
+        let line = Line::open(&port, reach.baud).map_err(|why| Error::Open(port.clone(), why))?;
         let timeout = Duration::from_millis(reach.timeout_ms);
         Ok(Self { line, port, baud: reach.baud, id: reach.ids[0], timeout, owed: false })
     }
 
     /// Opens a port again that was lost.
     pub fn reopen(&mut self) -> Result<(), Error> {
-        self.line = Line::open(&self.port, self.baud).map_err(|why| Error::Open { port: self.port.clone(), why })?;
+        self.line = Line::open(&self.port, self.baud).map_err(|why| Error::Open(self.port.clone(), why))?;
         self.owed = false;
         Ok(())
     }
 
     /// Opens the port and sees to it that one fingertip of a known table answers.
-    ///
-    /// # Errors
-    /// None answers, or it is another device, or several are named.
     pub fn connect(reach: &Reach) -> Result<Self, Error> {
         if reach.ids.len() > 1 || reach.ids.contains(&BROADCAST) {
             return Err(Error::NotUnderstood(
@@ -103,40 +102,19 @@ impl Client {
     /// Sees to it that a fingertip of a known table answers.
     pub fn check(&mut self) -> Result<(), Error> {
         let pong = self.ping()?;
-        if i64::from(pong.model) != table::model() {
+        if !pong.is_fingertip() {
             return Err(format!("ID {} is no fingertip: its model number is {}", self.id, pong.model).into());
         }
         Ok(())
     }
 
-    /// The port's name.
-    pub fn port(&self) -> &str {
-        &self.port
-    }
-
-    /// The bus speed.
-    pub fn baud(&self) -> u32 {
-        self.baud
-    }
-
     /// Goes on at another speed.
     pub fn set_baud(&mut self, baud: u32) -> Result<(), Error> {
-        self.line.set_baud(baud).map_err(|why| Error::Open { port: format!("{} at {baud} baud", self.port), why })?;
+        self.line.set_baud(baud).map_err(|why| Error::Open(format!("{} at {baud} baud", self.port), why))?;
         self.baud = baud;
         Ok(())
     }
 
-    /// Longest wait.
-    pub fn timeout(&self) -> Duration {
-        self.timeout
-    }
-
-    /// Waits differently long.
-    pub fn set_timeout(&mut self, timeout: Duration) -> Duration {
-        std::mem::replace(&mut self.timeout, timeout)
-    }
-
-    /// Pings the controller.
     pub fn ping(&mut self) -> Result<Pong, Error> {
         let data = self.ask("ping", instruction::PING, &[], 3)?;
         Ok(Pong { id: self.id, model: u16::from_le_bytes([data[0], data[1]]), firmware: data[2] })
@@ -152,13 +130,12 @@ impl Client {
         (self.id, self.timeout) = (own, timeout);
         settled?;
         match pong {
-            Ok(_) | Err(Error::Damaged { .. } | Error::Refused { .. }) => Ok(true),
-            Err(Error::Silent { .. }) => Ok(false),
+            Ok(_) | Err(Error::Damaged(_) | Error::Refused(..)) => Ok(true),
+            Err(Error::Silent(_)) => Ok(false),
             Err(why) => Err(why),
         }
     }
 
-    /// Pings all devices on the bus.
     pub fn ping_all(&mut self) -> Result<Vec<Pong>, Error> {
         let heard = self.pass(&packet(BROADCAST, instruction::PING, &[]), None, usize::MAX)?;
         let (mut receiver, mut found) = (Receiver::new(), Vec::new());
@@ -184,7 +161,6 @@ impl Client {
         ask(self)
     }
 
-    /// Reads bytes of the table.
     pub fn read(&mut self, address: u16, length: u16) -> Result<Vec<u8>, Error> {
         let doing = format!("read {}", table::place(address));
         let params = [address.to_le_bytes(), length.to_le_bytes()].concat();
@@ -202,7 +178,6 @@ impl Client {
         Ok(self.block(address, address)?.number(address))
     }
 
-    /// Writes bytes of the table.
     pub fn write(&mut self, address: u16, data: &[u8]) -> Result<(), Error> {
         let doing = format!("write {}", table::place(address));
         self.ask(&doing, instruction::WRITE, &[&address.to_le_bytes(), data].concat(), 0).map(drop)
@@ -210,22 +185,13 @@ impl Client {
 
     /// Writes a register of one number.
     pub fn set(&mut self, address: u16, value: i64) -> Result<(), Error> {
-        let register = table::register_at(address).ok_or_else(|| format!("no register at {address}"))?;
-        self.set_register(register, value)
-    }
-
-    /// The same.
-    pub fn set_register(&mut self, register: &Register, value: i64) -> Result<(), Error> {
-        let data = table::encode(register, value);
-        let doing = format!("set {} to {}", table::name(register), Value { register, value });
-        self.ask(&doing, instruction::WRITE, &[&register.address.to_le_bytes()[..], &data].concat(), 0).map(drop)
+        let doing = format!("set {} to {value}", table::place(address));
+        self.ask(&doing, instruction::WRITE, &assignment(address, value)?, 0).map(drop)
     }
 
     /// Writes a register of one number of all devices on the bus. None of them answers.
     pub fn set_all(&mut self, address: u16, value: i64) -> Result<(), Error> {
-        let register = table::register_at(address).ok_or_else(|| format!("no register at {address}"))?;
-        let data = table::encode(register, value);
-        self.send(BROADCAST, instruction::WRITE, &[&address.to_le_bytes()[..], &data].concat())
+        self.transmit(&packet(BROADCAST, instruction::WRITE, &assignment(address, value)?))
     }
 
     /// Sends a packet unchanged. Returns the bytes received until this number of status packets arrived, or until the
@@ -258,47 +224,47 @@ impl Client {
 
     /// Sends an instruction and waits for its answer: `length` bytes behind the error.
     fn ask(&mut self, doing: &str, instruction: u8, params: &[u8], length: usize) -> Result<Vec<u8>, Error> {
-        self.send(self.id, instruction, params)?;
+        self.transmit(&packet(self.id, instruction, params))?;
         let until = Instant::now() + self.timeout;
         let mut receiver = Receiver::new();
-        let damaged = |what| Error::Damaged { doing: doing.into(), id: self.id, what };
+        let id = self.id;
+        let damaged = |what| {
+            let cause = "is the line noisy, or are there two devices with this ID?";
+            Err(Error::Damaged(format!("{doing}: a damaged answer of ID {id} ({what}); {cause}")))
+        };
         while let Some(left) = until.checked_duration_since(Instant::now()) {
             let bytes = self.line.read(left).map_err(|why| self.lost(why))?;
             for byte in bytes {
                 match receiver.push(byte) {
                     Some(Event::Packet) => {}
-                    Some(Event::BadCrc) => return Err(damaged("its check sum is wrong")),
+                    Some(Event::BadCrc) => return damaged("its check sum is wrong"),
                     _ => continue,
                 }
                 let packet = receiver.packet();
                 // On a line that echoes, the instruction comes back too.
-                if packet.id != self.id || packet.instruction != instruction::STATUS {
+                if packet.id != id || packet.instruction != instruction::STATUS {
                     continue;
                 }
-                let Some((&error, data)) = packet.params.split_first() else { return Err(damaged("it is empty")) };
+                let Some((&error, data)) = packet.params.split_first() else { return damaged("it is empty") };
                 let number = error & !ALERT;
                 if number != 0 {
-                    return Err(Error::Refused { doing: doing.into(), id: self.id, number });
+                    let meaning = table::meaning_of_error(number);
+                    let text = format!("{doing}: refused by ID {id} with error {number}: {meaning}");
+                    return Err(Error::Refused(text, number));
                 }
                 if data.len() != length {
                     self.owed = true;
-                    return Err(damaged("it has another length than what was asked for"));
+                    return damaged("it has another length than what was asked for");
                 }
                 return Ok(data.to_vec());
             }
         }
         self.owed = true;
-        Err(Error::Silent {
-            doing: doing.into(),
-            id: self.id,
-            port: self.port.clone(),
-            baud: self.baud,
-            waited_ms: self.timeout.as_millis(),
-        })
-    }
-
-    fn send(&mut self, id: u8, instruction: u8, params: &[u8]) -> Result<(), Error> {
-        self.transmit(&packet(id, instruction, params))
+        let (port, baud, waited_ms) = (&self.port, self.baud, self.timeout.as_millis());
+        Err(Error::Silent(format!(
+            "{doing}: no answer of ID {id} on {port} at {baud} baud within {waited_ms} ms; `fingertip scan` looks for it, \
+             --timeout-ms waits longer"
+        )))
     }
 
     fn transmit(&mut self, packet: &[u8]) -> Result<(), Error> {
@@ -317,8 +283,14 @@ impl Client {
     }
 
     fn lost(&self, why: std::io::Error) -> Error {
-        Error::Port { port: self.port.clone(), why }
+        Error::Port(self.port.clone(), why)
     }
+}
+
+/// Parameters of an instruction that writes a register of one number.
+fn assignment(address: u16, value: i64) -> Result<Vec<u8>, Error> {
+    let register = table::register_at(address).ok_or_else(|| format!("no register at {address}"))?;
+    Ok([&address.to_le_bytes()[..], &table::encode(register, value)].concat())
 }
 
 /// The bytes of an instruction packet.

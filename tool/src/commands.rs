@@ -20,9 +20,11 @@ pub mod stream;
 pub mod tare;
 pub mod view;
 
-use crate::client::Reach;
+use crate::client::{Pong, Reach};
 use crate::{Client, Error, table};
 use fingertip::link::packet::BROADCAST;
+use fingertip::measure::MeasureState;
+use fingertip::shipped::address;
 use serde_json::Value;
 use std::io::{self, Write as _};
 use std::sync::Arc;
@@ -65,15 +67,12 @@ fn say_json(value: &Value) {
 }
 
 /// Runs a command for each ID of `--id`, also after an error of one.
-///
-/// # Errors
-/// The port cannot be opened, no device answers to `all`, or the command failed.
 pub fn each(reach: &Reach, titled: bool, command: impl Fn(&mut Client) -> Result<(), Error>) -> Result<(), Error> {
     let mut client = Client::open(reach)?;
     let mut ids = reach.ids.clone();
     if ids.contains(&BROADCAST) {
         let found = client.ping_all()?;
-        ids = found.into_iter().filter(|pong| i64::from(pong.model) == table::model()).map(|pong| pong.id).collect();
+        ids = found.into_iter().filter(Pong::is_fingertip).map(|pong| pong.id).collect();
         if ids.is_empty() {
             return Err("no fingertip answers: is it powered, and is the baud rate right?".into());
         }
@@ -144,13 +143,22 @@ fn wait_for(client: &mut Client, address: u16, within: Duration, wanted: impl Fn
     }
 }
 
+/// Fails in a fault, and while a measuring motion runs, which a tare would end.
+fn no_fault_nor_motion(client: &mut Client) -> Result<(), Error> {
+    no_fault(client)?;
+    if client.number(address::MEASURE_STATE)? == MeasureState::Running as i64 {
+        return Err("another motion that measures is under way: wait for its end, or `fingertip stop`".into());
+    }
+    Ok(())
+}
+
 /// Fails if there is a fault, with the next step in the text.
 fn no_fault(client: &mut Client) -> Result<(), Error> {
-    let fault = client.number(fingertip::shipped::address::FAULT)?;
+    let fault = client.number(address::FAULT)?;
     if fault == 0 { Ok(()) } else { Err(stopped(fault)) }
 }
 
 fn stopped(fault: i64) -> Error {
-    let words = table::meaning(fingertip::shipped::address::FAULT, fault);
+    let words = table::meaning(address::FAULT, fault);
     format!("the motor was stopped by fault {fault} ({words}): mend what caused it, then `fingertip recover`").into()
 }

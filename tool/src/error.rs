@@ -1,69 +1,28 @@
 //! Errors: what failed, where, and what to do about it.
 
-use crate::table::meaning_of_error;
-
 /// A controller's number for an instruction that came damaged.
 const DAMAGED: u8 = 3;
 
 /// A command could not be carried out.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The port cannot be opened.
-    #[error("cannot open {port}: {why}{}", ports_there())]
-    Open {
-        /// Name as requested.
-        port: String,
-        /// The system's reason.
-        why: std::io::Error,
-    },
-    /// No port was named.
+    /// The port cannot be opened, for the system's reason.
+    #[error("cannot open {0}: {1}{ports}", ports = ports_there())]
+    Open(String, std::io::Error),
     #[error("no port: name one with --port, or in FINGERTIP_PORT{}", ports_there())]
     NoPort,
-    /// The port was lost.
-    #[error("{port}: {why}; is it still connected?")]
-    Port {
-        /// Name of the port.
-        port: String,
-        /// The system's reason.
-        why: std::io::Error,
-    },
+    /// The port was lost, for the system's reason.
+    #[error("{0}: {1}; is it still connected?")]
+    Port(String, std::io::Error),
     /// The controller did not answer.
-    #[error(
-        "{doing}: no answer of ID {id} on {port} at {baud} baud within {waited_ms} ms; `fingertip scan` looks for it, \
-         --timeout-ms waits longer"
-    )]
-    Silent {
-        /// Request.
-        doing: String,
-        /// ID of the controller.
-        id: u8,
-        /// Port.
-        port: String,
-        /// Bus speed, baud.
-        baud: u32,
-        /// Time waited, ms.
-        waited_ms: u128,
-    },
+    #[error("{0}")]
+    Silent(String),
     /// The answer was no good.
-    #[error("{doing}: a damaged answer of ID {id} ({what}); is the line noisy, or are there two devices with this ID?")]
-    Damaged {
-        /// Request.
-        doing: String,
-        /// ID of the controller.
-        id: u8,
-        /// Fault of the packet.
-        what: &'static str,
-    },
-    /// The controller refused.
-    #[error("{doing}: refused by ID {id} with error {number}: {}", meaning_of_error(*number))]
-    Refused {
-        /// Request.
-        doing: String,
-        /// ID of the controller.
-        id: u8,
-        /// Number of the error.
-        number: u8,
-    },
+    #[error("{0}")]
+    Damaged(String),
+    /// The controller refused with the number of an error.
+    #[error("{0}")]
+    Refused(String, u8),
     /// The command line asks for something that does not exist; nothing was sent.
     #[error("{0}")]
     NotUnderstood(String),
@@ -73,7 +32,6 @@ pub enum Error {
     /// A signal ended a command that moves the finger.
     #[error("interrupted before its end; torque is off")]
     Interrupted,
-    /// Another error, with its whole text.
     #[error("{0}")]
     Other(String),
 }
@@ -92,12 +50,12 @@ impl Error {
 
     /// True if the controller refused with this number.
     pub fn refused_with(&self, wanted: u8) -> bool {
-        matches!(self, Self::Refused { number, .. } if *number == wanted)
+        matches!(self, Self::Refused(_, number) if *number == wanted)
     }
 
     /// True if the line may be what was wrong, so that it may go well the next time.
     pub fn is_noise(&self) -> bool {
-        matches!(self, Self::Silent { .. } | Self::Damaged { .. }) || self.refused_with(DAMAGED)
+        matches!(self, Self::Silent(_) | Self::Damaged(_)) || self.refused_with(DAMAGED)
     }
 
     /// A file that cannot be read or written.

@@ -32,10 +32,6 @@ pub fn ports() -> Vec<String> {
 }
 
 impl Line {
-    /// Opens it.
-    ///
-    /// # Errors
-    /// The port does not exist, another program uses it, or it does not support this speed.
     pub fn open(port: &str, baud: u32) -> io::Result<Self> {
         if let Some(address) = port.strip_prefix(TCP) {
             let stream = TcpStream::connect(address)?;
@@ -60,7 +56,6 @@ impl Line {
         port.set_configuration(&settings)
     }
 
-    /// Sends all.
     pub fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
         match self {
             Self::Serial(port) => port.write_all(bytes),

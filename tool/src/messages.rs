@@ -7,23 +7,8 @@ use base64::prelude::{BASE64_STANDARD, Engine as _};
 use fingertip::shipped::address;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
+use std::io::{Seek, Write};
 
-/// The names of a scene's scalars that a controller knows, and what they are.
-const SCALARS: [(&str, &str); 13] = [
-    ("time_s", "The controller's time from the first state"),
-    ("goal_n", "The force asked for"),
-    ("sensed_force_n", "Normal force as the controller senses it"),
-    ("indentation_mm", "Indentation of the tip, by the model"),
-    ("travel_mm", "Way of the tip since torque was enabled"),
-    ("speed_mm_per_s", "Speed of the tip"),
-    ("duty_percent", "Share of the supply at the motor; positive presses"),
-    ("centre_x_mm", "Sensed centre of the contact along the columns"),
-    ("centre_y_mm", "Sensed centre of the contact along the rows"),
-    ("confidence_percent", "Confidence that the contact is a tip on a plane"),
-    ("mode", "Mode, by its number on the bus"),
-    ("fault", "Fault, by its number on the bus; 0 is none"),
-    ("limits", "Limits, a bit each as on the bus"),
-];
 /// Schema of <https://docs.foxglove.dev/docs/sdk/schemas/raw-image>; recordings of scenes include the same file.
 const IMAGE_SCHEMA: &str = include_str!("messages/raw_image.json");
 /// Pa for a grey level: that of the scenes, 8 codes at 24 codes for a kPa.
@@ -39,7 +24,6 @@ pub enum Topic {
 }
 
 impl Topic {
-    /// Name of the topic for a controller.
     pub fn name(self, id: u8) -> String {
         let kind = match self {
             Self::Scalars => "scalars",
@@ -48,7 +32,6 @@ impl Topic {
         topic(id, kind)
     }
 
-    /// Name of the topic's schema.
     pub fn schema_name(self) -> &'static str {
         match self {
             Self::Scalars => "fingertip.Scalars",
@@ -56,18 +39,37 @@ impl Topic {
         }
     }
 
-    /// Schema of the topic, as JSON Schema.
     pub fn schema(self) -> Vec<u8> {
         match self {
-            Self::Scalars => scalars_schema().to_string().into_bytes(),
+            Self::Scalars => {
+                let number = |about| json!({ "type": "number", "description": about });
+                let scalars = scalars(0.0, &State::default());
+                let properties = Map::from_iter(scalars.map(|(name, about, _)| (name.to_owned(), number(about))));
+                let schema = json!({ "title": "fingertip.Scalars", "type": "object", "properties": properties });
+                schema.to_string().into_bytes()
+            }
             Self::Image => IMAGE_SCHEMA.into(),
         }
+    }
+
+    /// Adds the topic of a controller to a file.
+    pub fn add_to<W: Write + Seek>(
+        self,
+        out: &mut mcap::Writer<W>,
+        id: u8,
+        device: &BTreeMap<String, String>,
+    ) -> mcap::McapResult<u16> {
+        let schema = out.add_schema(self.schema_name(), "jsonschema", &self.schema())?;
+        out.add_channel(schema, &self.name(id), "json", device)
     }
 
     /// A state's message, in JSON.
     pub fn message(self, stamp: &Stamp, state: &State) -> Vec<u8> {
         let message = match self {
-            Self::Scalars => scalars(stamp.time_s, state),
+            Self::Scalars => {
+                let named = scalars(stamp.time_s, state).map(|(name, _, value)| (name.to_owned(), value));
+                Value::Object(Map::from_iter(named))
+            }
             Self::Image => image(stamp.frame_ns, state),
         };
         message.to_string().into_bytes()
@@ -92,25 +94,28 @@ pub fn device(client: &mut Client) -> Result<BTreeMap<String, String>, Error> {
     Ok(entries.map(|(name, value)| (name.to_owned(), value)).into())
 }
 
-fn scalars(time_s: f64, state: &State) -> Value {
-    let thousandth = |value: i64| value as f64 * 1e-3;
-    let values = [
-        json!(time_s),
-        json!(thousandth(state.goal_mn)),
-        json!(thousandth(state.force_mn)),
-        json!(thousandth(state.indentation_um)),
-        json!(thousandth(state.travel_um)),
-        json!(thousandth(state.speed_um_per_s)),
-        json!(state.duty_permille as f64 * 0.1),
-        json!(thousandth(state.centre_x_um)),
-        json!(thousandth(state.centre_y_um)),
-        json!(state.confidence as f64 / 2.55),
-        json!(state.mode),
-        json!(state.fault),
-        json!(state.limits),
-    ];
-    let names = SCALARS.iter().map(|(name, _)| (*name).to_owned());
-    Value::Object(names.zip(values).collect::<Map<_, _>>())
+/// The scene's scalars that a controller knows: name, description and value.
+fn scalars(time_s: f64, state: &State) -> [(&'static str, &'static str, Value); 13] {
+    let thousandth = |value: i64| json!(value as f64 * 1e-3);
+    [
+        ("time_s", "The controller's time from the first state", json!(time_s)),
+        ("goal_n", "The force asked for", thousandth(state.goal_mn)),
+        ("sensed_force_n", "Normal force as the controller senses it", thousandth(state.force_mn)),
+        ("indentation_mm", "Indentation of the tip, by the model", thousandth(state.indentation_um)),
+        ("travel_mm", "Way of the tip since torque was enabled", thousandth(state.travel_um)),
+        ("speed_mm_per_s", "Speed of the tip", thousandth(state.speed_um_per_s)),
+        ("duty_percent", "Share of the supply at the motor; positive presses", json!(state.duty_permille as f64 * 0.1)),
+        ("centre_x_mm", "Sensed centre of the contact along the columns", thousandth(state.centre_x_um)),
+        ("centre_y_mm", "Sensed centre of the contact along the rows", thousandth(state.centre_y_um)),
+        (
+            "confidence_percent",
+            "Confidence that the contact is a tip on a plane",
+            json!(state.confidence as f64 / 2.55),
+        ),
+        ("mode", "Mode, by its number on the bus", json!(state.mode)),
+        ("fault", "Fault, by its number on the bus; 0 is none", json!(state.fault)),
+        ("limits", "Limits, a bit each as on the bus", json!(state.limits)),
+    ]
 }
 
 fn image(time_ns: u64, state: &State) -> Value {
@@ -123,10 +128,4 @@ fn image(time_ns: u64, state: &State) -> Value {
         "frame_id": "array", "width": columns, "height": rows, "encoding": "mono8", "step": columns,
         "data": BASE64_STANDARD.encode(data),
     })
-}
-
-fn scalars_schema() -> Value {
-    let number = |about: &str| json!({ "type": "number", "description": about });
-    let properties: Map<_, _> = SCALARS.iter().map(|(name, about)| ((*name).to_owned(), number(about))).collect();
-    json!({ "title": "fingertip.Scalars", "type": "object", "properties": properties })
 }

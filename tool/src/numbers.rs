@@ -8,12 +8,10 @@ const SECONDS: RangeInclusive<f64> = 0.0..=1e9;
 /// Range of rates, Hz: from one in a quarter of an hour to more than there are frames.
 const RATES_HZ: RangeInclusive<f64> = 0.001..=1e6;
 
-/// A time in s.
 pub fn seconds(text: &str) -> Result<f64, String> {
     within(text, &SECONDS)
 }
 
-/// A rate in Hz.
 pub fn rate_hz(text: &str) -> Result<f64, String> {
     within(text, &RATES_HZ)
 }
@@ -23,7 +21,6 @@ pub fn rate_hz_or_all(text: &str) -> Result<f64, String> {
     if text.parse() == Ok(0.0) { Ok(0.0) } else { rate_hz(text).map_err(|why| format!("{why}, or 0")) }
 }
 
-/// A share in percent.
 pub fn percent(text: &str) -> Result<f64, String> {
     within(text, &(0.0..=100.0))
 }
@@ -33,9 +30,9 @@ pub fn goal_mn(text: &str) -> Result<i64, String> {
     within(text, &(0.001..=150.0)).map(|newtons| (newtons * 1e3).round() as i64)
 }
 
-/// Force in mN that a scale shows, of a number in N.
-pub fn shown_mn(text: &str) -> Result<i64, String> {
-    within(text, &(0.0..=150.0)).map(|newtons| (newtons * 1e3).round() as i64)
+/// Force that a scale shows, N, to a mN.
+pub fn shown_n(text: &str) -> Result<f64, String> {
+    within(text, &(0.0..=150.0)).map(|newtons| (newtons * 1e3).round() * 1e-3)
 }
 
 fn within(text: &str, range: &RangeInclusive<f64>) -> Result<f64, String> {

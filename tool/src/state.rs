@@ -13,30 +13,23 @@ const LAST: u16 = address::FRAME_PERIOD_NS;
 /// The state before the pressures, and these.
 const PICTURE: u16 = address::PICTURE_TIME_US;
 
-/// The state of the loop at a frame, in the units of the bus.
+/// Rows and columns that this program knows.
+pub const SHAPE: [usize; 2] = [ROWS, COLUMNS];
+
+/// The state of the loop at a frame, as the control table has it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct State {
     /// Time of the frame's end by the controller's clock, us; wraps after 71 minutes.
     pub time_us: u32,
-    /// See the control table for each.
     pub frame: i64,
-    /// mN.
     pub goal_mn: i64,
-    /// mN.
     pub force_mn: i64,
-    /// um.
     pub indentation_um: i64,
-    /// um.
     pub centre_x_um: i64,
-    /// um.
     pub centre_y_um: i64,
-    /// um.
     pub travel_um: i64,
-    /// um/s.
     pub speed_um_per_s: i64,
-    /// Thousandths of the supply.
     pub duty_permille: i64,
-    /// A mode's number.
     pub mode: i64,
     /// Number of the fault; 0 without one.
     pub fault: i64,
@@ -53,57 +46,38 @@ pub struct State {
 impl State {
     /// Reads it, in one packet.
     pub fn read(client: &mut Client) -> Result<Self, Error> {
-        Ok(Self::of(&client.block(FIRST, LAST)?))
+        Ok(Self::of(&client.block(FIRST, LAST)?, false))
     }
 
     /// Reads it with the pressures, in one packet.
     pub fn read_picture(client: &mut Client) -> Result<Self, Error> {
         let block = client.block(PICTURE, address::PRESSURES)?;
-        // The mirrors have the registers' names at other places.
-        let at = |address: u16| block.number(address);
-        Ok(Self {
-            time_us: at(address::PICTURE_TIME_US) as u32,
-            frame: at(address::PICTURE_FRAME),
-            goal_mn: at(address::PICTURE_GOAL_MN),
-            force_mn: at(address::PICTURE_FORCE_MN),
-            indentation_um: at(address::PICTURE_INDENTATION_UM),
-            centre_x_um: at(address::PICTURE_CENTRE_X_UM),
-            centre_y_um: at(address::PICTURE_CENTRE_Y_UM),
-            travel_um: at(address::PICTURE_TRAVEL_UM),
-            speed_um_per_s: at(address::PICTURE_SPEED_UM_PER_S),
-            duty_permille: at(address::PICTURE_DUTY_PERMILLE),
-            mode: at(address::PICTURE_MODE),
-            fault: at(address::PICTURE_FAULT),
-            limits: at(address::PICTURE_LIMITS),
-            confidence: at(address::PICTURE_CONFIDENCE),
-            period_ns: at(address::PICTURE_PERIOD_NS),
-            pressures_pa: block.numbers(address::PRESSURES),
-        })
+        Ok(Self { pressures_pa: block.numbers(address::PRESSURES), ..Self::of(&block, true) })
     }
 
-    fn of(block: &Block) -> Self {
-        let at = |address: u16| block.number(address);
+    /// The state of its registers, or of those that mirror them beside the pressures.
+    fn of(block: &Block, mirrored: bool) -> Self {
+        let at = |plain: u16, mirror: u16| block.number(if mirrored { mirror } else { plain });
         Self {
-            time_us: at(address::FRAME_TIME_US) as u32,
-            frame: at(address::FRAME_COUNTER),
-            goal_mn: at(address::GOAL_FORCE_MN),
-            force_mn: at(address::PRESENT_FORCE_MN),
-            indentation_um: at(address::INDENTATION_UM),
-            centre_x_um: at(address::CENTRE_X_UM),
-            centre_y_um: at(address::CENTRE_Y_UM),
-            travel_um: at(address::TRAVEL_UM),
-            speed_um_per_s: at(address::SPEED_UM_PER_S),
-            duty_permille: at(address::DUTY_PERMILLE),
-            mode: at(address::PRESENT_MODE),
-            fault: at(address::FAULT),
-            limits: at(address::LIMITS),
-            confidence: at(address::CONFIDENCE),
-            period_ns: at(address::FRAME_PERIOD_NS),
+            time_us: at(address::FRAME_TIME_US, address::PICTURE_TIME_US) as u32,
+            frame: at(address::FRAME_COUNTER, address::PICTURE_FRAME),
+            goal_mn: at(address::GOAL_FORCE_MN, address::PICTURE_GOAL_MN),
+            force_mn: at(address::PRESENT_FORCE_MN, address::PICTURE_FORCE_MN),
+            indentation_um: at(address::INDENTATION_UM, address::PICTURE_INDENTATION_UM),
+            centre_x_um: at(address::CENTRE_X_UM, address::PICTURE_CENTRE_X_UM),
+            centre_y_um: at(address::CENTRE_Y_UM, address::PICTURE_CENTRE_Y_UM),
+            travel_um: at(address::TRAVEL_UM, address::PICTURE_TRAVEL_UM),
+            speed_um_per_s: at(address::SPEED_UM_PER_S, address::PICTURE_SPEED_UM_PER_S),
+            duty_permille: at(address::DUTY_PERMILLE, address::PICTURE_DUTY_PERMILLE),
+            mode: at(address::PRESENT_MODE, address::PICTURE_MODE),
+            fault: at(address::FAULT, address::PICTURE_FAULT),
+            limits: at(address::LIMITS, address::PICTURE_LIMITS),
+            confidence: at(address::CONFIDENCE, address::PICTURE_CONFIDENCE),
+            period_ns: at(address::FRAME_PERIOD_NS, address::PICTURE_PERIOD_NS),
             pressures_pa: Vec::new(),
         }
     }
 
-    /// The mode in words.
     pub fn mode_name(&self) -> String {
         table::meaning(address::PRESENT_MODE, self.mode)
     }
@@ -113,9 +87,14 @@ impl State {
         (self.fault != 0).then(|| table::meaning(address::FAULT, self.fault))
     }
 
-    /// The limits in words.
     pub fn limit_names(&self) -> Vec<String> {
         table::bits(address::LIMITS, self.limits)
+    }
+
+    /// The limits for people.
+    pub fn limits_text(&self) -> String {
+        let names = self.limit_names();
+        if names.is_empty() { "none".into() } else { names.join(", ") }
     }
 
     /// Each number with its name, in the order in which it is written; the pressures apart.
@@ -212,9 +191,6 @@ impl Stamps {
 pub fn unix_ns() -> u64 {
     SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos() as u64
 }
-
-/// Rows and columns that this program knows.
-pub const SHAPE: [usize; 2] = [ROWS, COLUMNS];
 
 #[cfg(test)]
 mod tests {

@@ -2,14 +2,11 @@
 
 use fingertip::link::table::{Access, Kind, Register};
 use fingertip::shipped::{REGISTERS, address};
-use std::fmt;
 
 /// Registers side by side, as they were read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Block {
-    /// First address.
     pub first: u16,
-    /// Bytes as received.
     pub bytes: Vec<u8>,
 }
 
@@ -29,20 +26,6 @@ impl Block {
         let bytes = self.bytes.get(offset..).unwrap_or_default();
         let words = bytes.chunks_exact(usize::from(width)).take(usize::from(register.count));
         words.map(|word| decode(register.kind, word).unwrap_or(0) * i64::from(register.scale)).collect()
-    }
-}
-
-/// A number with its unit, for people.
-pub struct Value<'a> {
-    /// Whose.
-    pub register: &'a Register,
-    /// Bytes as on the bus.
-    pub value: i64,
-}
-
-impl fmt::Display for Value<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.value)
     }
 }
 
@@ -66,7 +49,6 @@ pub fn place(address: u16) -> String {
     register_at(address).map_or_else(|| format!("address {address}"), name)
 }
 
-/// A register by its name.
 pub fn find(wanted: &str) -> Result<&'static Register, String> {
     let found = REGISTERS.iter().find(|register| register.name.eq_ignore_ascii_case(wanted));
     found.ok_or_else(|| {
@@ -119,7 +101,6 @@ fn decode(kind: Kind, bytes: &[u8]) -> Option<i64> {
     })
 }
 
-/// The model number of a fingertip.
 pub fn model() -> i64 {
     register_at(address::MODEL_NUMBER).map_or(0, |register| register.min)
 }

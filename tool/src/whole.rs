@@ -22,11 +22,8 @@ pub struct Part {
 }
 
 impl Part {
-    /// Begins it: `FILE.part`, empty. What is at the place stays as it is until [`Self::place`].
-    ///
-    /// # Errors
-    /// Something is there and `force` is not set; it is no file, as a device or a pipe; it cannot be written; or another
-    /// program is at it.
+    /// Begins it: `FILE.part`, empty. What is at the place stays as it is until [`Self::place`]. Fails if something is there
+    /// and `force` is not set, if it is no file, as a device or a pipe, and if another program is at it.
     pub fn begin(place: &Path, force: bool) -> Result<Self, Error> {
         let failed = |why: io::Error| Error::file("write", place, why);
         let is_file = fs::metadata(place).map_or(true, |there| there.is_file());
@@ -46,10 +43,9 @@ impl Part {
         if !force {
             free(place)?;
             if begun.file.metadata().map_err(failed)?.len() > 0 {
-                let part = begun.part.display();
-                return Err(
-                    format!("an earlier command left {part} unfinished: rename it, or --force writes over it").into()
-                );
+                let left = begun.part.display();
+                let why = format!("an earlier command left {left} unfinished: rename it, or --force writes over it");
+                return Err(why.into());
             }
         }
         begun.file.set_len(0).map_err(failed)?;
@@ -61,10 +57,7 @@ impl Part {
         self.file.try_clone()
     }
 
-    /// Moves the complete file to its place.
-    ///
-    /// # Errors
-    /// The file cannot be moved, or another file took its place meanwhile: then the part stays beside it.
+    /// Moves the complete file to its place. Where another file took the place meanwhile, the part stays beside it.
     pub fn place(self) -> Result<(), Error> {
         let failed = |why: io::Error| Error::file("write", &self.place, why);
         self.file.sync_all().map_err(failed)?;
@@ -85,9 +78,6 @@ impl Drop for Part {
 }
 
 /// Writes a whole file at once.
-///
-/// # Errors
-/// Like [`Part::begin`] and [`Part::place`].
 pub fn write(place: &Path, force: bool, bytes: &[u8]) -> Result<(), Error> {
     let mut part = Part::begin(place, force)?;
     part.file.write_all(bytes).map_err(|why| Error::file("write", place, why))?;

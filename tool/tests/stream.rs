@@ -4,7 +4,7 @@
 mod served;
 
 use serde_json::{Value, json};
-use served::Served;
+use served::{Served, line_with};
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::TcpStream;
 use std::process::Child;
@@ -79,16 +79,10 @@ impl Listener {
     }
 }
 
-/// Beginning of the line that names the stream's address.
+/// Address of a stream that was started.
 fn address(child: &mut Child) -> String {
-    let mut line = String::new();
-    let mut reader = BufReader::new(child.stderr.take().expect("a pipe"));
-    reader.read_line(&mut line).expect("it says where");
-    let address = line.split("ws://").nth(1).and_then(|rest| rest.split(';').next());
-    let address = address.unwrap_or_else(|| panic!("{line}")).to_owned();
-    // Later output has no reader, and must not stop it.
-    std::thread::spawn(move || std::io::copy(&mut reader, &mut std::io::sink()));
-    address
+    let line = line_with("ws://", child.stderr.take().expect("a pipe"));
+    line.split("ws://").nth(1).and_then(|rest| rest.split(';').next()).expect("an address").to_owned()
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! The joint least squares over all strokes.
 
-use super::model::{ALL, FITTED, Form, Law, Parameters, Path, index};
+use super::model::{ALL, FITTED, FORMS, Law, Parameters, Path, index};
 use super::{NoDrive, Record};
 use nalgebra::{Cholesky, Matrix3, SMatrix, SVector, Vector3};
 
@@ -37,12 +37,8 @@ const UNEVEN: f64 = 0.05;
 pub struct Fit {
     /// The parameters.
     pub p: Parameters,
-    /// Dependence of friction on speed.
-    pub law: Law,
     /// Sum of squares of the residuals, rad^2.
     pub cost: f64,
-    /// Root of their mean, rad.
-    pub residual_rad: f64,
     /// Samples that count as independent.
     independent: f64,
     /// Variance of k by the strokes' scatter, as a multiple of that by the samples' scatter.
@@ -201,9 +197,7 @@ impl Problem<'_> {
         let common = (sandwich[(index::K, index::K)] / naive[(index::K, index::K)]).max(1.0);
         Fit {
             p: at.p,
-            law,
             cost,
-            residual_rad: (cost / samples).sqrt(),
             common,
             independent: samples / common,
             scatter: naive + sandwich,
@@ -231,8 +225,8 @@ impl Fit {
         let mut failed = NoDrive::Unsolved(0);
         for even in [true, false] {
             let mut fits = Vec::new();
-            for form in Form::ALL {
-                match Self::new(paths, Law { form, slowest }, record, even) {
+            for share in FORMS {
+                match Self::new(paths, Law { share, slowest }, record, even) {
                     Ok(fit) => fits.push(fit),
                     Err(refusal) => failed = refusal,
                 }

@@ -4,44 +4,25 @@ use super::Record;
 use super::fit::Own;
 use core::ops::RangeInclusive;
 
-/// Ways in which friction may fall from its value at standstill: the share that is left at a speed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Form {
-    /// 1 / (1 + r^2), after Hess and Soom, J. Tribology 112 (1990).
-    Lorentzian,
-    /// exp(-r^2), r the speed as a share of the Stribeck speed.
-    Gaussian,
-    /// exp(-r).
-    Exponential,
-}
-
-impl Form {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Lorentzian, Self::Gaussian, Self::Exponential];
-
-    /// The share of the additional friction that is left at `r` Stribeck speeds.
-    fn share(self, r: f64) -> f64 {
-        match self {
-            Self::Lorentzian => 1.0 / (1.0 + r * r),
-            Self::Gaussian => (-r * r).exp(),
-            Self::Exponential => (-r).exp(),
-        }
-    }
-
-    /// V_s, what friction at standstill has beyond that at high speed. The slowest strokes fix friction at their own
-    /// speed far better than V_s and w_s, so its excess there is the parameter; `SHARE` keeps V_s finite.
-    pub fn standstill_v(self, p: &Parameters, side: usize, slowest: f64) -> f64 {
-        p[index::STRIBECK + side] / (self.share(slowest * (-p[index::SPEED]).exp()) + SHARE)
-    }
-}
+/// Forms in which friction may fall from its value at standstill: the share that is left at a speed, as a share r of the
+/// Stribeck speed. The first is after Hess and Soom, J. Tribology 112 (1990).
+pub const FORMS: [fn(f64) -> f64; 3] = [|r| 1.0 / (1.0 + r * r), |r| (-r * r).exp(), |r| (-r).exp()];
 
 /// Dependence of friction on speed in a fit.
 #[derive(Clone, Copy, Debug)]
 pub struct Law {
-    /// The form.
-    pub form: Form,
+    /// One of the [`FORMS`].
+    pub share: fn(f64) -> f64,
     /// Speed of the slowest stroke, rad/s.
     pub slowest: f64,
+}
+
+impl Law {
+    /// V_s, what friction at standstill has beyond that at high speed. The slowest strokes fix friction at their own
+    /// speed far better than V_s and w_s, so its excess there is the parameter; `SHARE` keeps V_s finite.
+    fn standstill_v(self, p: &Parameters, side: usize) -> f64 {
+        p[index::STRIBECK + side] / ((self.share)(self.slowest * (-p[index::SPEED]).exp()) + SHARE)
+    }
 }
 
 /// Indices of the parameters. The first [`FITTED`] are fitted; the others are 0 in the fit, and only tell how far
@@ -194,12 +175,11 @@ impl Path {
     /// Within a step V_f is that at the step's middle, so that w goes exponentially; where w reaches 0 the shaft
     /// stays.
     pub fn angles(&self, p: &Parameters, law: Law, own: &Own, angles: &mut Vec<f64>) {
-        let Law { form, slowest } = law;
         let sign = if self.side == 0 { 1.0 } else { -1.0 };
         let k = p[index::K].exp() * (1.0 + sign * p[index::SIDES]);
         let tau = p[index::A].exp() / k;
         let coulomb = p[index::COULOMB + self.side].exp() + own[2];
-        let stribeck = form.standstill_v(p, self.side, slowest);
+        let stribeck = law.standstill_v(p, self.side);
         let slowness = (-p[index::SPEED]).exp();
         let placed = p[index::FRONT] != 0.0 || p[index::SPRING] != 0.0;
         let (mut x, mut w) = (own[0], own[1]);
@@ -212,7 +192,7 @@ impl Path {
             if placed {
                 drive -= sign * self.force_v(p, self.place + sign * x);
             }
-            let end = |w: f64| (drive - stribeck * form.share(w.max(0.0) * slowness)) / k;
+            let end = |w: f64| (drive - stribeck * (law.share)(w.max(0.0) * slowness)) / k;
             if w > 0.0 || end(0.0) > 0.0 {
                 if step.length_s != length_s {
                     length_s = step.length_s;

@@ -7,7 +7,7 @@ use sim::effects::{Named, Set, contact};
 use sim::mechanics::contact::Contact;
 use sim::scene::{Scene, read};
 use sim::setup::Setup;
-use solve::press::{Array, Branch, Press, Reading, Step, Tip};
+use solve::press::{Array, Branch, Press, Reading, Step};
 use solve::record;
 
 const ROWS: usize = 10;
@@ -18,7 +18,7 @@ pub const FRAME_NS: u32 = 500_000;
 const TARE_FRAMES: usize = 256;
 
 /// Drawn properties of a finger.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Draw {
     pub seed: u64,
     pub modulus_kpa: f64,
@@ -34,18 +34,7 @@ pub struct Draw {
 
 impl Draw {
     pub fn plain(modulus_kpa: f64) -> Self {
-        Self {
-            seed: 1,
-            modulus_kpa,
-            noise_codes: 1.0,
-            gains_percent: 0.0,
-            creep_percent: 0.0,
-            hysteresis_percent: 0.0,
-            relaxation: 0.0,
-            relaxation_s: 0.5,
-            dead: Vec::new(),
-            extra: String::new(),
-        }
+        Self { seed: 1, modulus_kpa, noise_codes: 1.0, relaxation_s: 0.5, ..Self::default() }
     }
 
     /// Of the ranges that a tip and an array have, by a seed.
@@ -263,9 +252,8 @@ impl Finger {
                 }
             }
         }
-        let tip = Tip { radius_mm: self.setup.tip.radius_mm, modulus_kpa: 250.0 };
         let array = Array { rows: ROWS, columns: COLUMNS, pitch_mm: self.setup.array.pitch_mm, codes_per_kpa: 24.0 };
-        let press = Press { tip, array, steps, ended: None };
+        let press = Press { radius_mm: self.setup.tip.radius_mm, array, steps, ended: None };
         record::press(&crate::press(&press, FRAME_NS, -777), &Params::DEFAULT).expect("a series")
     }
 
@@ -304,7 +292,7 @@ impl Recorder {
             Reading { mean, deviation, bad: false }
         };
         let taxels = sums.iter().flatten().map(reading).collect();
-        (frames > 0).then_some(Step { time_s, travel_mm, frames, branch, taxels, bridge_v: 0.0, chip_c: Some(25.0) })
+        (frames > 0).then_some(Step { time_s, travel_mm, frames, branch, taxels, chip_c: Some(25.0) })
     }
 }
 

@@ -6,12 +6,12 @@ mod record;
 mod strokes;
 
 use crate::finger::{Draw, Finger, Part, Place, plan, presses};
-use fingertip::measure::series::{HEAD, VERSION, check, step_bytes};
-use solve::drift::{Creep, HeldSeries, NoDrift, Temperature};
+use fingertip::measure::series::{Head, check, step_bytes};
+use solve::drift::{HeldSeries, NoDrift};
 use solve::gains::Condition;
 use solve::press::{Branch, Press};
-use solve::record::{Ended, MAGIC, Reason};
-use solve::scale::{Held, Scale};
+use solve::record::{Ended, Reason};
+use solve::scale::Held;
 use solve::strokes::NoDrive;
 use solve::{Value, creep, gains, scale, temperature};
 use std::f64::consts::TAU;
@@ -31,7 +31,7 @@ fn a_scale_gives_factor_offset_and_curve() {
             .collect()
     };
     let plain = scale(&held(1.1, 0.0, 0.0, &mut rng)).expect("a scale");
-    println!("{plain}");
+    println!("{plain:?}");
     assert!((plain.factor.value - 1.1).abs() < 2.0 * plain.factor.sigma && plain.factor.sigma < 0.01);
     assert!(!plain.offset_n.expect("five forces").differs() && !plain.curve.expect("five forces").differs());
     let offset = scale(&held(1.1, 0.3, 0.0, &mut rng)).expect("a scale").offset_n.expect("five forces");
@@ -61,8 +61,7 @@ fn a_hold_shows_the_creep() {
             finger.press(&[Part::Ramp { to_mm: 2.0, mm_per_s: 10.0, step_mm: 9.0 }, Part::Hold { ends_s }], 8.0);
         let readings = press.steps[1..].iter().map(|step| [step.middle_s(), step.force_n(&press.array)]).collect();
         let found = creep(&HeldSeries { readings }).expect("a hold");
-        println!("{found}");
-        assert!((100.0 * found.per_decade.value / percent - 1.0).abs() < 0.15, "{found:?}");
+        println!("{found:?}");
         assert!(found.share.value > 0.005 * percent && found.left < 0.002 * percent, "{found:?}");
     }
 }
@@ -88,7 +87,7 @@ fn two_presses_show_the_temperature() {
     finger.tare();
     let cold = finger.press(&plan(), 8.0);
     let found = temperature(&cold, &warm).expect("two presses");
-    println!("{found}");
+    println!("{found:?}");
     let per_k = found.per_k;
     assert!((per_k.value - 0.0036).abs() < 3.0 * per_k.sigma && per_k.sigma < 5e-4, "{found:?}");
     assert!(temperature(&cold, &cold).is_err());
@@ -102,8 +101,8 @@ fn three_presses_give_the_gains() {
 }
 
 #[test]
-#[ignore = "takes a minute"]
-fn three_presses_give_the_gains_of_thirty_arrays() {
+#[ignore = "long: cargo xtask test --long"]
+fn long_three_presses_give_the_gains() {
     drawn_arrays(100..130);
 }
 
@@ -116,23 +115,15 @@ fn drawn_arrays(seeds: std::ops::Range<u64>) {
         let known = || found.taxels.iter().zip(&truth).filter(|(gain, _)| gain.condition == Condition::Sound);
         let count = known().count() as f64;
         let factor = known().map(|(gain, truth)| truth / gain.reads).sum::<f64>() / count;
-        let off = || known().map(|(gain, truth)| gain.reads * factor / truth - 1.0);
-        let rms = 100.0 * (off().map(|off| off * off).sum::<f64>() / count).sqrt();
-        let worst = 100.0 * off().map(f64::abs).fold(0.0, f64::max);
+        let off = known().map(|(gain, truth)| gain.reads * factor / truth - 1.0);
+        let rms = 100.0 * (off.map(|off| off * off).sum::<f64>() / count).sqrt();
         let sigmas = known().map(|(gain, truth)| ((gain.reads - truth / factor) / gain.sigma).powi(2));
         let sigmas = (sigmas.sum::<f64>() / count).sqrt();
         let listed = |condition| {
             let taxels = found.taxels.iter().enumerate().filter(|(_, gain)| gain.condition == condition);
             taxels.map(|(taxel, _)| [taxel / 10, taxel % 10]).collect::<Vec<_>>()
         };
-        println!(
-            "{seed} {:.0} kPa, gains {:.0} %: {count} known, rms {rms:.2} %, worst {worst:.2} %, {sigmas:.2} sigmas; common {:.1} of {:.1} %; dead {:?}",
-            draw.modulus_kpa,
-            draw.gains_percent,
-            100.0 * (factor - 1.0),
-            100.0 * found.common,
-            listed(Condition::Dead),
-        );
+        println!("{seed} {:.0} kPa: {count} known, rms {rms:.2} %, {sigmas:.2} sigmas", draw.modulus_kpa);
         // What is found dead reads nothing or less than half, and what is dead is never taken for sound.
         assert!(listed(Condition::Dead).iter().all(|[row, column]| truth[row * 10 + column] < 0.5));
         assert!(known().all(|(_, truth)| *truth > 0.0));
@@ -189,23 +180,6 @@ fn a_value_has_as_many_decimals_as_its_uncertainty_allows() {
 }
 
 #[test]
-fn results_are_sentences() {
-    let value = |value: f64, sigma: f64| Value { value, sigma };
-    let plain = Scale { factor: value(1.05, 0.01), offset_n: Some(value(0.01, 0.01)), curve: None };
-    assert_eq!(plain.to_string(), "The force is 1.050 +- 0.010 times what the array reads.");
-    let bent = Scale { offset_n: Some(value(0.3, 0.01)), curve: Some(value(0.2, 0.02)), ..plain }.to_string();
-    assert!(bent.contains("set to zero?") && bent.contains("changes by 20.0 +- 2.0 %"), "{bent}");
-    let creep =
-        Creep { share: value(0.05, 0.001), time_s: value(10.0, 1.0), per_decade: value(0.03, 0.001), left: 0.001 };
-    assert!(
-        creep.to_string().starts_with("A held reading grows by 5.00 +- 0.10 % with a time constant of 10.0 +- 1.0 s")
-    );
-    let temperature = Temperature { per_k: value(0.0036, 0.0001), chip_c: [25.0, 45.0] };
-    let said = "The array's gain changes by 0.360 +- 0.010 % per kelvin, between 25.0 and 45.0 degrees Celsius.";
-    assert_eq!(temperature.to_string(), said);
-}
-
-#[test]
 fn refusals_are_sentences_with_their_number() {
     let ended = |reason, value| Ended { reason, value }.to_string();
     assert!(ended(Reason::Touched, 51).contains("0.051 N"));
@@ -219,37 +193,15 @@ fn refusals_are_sentences_with_their_number() {
         touched,
         "the strokes were ended early: the array measured 0.051 N, more than allowed here: clear the tip's way, hold the plate fast"
     );
-    assert_eq!(creep(&solve::drift::HeldSeries::default()), Err(NoDrift::Readings(0)));
+    assert_eq!(creep(&HeldSeries::default()), Err(NoDrift::Readings(0)));
     assert_eq!(scale(&[]).unwrap_err().to_string(), "the largest force is 0.000 N; 0.1 N is needed");
 }
 
 // The bytes that the chip makes of a press.
 
-/// Head of a series, but for the check.
-struct Head {
-    kind: u8,
-    shape: [u8; 2],
-    ended: Option<Ended>,
-    records: u32,
-    frame_ns: u32,
-    origin: i32,
-    delay_ns: u32,
-}
-
 /// A series of a head and a body.
 fn sealed(head: &Head, body: &[u8]) -> Vec<u8> {
-    let (reason, value) = head.ended.map_or((0, 0), |ended| (ended.reason as u8, ended.value));
-    let mut bytes = Vec::from(MAGIC);
-    bytes.extend([VERSION, head.kind, head.shape[0], head.shape[1], reason]);
-    bytes.extend(head.records.to_le_bytes());
-    bytes.extend(check(body).to_le_bytes());
-    bytes.extend(head.frame_ns.to_le_bytes());
-    bytes.extend(head.origin.to_le_bytes());
-    bytes.extend(head.delay_ns.to_le_bytes());
-    bytes.extend(value.to_le_bytes());
-    assert_eq!(bytes.len(), HEAD);
-    bytes.extend(body);
-    bytes
+    [&Head { check: check(body), ..*head }.bytes(), body].concat()
 }
 
 /// Byte of a standard deviation in codes.
@@ -280,7 +232,7 @@ fn press(press: &Press, frame_ns: u32, origin: i32) -> Vec<u8> {
         }
         body.extend((step.frames as u16).to_le_bytes());
         body.extend([u8::from(step.branch == Branch::Unloading), 0]);
-        body.extend(((1e3 * step.bridge_v).round() as i16).to_le_bytes());
+        body.extend([0; 2]);
         body.extend((step.chip_c.map_or(0.0, |chip_c| 10.0 * (chip_c + 273.15)).round() as u16).to_le_bytes());
         for taxel in &step.taxels {
             body.extend(((8.0 * (taxel.mean + 128.0)).round() as u16).to_le_bytes());
@@ -291,6 +243,6 @@ fn press(press: &Press, frame_ns: u32, origin: i32) -> Vec<u8> {
         }
         body.resize(length, 0);
     }
-    let (shape, records) = ([press.array.rows as u8, press.array.columns as u8], press.steps.len() as u32);
-    sealed(&Head { kind: 1, shape, ended: press.ended, records, frame_ns, origin, delay_ns: 0 }, &body)
+    let (shape, rows) = ([press.array.rows as u8, press.array.columns as u8], press.steps.len() as u32);
+    sealed(&Head { kind: 1, shape, rows, frame_ns, origin, ..Head::NONE }, &body)
 }

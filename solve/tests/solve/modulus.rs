@@ -4,7 +4,7 @@ use crate::finger::{Draw, FRAME_NS, Finger, Part, Place, cycle, plan, presses, s
 use fingertip::params::Params;
 use solve::gains::{Condition, NoGains};
 use solve::judge::Verdict;
-use solve::modulus::NoModulus;
+use solve::modulus::{Modulus, NoModulus};
 use solve::press::Press;
 use solve::{gains, modulus, record};
 
@@ -12,32 +12,28 @@ use solve::{gains, modulus, record};
 fn errors(seeds: std::ops::Range<u64>, count: usize, plan: &[Part]) -> Vec<[f64; 2]> {
     let solved = seeds.map(|seed| {
         let draw = Draw::any(seed, [0.0, 10.0], [0, 2]);
-        let found = modulus(&presses(&draw, count, plan)).unwrap_or_else(|why| panic!("{why:?} {draw:?}"));
-        let error = 100.0 * (found.kpa / draw.modulus_kpa - 1.0);
-        let sigma = 100.0 * found.sigma_kpa / found.kpa;
-        println!(
-            "{seed:3} {:5.0} kPa {error:6.2} of {sigma:4.2} % {:?} {:.3?}",
-            draw.modulus_kpa,
-            found.parts,
-            found.presses.iter().map(|one| 100.0 * (one.kpa / draw.modulus_kpa - 1.0)).collect::<Vec<_>>()
-        );
+        let (found, [error, sigma]) = solved(&draw, &presses(&draw, count, plan));
+        println!("{seed:3} {:5.0} kPa {error:6.2} of {sigma:4.2} % {:?}", draw.modulus_kpa, found.parts);
         [error, sigma]
     });
     solved.collect()
 }
 
-/// Median, worst, standard deviation, standard uncertainty, and how many are within two.
+/// Modulus of a tip, with its error and uncertainty in percent.
+fn solved(draw: &Draw, presses: &[Press]) -> (Modulus, [f64; 2]) {
+    let found = modulus(presses).unwrap_or_else(|why| panic!("{why:?} {draw:?}"));
+    let errors = [100.0 * (found.kpa / draw.modulus_kpa - 1.0), 100.0 * found.sigma_kpa / found.kpa];
+    (found, errors)
+}
+
+/// Median, worst, standard deviation, standard uncertainty, and how many are within two; printed too.
 fn summary(name: &str, errors: &[[f64; 2]]) -> [f64; 5] {
     let mut sizes: Vec<f64> = errors.iter().map(|[error, _]| error.abs()).collect();
     sizes.sort_by(f64::total_cmp);
     let rms = |at: usize| (errors.iter().map(|one| one[at] * one[at]).sum::<f64>() / errors.len() as f64).sqrt();
     let within = errors.iter().filter(|[error, sigma]| error.abs() <= 2.0 * sigma).count();
     let summary = [sizes[sizes.len() / 2], sizes[sizes.len() - 1], rms(0), rms(1), within as f64];
-    let [median, worst, deviation, sigma, within] = summary;
-    println!(
-        "{name}: {} tips, median {median:.2} %, worst {worst:.2} %, deviation {deviation:.2} %, uncertainty {sigma:.2} %, {within} within two",
-        errors.len()
-    );
+    println!("{name}: {} tips, {summary:.2?}", errors.len());
     summary
 }
 
@@ -100,7 +96,7 @@ fn an_array_of_any_shape_gives_the_modulus() {
             }
             let bytes = crate::press(press, FRAME_NS, 5);
             let press = record::press(&bytes, &Params::DEFAULT).expect("a series");
-            let found = modulus(std::slice::from_ref(&press)).unwrap_or_else(|why| panic!("{why} {draw:?}"));
+            let (found, errors) = solved(&draw, std::slice::from_ref(&press));
             println!("{found}");
             // The middle of an array with an odd number of rows or columns lies half a pitch before that of 10.
             let off = |size: usize| if size % 2 == 1 { 0.5 * press.array.pitch_mm } else { 0.0 };
@@ -110,7 +106,7 @@ fn an_array_of_any_shape_gives_the_modulus() {
             }
             // The rim is pressed on the array's border, which must not make it look dead.
             assert!(found.gains.taxels.iter().all(|gain| gain.condition != Condition::Dead), "{found}");
-            [100.0 * (found.kpa / draw.modulus_kpa - 1.0), 100.0 * found.sigma_kpa / found.kpa]
+            errors
         })
         .collect();
     let [_, worst, .., within] = summary("other shapes", &errors);
@@ -125,8 +121,7 @@ fn an_edge_does_not_refuse_a_press() {
         let mut finger = Finger::new(&draw);
         finger.go(&Place { centre_mm: [4.5, -2.0], tilt_deg: [1.0, 1.0] });
         finger.tare();
-        let found = modulus(&[finger.press(&plan(), 8.0)]).unwrap_or_else(|why| panic!("{why:?} {draw:?}"));
-        [100.0 * (found.kpa / draw.modulus_kpa - 1.0), 100.0 * found.sigma_kpa / found.kpa]
+        solved(&draw, &[finger.press(&plan(), 8.0)]).1
     });
     let [_, worst, ..] = summary("over the edge", &errors.collect::<Vec<_>>());
     assert!(worst < 4.0, "{worst}");
@@ -139,10 +134,8 @@ fn a_wrong_radius_hardly_matters() {
         let errors = (0..2).map(|seed| {
             let draw = Draw::any(500 + seed, [0.0, 3.0], [0, 2]);
             let mut presses = presses(&draw, 1, &plan());
-            presses[0].tip.radius_mm *= share;
-            let found = modulus(&presses).unwrap_or_else(|why| panic!("{why:?} {draw:?}"));
-            println!("{share} {:?} {:?}", found.gains.presses[0].judgement, found.gains.presses[0].pose);
-            [100.0 * (found.kpa / draw.modulus_kpa - 1.0), 100.0 * found.sigma_kpa / found.kpa]
+            presses[0].radius_mm *= share;
+            solved(&draw, &presses).1
         });
         let [_, worst, .., within] = summary("radius", &errors.collect::<Vec<_>>());
         assert!(worst < 3.0 && within >= 2.0, "{worst} {within}");
@@ -167,19 +160,13 @@ fn a_soft_plate_is_measured() {
     for seed in 0..2 {
         for yields_mm_per_n in [0.0, 0.03, 0.06] {
             let draw = drawn(seed, yields_mm_per_n);
-            let found = modulus(&[press(&draw, 0.0, &plan())]).unwrap_or_else(|why| panic!("{why:?} {draw:?}"));
+            let (found, [error, _]) = solved(&draw, &[press(&draw, 0.0, &plan())]);
             let judgement = found.gains.presses[0].judgement;
-            let [yields, sigma] = judgement.yields_mm_per_n;
-            let error = found.kpa / draw.modulus_kpa - 1.0;
-            println!(
-                "{:.0} kPa yields {yields_mm_per_n}: {yields:.4} +- {sigma:.4} {:?}, modulus {:.1} %",
-                draw.modulus_kpa,
-                judgement.verdict,
-                100.0 * error
-            );
+            let [yields, _] = judgement.yields_mm_per_n;
+            println!("{:.0} kPa yields {yields_mm_per_n}: {judgement:?}, modulus {error:.1} %", draw.modulus_kpa);
             assert!((yields - yields_mm_per_n).abs() < 0.003 + 0.1 * yields_mm_per_n, "{yields}");
             assert_eq!(matches!(judgement.verdict, Verdict::Soft(_)), yields_mm_per_n > 0.0, "{judgement:?}");
-            assert!(error.abs() < 0.06, "{error}");
+            assert!(error.abs() < 6.0, "{error}");
         }
     }
 }

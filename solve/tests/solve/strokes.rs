@@ -22,29 +22,22 @@ const FORCE_N: f64 = 0.3;
 
 const QUANTITIES: [&str; 5] = ["k", "tau", "inertia", "friction forward", "friction back"];
 
-/// The worst of values that belong to drives, the 95th of a hundred, the median.
+/// Prints the worst of values that belong to drives, and the median; returns the worst.
 fn tell(name: &str, values: &[(f64, usize)]) -> f64 {
     let mut values = values.to_vec();
     values.sort_by(|a, b| b.0.total_cmp(&a.0));
-    if values.is_empty() {
-        return 0.0;
-    }
-    let at = |share: f64| values[(values.len() as f64 * share) as usize];
-    let (worst, number) = values[0];
-    println!("{name}: worst {worst:.2} (drive {number}), 95 % {:.2}, median {:.2}", at(0.05).0, at(0.5).0);
-    worst
+    let Some((worst, number)) = values.first() else { return 0.0 };
+    println!("{name}: worst {worst:.2} (drive {number}), median {:.2}", values[values.len() / 2].0);
+    *worst
 }
 
 /// Errors of the results of many drives.
 #[derive(Default)]
 struct Figures {
+    /// Errors of each quantity, in percent.
     errors: [Vec<(f64, usize)>; 5],
-    sigmas: [Vec<(f64, usize)>; 5],
-    travels: Vec<(f64, usize)>,
-    forces: Vec<(f64, usize)>,
-    samples: Vec<(f64, usize)>,
-    times: Vec<(f64, usize)>,
     refused: Vec<usize>,
+    /// Drives with an error beyond 5 % and two standard uncertainties.
     silent: Vec<usize>,
     measured: usize,
 }
@@ -67,37 +60,22 @@ impl Figures {
             let mut rig = Rig::new(draw(&mut rng, number), rng.u64(..));
             figures.add(number, &mut rig, strokes);
         }
-        let Self { errors, sigmas, travels, forces, samples, times, refused, silent, measured } = &figures;
+        let Self { errors, refused, silent, measured } = &figures;
         println!("{name}: {measured} of {count} measured, refused {refused:?}, silently wrong {silent:?}");
-        for (name, (errors, sigmas)) in QUANTITIES.iter().zip(errors.iter().zip(sigmas)) {
-            let within = sigmas.iter().filter(|(sigmas, _)| *sigmas <= 2.0).count();
+        for (name, errors) in QUANTITIES.iter().zip(errors) {
             tell(&format!("{name} %"), errors);
-            tell(&format!("{name}, {within} of {} within two sigmas; in sigmas", sigmas.len()), sigmas);
         }
-        tell("travel mm", travels);
-        tell("force mN", forces);
-        tell("samples", samples);
-        tell("duration s", times);
         figures
     }
 
     fn add(&mut self, number: usize, rig: &mut Rig, strokes: usize) {
         let record = measure(rig, strokes);
-        self.travels.push((rig.travel_mm, number));
-        self.forces.push((1e3 * rig.force_n, number));
-        let samples: usize = record.strokes.iter().map(|stroke| stroke.samples.len()).sum();
-        self.samples.push((samples as f64, number));
-        self.times.push((rig.time_s, number));
+        assert!(rig.travel_mm < TRAVEL_MM && rig.force_n == 0.0, "drive {number}: {} mm", rig.travel_mm);
         let d = &rig.drive;
         let found = match solve(&record) {
             Ok(found) => found,
             Err(refusal) => {
-                println!(
-                    "drive {number}, k {:.2e}, {:.2} Ohm, friction {:.2e}: {refusal}",
-                    d.k,
-                    d.ohm(),
-                    d.friction_nm
-                );
+                println!("drive {number}: {refusal} {d:?}");
                 self.refused.push(number);
                 return;
             }
@@ -106,13 +84,12 @@ impl Figures {
             (found.torque_constant, d.k),
             (found.time_constant_s, d.tau()),
             (found.inertia_kg_m2, d.inertia),
-            (found.friction[0].torque_nm, d.friction_nm),
-            (found.friction[1].torque_nm, d.friction_nm),
+            (found.friction_nm[0], d.friction_nm),
+            (found.friction_nm[1], d.friction_nm),
         ];
         for (place, (found, truth)) in pairs.into_iter().enumerate() {
             let error = (found.value / truth - 1.0).abs();
             self.errors[place].push((100.0 * error, number));
-            self.sigmas[place].push((error / found.relative(), number));
             if place < 2 && error > 0.05 && found.relative() < 0.5 * error {
                 self.silent.push(number);
             }
@@ -120,33 +97,18 @@ impl Figures {
         let precise = pairs[0].0.relative() < MEASURED[0] && pairs[1].0.relative() < MEASURED[1];
         self.measured += usize::from(precise);
         if !precise {
-            println!(
-                "drive {number}: k {:.2} % +- {:.2}, tau {:.2} % +- {:.2}, residual {:.5}, {:?} {:.1}, speeds {:.0?}; {:?} {:.1} {:.2}",
-                100.0 * (pairs[0].0.value / pairs[0].1 - 1.0),
-                100.0 * pairs[0].0.relative(),
-                100.0 * (pairs[1].0.value / pairs[1].1 - 1.0),
-                100.0 * pairs[1].0.relative(),
-                found.residual_rad,
-                found.form,
-                found.stribeck_rad_per_s.value,
-                found.speeds_rad_per_s,
-                d.falls,
-                d.stribeck,
-                d.stiction,
-            );
+            println!("drive {number} is not measured: {found:?} {d:?}");
         }
     }
 
     /// The bounds that hold for every population in the air.
     fn judge(&self, measured: usize) {
-        let worst = |values: &[(f64, usize)]| values.iter().map(|(value, _)| *value).fold(0.0, f64::max);
         assert!(self.silent.is_empty());
         assert!(self.measured >= measured, "{} measured", self.measured);
-        assert!(worst(&self.travels) < TRAVEL_MM && worst(&self.samples) <= ROWS as f64);
-        assert_eq!(worst(&self.forces), 0.0);
         // By encoders of 256 to 4096 counts, k cannot be exact for every drive of a population.
         if measured >= 20 {
-            assert!((0.1..5.0).contains(&worst(&self.errors[0])), "{}", worst(&self.errors[0]));
+            let worst = self.errors[0].iter().map(|(value, _)| *value).fold(0.0, f64::max);
+            assert!((0.1..5.0).contains(&worst), "{worst}");
         }
     }
 }
@@ -159,13 +121,6 @@ fn ordinary_drives_are_measured() {
 #[test]
 fn varied_drives_are_measured() {
     Figures::of("varied", 0..30, ALL, |rng, _| SimulatedDrive::varied(rng)).judge(27);
-}
-
-#[test]
-#[ignore = "takes minutes"]
-fn two_hundred_drives_of_each_kind_are_measured() {
-    Figures::of("ordinary", 0..200, ALL, |rng, _| SimulatedDrive::ordinary(rng)).judge(180);
-    Figures::of("varied", 0..200, ALL, |rng, _| SimulatedDrive::varied(rng)).judge(180);
 }
 
 /// Slow strokes alone do not separate k from friction that falls with speed. The uncertainties must cover that.
@@ -241,11 +196,8 @@ fn a_refusal_states_its_reason_and_the_number_behind_it() {
     let record = measure(&mut Rig::new(drive, 1), ALL);
     let changed = |change: fn(i32) -> i32| {
         let mut record = record.clone();
-        record
-            .strokes
-            .iter_mut()
-            .flat_map(|stroke| &mut stroke.samples)
-            .for_each(|sample| sample.count = change(sample.count));
+        let samples = record.strokes.iter_mut().flat_map(|stroke| &mut stroke.samples);
+        samples.for_each(|sample| sample.count = change(sample.count));
         record
     };
     let counts = 1.4 * record.rad_per_mm / core::f64::consts::TAU * record.counts_per_turn;
@@ -267,19 +219,9 @@ fn a_refusal_states_its_reason_and_the_number_behind_it() {
 /// Something 0.02 to 0.8 mm away, every second time unseen by the array: as hard as glass under the tip, or soft.
 #[test]
 fn what_is_in_the_way_is_pressed_with_less_than_the_bound() {
-    in_the_way(8);
-}
-
-#[test]
-#[ignore = "takes minutes"]
-fn what_is_in_the_way_of_two_hundred_is_pressed_with_less_than_the_bound() {
-    in_the_way(200);
-}
-
-fn in_the_way(count: usize) {
     let mut forces = Vec::new();
-    let (mut reasons, mut through) = (Vec::new(), Vec::new());
-    for number in 0..count {
+    let mut through = Vec::new();
+    for number in 0..8 {
         let mut rng = fastrand::Rng::with_seed(1000 + number as u64);
         let draw = if number % 4 < 2 { SimulatedDrive::ordinary } else { SimulatedDrive::varied };
         let mut drive = draw(&mut rng);
@@ -289,17 +231,10 @@ fn in_the_way(count: usize) {
         let mut rig = Rig::new(drive, rng.u64(..));
         let record = measure(&mut rig, ALL);
         forces.push((1e3 * rig.force_n, number));
-        match solve(&record) {
-            Err(refusal) => reasons.push(refusal.to_string()),
-            Ok(found) => {
-                let error = (found.torque_constant.value / rig.drive.k - 1.0).abs();
-                through.push((100.0 * error, number));
-            }
-        }
+        let found = solve(&record);
+        through.extend(found.map(|found| (100.0 * (found.torque_constant.value / rig.drive.k - 1.0).abs(), number)));
     }
-    println!("{} refused, {} went through", reasons.len(), through.len());
-    let worst = tell("k of those %", &through);
-    assert!(worst < 5.0);
+    assert!(tell("k of those that are not refused %", &through) < 5.0);
     assert!(tell("force mN", &forces) < 1e3 * FORCE_N);
 }
 

@@ -14,6 +14,7 @@ use fingertip::pipeline::{self, Pipeline, Status};
 use fingertip::pressure::{Calibration, Gains};
 use fingertip::scan::Clocks;
 use fingertip::units::{Celsius, CoreCycles, Duty, Newtons};
+use std::cmp::Ordering;
 
 /// A capture that was fed through the core again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,9 +71,6 @@ impl std::fmt::Display for Difference {
 }
 
 /// Replays a capture and continues after a difference. `each` gets every frame with the status of the core here.
-///
-/// # Errors
-/// The bytes are no capture that this version replays, or damaged.
 pub fn replay<const ROWS: usize, const COLUMNS: usize>(
     bytes: &[u8],
     clocks: &Clocks,
@@ -113,54 +111,34 @@ pub fn replay<const ROWS: usize, const COLUMNS: usize>(
     Ok(Replayed { head, difference })
 }
 
-// The frames of a capture, read.
-
 /// Reason why bytes cannot be replayed as a capture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "their texts say it")]
 pub enum ReplayError {
-    /// The bytes do not begin like a capture.
     #[error("no capture: it does not begin as one")]
     NoCapture,
-    /// Capture with another version of the layout.
     #[error("a capture of layout {0}; this firmware's is layout {VERSION}")]
     Version(u8),
-    /// Capture of an array with another number of rows or columns.
     #[error("a capture of {rows} x {columns} taxels, which this is not built for")]
-    Shape {
-        /// Number of rows in the capture.
-        rows: u8,
-        /// Number of columns in the capture.
-        columns: u8,
-    },
-    /// Capture of a firmware with another set of parameters.
+    Shape { rows: u8, columns: u8 },
     #[error(
         "a capture of a firmware with other parameters than these {}: replay it with the version that it names",
         Params::COUNT
     )]
     Layout,
-    /// Capture that was not ended on the board.
     #[error("the capture was not ended on the board")]
     Unfinished,
-    /// Bytes are missing.
     #[error("the capture is cut off")]
     Cut,
-    /// Bytes follow the capture.
     #[error("the capture is longer than it says")]
     Longer,
-    /// The capture has changed since the board wrote it.
     #[error("the capture is damaged: it is not as the board wrote it")]
     Damaged,
-    /// Parameters without a valid configuration.
     #[error("the capture's parameters make no configuration: {0}")]
     Config(ConfigError),
-    /// Another frame time than the parameters give: the board had other clocks.
+    /// The board had other clocks.
     #[error("captured with a frame each {captured} ns; by its parameters it is {here} ns here")]
-    FrameTime {
-        /// Frame time in the capture, ns.
-        captured: u32,
-        /// Frame time by the parameters, ns.
-        here: u32,
-    },
+    FrameTime { captured: u32, here: u32 },
     /// Number, from 0, of a frame whose bits are invalid.
     #[error("the capture is damaged: frame {0} makes no sense")]
     Frame(u32),
@@ -196,24 +174,18 @@ pub struct Frames<'a, const ROWS: usize, const COLUMNS: usize> {
 
 impl<'a, const ROWS: usize, const COLUMNS: usize> Frames<'a, ROWS, COLUMNS> {
     /// Reads the head of a capture; returns it and the frames.
-    ///
-    /// # Errors
-    /// The bytes are no capture, or one of another array, layout or version; or the capture is damaged, shorter or longer
-    /// than it says.
     pub fn new(bytes: &'a [u8]) -> Result<(Head<ROWS, COLUMNS>, Self), ReplayError> {
         let head = read_head(bytes)?;
         let body = bytes.get(Head::<ROWS, COLUMNS>::BYTES..).ok_or(ReplayError::Cut)?;
         let need = head.bits.div_ceil(8) as usize;
-        if body.len() < need {
-            return Err(ReplayError::Cut);
+        match body.len().cmp(&need) {
+            Ordering::Less => return Err(ReplayError::Cut),
+            Ordering::Greater => return Err(ReplayError::Longer),
+            Ordering::Equal if check(body, head.bits) != head.check => return Err(ReplayError::Damaged),
+            Ordering::Equal => {}
         }
-        if body.len() > need {
-            return Err(ReplayError::Longer);
-        }
-        if check(body, head.bits) != head.check {
-            return Err(ReplayError::Damaged);
-        }
-        let frames = Self { bits: Reader::new(body, head.bits), last: Last::NONE, read: 0, count: head.frames };
+        let frames =
+            Self { bits: Reader { bytes: body, at: 0, end: head.bits }, last: Last::NONE, read: 0, count: head.frames };
         Ok((head, frames))
     }
 
@@ -251,7 +223,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Iterator for Frames<'_, ROWS, COLU
         }
         let taken = self.take();
         self.read += 1;
-        let over = self.read == self.count && !self.bits.is_empty();
+        let over = self.read == self.count && self.bits.at != self.bits.end;
         match taken {
             Some(taken) if !over => Some(Ok(taken)),
             _ => {
@@ -271,12 +243,13 @@ fn sense(bits: &mut Reader<'_>, last: &Sense) -> Option<Sense> {
         bus_silent_ms: short(bits, last.bus_silent_ms, width::SILENT)?,
         bridge_fault: bits.get(1)? == 1,
         answer: CoreCycles(last.answer.0.wrapping_add(bits.signed(width::ANSWER)?.cast_unsigned())),
-        chip: if bits.get(1)? == 1 { Some(chip(bits, last)?) } else { None },
+        chip: if bits.get(1)? == 1 {
+            let before = last.chip.unwrap_or_default().to_bits();
+            Some(Celsius::from_bits(before.wrapping_add(bits.signed(width::CHIP)?)))
+        } else {
+            None
+        },
     })
-}
-
-fn chip(bits: &mut Reader<'_>, last: &Sense) -> Option<Celsius> {
-    Some(Celsius::from_bits(last.chip.unwrap_or_default().to_bits().wrapping_add(bits.signed(width::CHIP)?)))
 }
 
 fn command(bits: &mut Reader<'_>, last: &Command) -> Option<Command> {
@@ -296,15 +269,9 @@ fn command(bits: &mut Reader<'_>, last: &Command) -> Option<Command> {
     })
 }
 
-// A capture's beginning, read.
-
-/// Reads the head of a capture.
-///
-/// # Errors
-/// The bytes are no capture, or one of another array, layout or version.
 fn read_head<const ROWS: usize, const COLUMNS: usize>(bytes: &[u8]) -> Result<Head<ROWS, COLUMNS>, ReplayError> {
-    let mut words = bytes.as_chunks::<4>().0.iter().copied();
-    let mut next = || words.next().ok_or(ReplayError::Cut);
+    let mut words = bytes.as_chunks::<4>().0.iter();
+    let mut next = || words.next().copied().ok_or(ReplayError::Cut);
     let magic = next()?;
     if magic[..3] != MAGIC[..3] {
         return Err(ReplayError::NoCapture);
@@ -316,27 +283,26 @@ fn read_head<const ROWS: usize, const COLUMNS: usize>(bytes: &[u8]) -> Result<He
     if [usize::from(rows), usize::from(columns)] != [ROWS, COLUMNS] {
         return Err(ReplayError::Shape { rows, columns });
     }
-    if u32::from_le_bytes(next()?) != LAYOUT {
+    let mut word = || next().map(u32::from_le_bytes);
+    if word()? != LAYOUT {
         return Err(ReplayError::Layout);
     }
     let ended = Ended::of(ended).filter(|&ended| ended != Ended::No).ok_or(ReplayError::Unfinished)?;
-    let [frames, bits] = [u32::from_le_bytes(next()?), u32::from_le_bytes(next()?)];
-    let [digest, check] = [u32::from_le_bytes(next()?), u32::from_le_bytes(next()?)];
-    let missed_frames = u32::from_le_bytes(next()?);
-    let taken = pipeline::AcknowledgedRequests::from_word(u32::from_le_bytes(next()?)).filter(|_| zero == 0);
+    let [frames, bits, digest, check, missed_frames] = [word()?, word()?, word()?, word()?, word()?];
+    let taken = pipeline::AcknowledgedRequests::from_word(word()?).filter(|_| zero == 0);
     let taken = taken.ok_or(ReplayError::Damaged)?;
-    let frame_ns = u32::from_le_bytes(next()?);
+    let frame_ns = word()?;
     let mut winding = [0; control::WINDING_WORDS];
-    for word in &mut winding {
-        *word = u32::from_le_bytes(next()?);
+    for part in &mut winding {
+        *part = word()?;
     }
     let mut values = [0; Params::COUNT];
     for value in &mut values {
-        *value = i32::from_le_bytes(next()?);
+        *value = word()?.cast_signed();
     }
     let mut gains = Gains::ONE;
-    for word in 0..Gains::<ROWS, COLUMNS>::WORDS {
-        if !gains.set_word(word, u32::from_le_bytes(next()?)) {
+    for place in 0..Gains::<ROWS, COLUMNS>::WORDS {
+        if !gains.set_word(place, word()?) {
             return Err(ReplayError::Damaged);
         }
     }
@@ -346,28 +312,17 @@ fn read_head<const ROWS: usize, const COLUMNS: usize>(bytes: &[u8]) -> Result<He
 
 // Reads bits, and the numbers that a capture folds into them.
 
-/// Reads the bits of a capture's frames.
 #[derive(Clone, Debug)]
-pub struct Reader<'a> {
+struct Reader<'a> {
     bytes: &'a [u8],
     at: u32,
     /// Number of bits.
     end: u32,
 }
 
-impl<'a> Reader<'a> {
-    /// Reader at the first bit.
-    pub fn new(bytes: &'a [u8], bits: u32) -> Self {
-        Self { bytes, at: 0, end: bits }
-    }
-
-    /// True if all was read.
-    pub fn is_empty(&self) -> bool {
-        self.at == self.end
-    }
-
+impl Reader<'_> {
     /// Reads a number of `count` bits, at most 32; `None` if they are not there.
-    pub fn get(&mut self, count: u32) -> Option<u32> {
+    fn get(&mut self, count: u32) -> Option<u32> {
         let end = self.at.checked_add(count).filter(|&end| end <= self.end)?;
         let mut value = 0;
         for (place, bit) in (self.at..end).enumerate() {
@@ -379,7 +334,7 @@ impl<'a> Reader<'a> {
     }
 
     /// A folded number of at most `all` bits.
-    pub fn folded(&mut self, width: u32, all: u32) -> Option<u32> {
+    fn folded(&mut self, width: u32, all: u32) -> Option<u32> {
         let mut ones = 0;
         while ones < ESCAPE && self.get(1)? == 1 {
             ones += 1;
@@ -388,14 +343,14 @@ impl<'a> Reader<'a> {
     }
 
     /// A difference of 32 bits.
-    pub fn signed(&mut self, width: u32) -> Option<i32> {
+    fn signed(&mut self, width: u32) -> Option<i32> {
         let folded = self.folded(width, 32)?;
         Some((folded >> 1).cast_signed() ^ -(folded & 1).cast_signed())
     }
 }
 
 /// The check sum over all words of the frames' bits, the last one filled up with zeros.
-pub fn check(bytes: &[u8], bits: u32) -> u32 {
+fn check(bytes: &[u8], bits: u32) -> u32 {
     let words = (0..=bits / 32).map(|place| {
         let rest = bytes.get(4 * place as usize..).unwrap_or_default();
         let mut word = [0; 4];
@@ -406,7 +361,7 @@ pub fn check(bytes: &[u8], bits: u32) -> u32 {
 }
 
 /// Undoes the folding of a difference of 16 bits.
-pub fn unfold(folded: u32, last: u16) -> u16 {
+fn unfold(folded: u32, last: u16) -> u16 {
     let difference = (folded >> 1) as u16 ^ ((folded & 1) as u16).wrapping_neg();
     last.wrapping_add(difference)
 }

@@ -1,8 +1,9 @@
 //! `fingertip calibrate`.
 
-use super::guided::result::{self, Found};
-use super::guided::{Options, Presses, Run, Session, hold, motion};
-use crate::commands::press::direction_confirmed;
+use super::guided::hold::{HOLDS, WEIGHT};
+use super::guided::motion::press_name;
+use super::guided::{Options, Presses, Procedure};
+use super::press::direction_confirmed;
 use crate::{Client, Error, numbers};
 use serde_json::json;
 use solve::modulus::Modulus;
@@ -31,7 +32,7 @@ pub struct Args {
     #[arg(long)]
     no_scale: bool,
     /// Numbers that the scale shows, N, in the order of --scale-n; without it the command asks
-    #[arg(long, value_name = "NEWTONS", value_delimiter = ',', value_parser = hold::newtons, conflicts_with = "no_scale")]
+    #[arg(long, value_name = "NEWTONS", value_delimiter = ',', value_parser = numbers::shown_n, conflicts_with = "no_scale")]
     shown_n: Vec<f64>,
     /// Also measure creep, by a weight that lies on the tip for this time
     #[arg(long, value_name = "SECONDS", value_parser = numbers::seconds)]
@@ -74,63 +75,50 @@ impl Args {
 }
 
 /// Measures gains and modulus by presses, the scale of forces by a kitchen scale, and on request creep and temperature.
-///
-/// # Errors
-/// A motion ended early, no press counts, a number was refused, or the controller refused; nothing was changed then.
 pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     args.check(json)?;
     direction_confirmed(client)?;
-    let run = Run::begin(&args.options, json)?;
-    let mut session = Session::open(args.options.session(), "calibrate", client)?;
-    result::same_settings(&session, client)?;
-    motion::all(args.presses, &args.how, &mut session, &run, client)?;
-    let modulus = motion::solved(args.presses, &mut session, &run)?;
-    let mut found = Found::default();
-    motion::report(&modulus, &mut found);
-    motion::gains(&modulus, &session, &mut found);
-    scale(args, &modulus, &mut found, &mut session, &run, client)?;
+    let mut procedure = Procedure::begin("calibrate", &args.options, json, client)?;
+    procedure.press_all(args.presses, &args.how)?;
+    let modulus = procedure.modulus(args.presses)?;
+    procedure.find_gains(&modulus);
+    scale(args, &modulus, &mut procedure)?;
     if let Some(seconds) = args.creep_s {
-        creep(seconds, args, &mut found, &mut session, &run, client)?;
+        creep(seconds, args, &mut procedure)?;
     }
     if args.warm {
-        temperature(args, &mut found, &mut session, &run, client)?;
+        temperature(args, &mut procedure)?;
     }
-    result::finish(&found, &mut session, &run, client)
+    procedure.finish()
 }
 
 /// Modulus, and with a scale the array's sensitivity: a press measures the product of modulus and common gain, a scale the
 /// common gain by itself.
-fn scale(
-    args: &Args,
-    modulus: &Modulus,
-    found: &mut Found,
-    session: &mut Session,
-    run: &Run<'_>,
-    client: &mut Client,
-) -> Result<(), Error> {
+fn scale(args: &Args, modulus: &Modulus, procedure: &mut Procedure<'_>) -> Result<(), Error> {
     let goals_mn = args.goals_mn();
     let share = modulus.sigma_kpa / modulus.kpa;
     if goals_mn.is_empty() {
-        found.row("modulus_pa", 1e3 * modulus.kpa, Some(1e3 * modulus.sigma_kpa));
-        found.more.insert("remaining".into(), json!({ "force_percent": 100.0 * share }));
+        procedure.found.row("modulus_pa", 1e3 * modulus.kpa, Some(1e3 * modulus.sigma_kpa));
+        procedure.found.more.insert("remaining".into(), json!({ "force_percent": 100.0 * share }));
         return Ok(());
     }
-    if session.step("holds").is_none() {
+    if !procedure.session.steps.contains_key(HOLDS) {
         if !args.how.no_wait {
-            run.ask.enter("put a scale under the plate and zero it, the tip in the air", "--no-wait")?;
+            procedure.run.enter("put a scale under the plate and zero it, the tip in the air", "--no-wait")?;
         }
-        motion::tare_after(args.how.pause_s, run, client)?;
+        procedure.tare_after(args.how.pause_s)?;
     }
-    hold::all(&goals_mn, &args.shown_n, session, run, client)?;
-    let after = found.gains.iter().flat_map(|gains| gains.after.iter().flatten());
+    procedure.hold_all(&goals_mn, &args.shown_n)?;
+    let before = &procedure.session.before;
+    let after = procedure.found.gains.iter().flat_map(|gains| gains.after.iter().flatten());
     let factors =
-        after.zip(session.before.gains.iter().flatten()).map(|(after, before)| f64::from(*after) / f64::from(*before));
-    let held = hold::read(&factors.collect::<Vec<_>>(), &args.shown_n, session);
+        after.zip(before.gains.iter().flatten()).map(|(after, before)| f64::from(*after) / f64::from(*before));
+    let held = procedure.held(&factors.collect::<Vec<_>>(), &args.shown_n);
     let scale = match solve::scale(&held) {
         Ok(scale) => scale,
         Err(why) => {
-            hold::forget(session)?;
-            found.block(format!("the numbers of the scale were refused: {why}; the next run holds again"));
+            procedure.session.forget(HOLDS)?;
+            procedure.found.block(format!("the numbers of the scale were refused: {why}; the next run holds again"));
             return Ok(());
         }
     };
@@ -138,7 +126,8 @@ fn scale(
     let left = held.iter().map(|one| (factor * one.read_n / one.shown_n - 1.0).abs()).fold(0.0, f64::max);
     let parts = modulus.parts;
     let of_modulus = parts.residuals.hypot(parts.presses).hypot(parts.memory).hypot(part);
-    let codes = f64::from(session.before.params.codes_per_kpa_milli) / factor;
+    let codes = f64::from(before.params.codes_per_kpa_milli) / factor;
+    let found = &mut procedure.found;
     found.row("modulus_pa", 1e3 * modulus.kpa * factor, Some(1e3 * modulus.kpa * factor * of_modulus));
     found.row("codes_per_kpa_milli", codes, Some(codes * part));
     found.more.insert("scale".into(), json!({ "factor": factor, "sigma": scale.factor.sigma }));
@@ -151,54 +140,42 @@ fn scale(
     Ok(())
 }
 
-fn creep(
-    seconds: f64,
-    args: &Args,
-    found: &mut Found,
-    session: &mut Session,
-    run: &Run<'_>,
-    client: &mut Client,
-) -> Result<(), Error> {
-    if session.step("weight").is_none() {
-        motion::tare_after(args.how.pause_s, run, client)?;
+fn creep(seconds: f64, args: &Args, procedure: &mut Procedure<'_>) -> Result<(), Error> {
+    if !procedure.session.steps.contains_key(WEIGHT) {
+        procedure.tare_after(args.how.pause_s)?;
     }
-    match solve::creep(&hold::weight(seconds, session, run, client)?) {
+    match solve::creep(&procedure.weight(seconds)?) {
         Ok(creep) => {
+            let found = &mut procedure.found;
             found.row("creep_permille", 1e3 * creep.share.value.max(0.0), Some(1e3 * creep.share.sigma));
             found.row("creep_time_ms", 1e3 * creep.time_s.value, Some(1e3 * creep.time_s.sigma));
             found.notes.push(format!("creep leaves {:.2} % of a held reading", 100.0 * creep.left));
         }
         Err(why) => {
-            session.forget("weight")?;
-            found.block(format!("the creep was not measured: {why}"));
+            procedure.session.forget(WEIGHT)?;
+            procedure.found.block(format!("the creep was not measured: {why}"));
         }
     }
     Ok(())
 }
 
-fn temperature(
-    args: &Args,
-    found: &mut Found,
-    session: &mut Session,
-    run: &Run<'_>,
-    client: &mut Client,
-) -> Result<(), Error> {
-    let cold = motion::read(&motion::name(args.presses), session)?;
-    if session.record(WARM).is_none() {
+fn temperature(args: &Args, procedure: &mut Procedure<'_>) -> Result<(), Error> {
+    let cold = procedure.pressed(&press_name(args.presses))?;
+    if !procedure.session.records.contains_key(WARM) {
         let chip_c = cold.steps.iter().find_map(|step| step.chip_c);
         let chip_c = chip_c.ok_or("the controller does not measure its temperature: leave --warm out")?;
-        motion::warm(chip_c + 5.0, Duration::from_secs_f64(args.warm_within_s), run, client)?;
+        procedure.warm(chip_c + 5.0, Duration::from_secs_f64(args.warm_within_s))?;
     }
     let question = "the controller is warm: leave finger and plate where they were in the last press";
-    motion::one(WARM, question, &args.how, session, run, client)?;
-    match solve::temperature(&cold, &motion::read(WARM, session)?) {
-        Ok(found_) => {
-            found.row("array_gain_ppm_per_k", 1e6 * found_.per_k.value, Some(1e6 * found_.per_k.sigma));
-            found.row("array_gain_at_c", found_.chip_c[0], None);
+    procedure.press(WARM, question, &args.how)?;
+    match solve::temperature(&cold, &procedure.pressed(WARM)?) {
+        Ok(found) => {
+            procedure.found.row("array_gain_ppm_per_k", 1e6 * found.per_k.value, Some(1e6 * found.per_k.sigma));
+            procedure.found.row("array_gain_at_c", found.chip_c[0], None);
         }
         Err(why) => {
-            session.forget(WARM)?;
-            found.block(format!("the temperature coefficient was not measured: {why}"));
+            procedure.session.forget(WARM)?;
+            procedure.found.block(format!("the temperature coefficient was not measured: {why}"));
         }
     }
     Ok(())

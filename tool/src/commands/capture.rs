@@ -1,8 +1,7 @@
 //! `fingertip capture`.
 
-use super::guided::motion;
 use super::moving::Moving;
-use super::{Interrupt, TOUCHED, aside, no_fault, press, say, say_json, stopped, wait_for};
+use super::{Interrupt, TOUCHED, aside, no_fault_nor_motion, press, say, say_json, stopped, wait_for};
 use crate::captured::{self, About, ENDED};
 use crate::messages::device;
 use crate::state::unix_ns;
@@ -71,16 +70,12 @@ impl Args {
 }
 
 /// Arms a capture, tares and, where asked to, presses; reads what the board kept, and writes it as a file.
-///
-/// # Errors
-/// The controller is in fault, torque is on, the capture does not start, or the file cannot be written.
 pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
-    no_fault(client)?;
-    motion::alone(client)?;
+    no_fault_nor_motion(client)?;
     if client.number(address::TORQUE_ENABLE)? != 0 {
         return Err("torque is on: a capture begins with a tare, for which the tip must be free".into());
     }
-    if client.number(address::CAPTURE_STATE)? == CaptureState::Recording as i64 {
+    if client.number(address::CAPTURE_STATE)? == RECORDING {
         client.set(address::CAPTURE, 0)?;
     }
     if args.press.is_some() {

@@ -1,7 +1,6 @@
 //! `fingertip commission`.
 
-use super::guided::result::{self, Found};
-use super::guided::{Options, Run, Session, motion, yes_or_no};
+use super::guided::{Options, Procedure, yes_or_no};
 use super::params;
 use crate::{Client, Error, table};
 use fingertip::measure::Task;
@@ -38,42 +37,36 @@ fn ohm(text: &str) -> Result<f64, String> {
 }
 
 /// Proves the motor's direction, then measures the drive by strokes in the air.
-///
-/// # Errors
-/// A motion ended early, the strokes give no drive, or the controller refused; the drive's parameters are as before then.
 pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     if json && args.forward.is_none() {
         return Err(Error::NotUnderstood("--json asks no questions: give --forward yes or --forward no".into()));
     }
-    let run = Run::begin(&args.options, json)?;
-    let mut session = Session::open(args.options.session(), "commission", client)?;
-    result::same_settings(&session, client)?;
+    let mut procedure = Procedure::begin("commission", &args.options, json, client)?;
     // A controller that restarted does not know it any more.
-    if session.step(JOG).is_none() || super::press::direction_confirmed(client).is_err() {
-        direction(args, &mut session, &run, client)?;
+    if !procedure.session.steps.contains_key(JOG) || super::press::direction_confirmed(procedure.client).is_err() {
+        direction(args, &mut procedure)?;
     }
-    if session.record(STROKES).is_none() {
-        motion::tare(&run, client)?;
-        run.report("strokes: 1 mm to both sides, some 10 s");
-        let bytes = motion::motion(Task::Strokes, &run, client)?;
-        solve::record::strokes(&bytes, &session.before.params).map_err(|why| why.to_string())?;
-        session.recorded(STROKES, bytes)?;
+    if !procedure.session.records.contains_key(STROKES) {
+        procedure.tare()?;
+        procedure.run.report("strokes: 1 mm to both sides, some 10 s");
+        let bytes = procedure.motion(Task::Strokes)?;
+        solve::record::strokes(&bytes, &procedure.session.before.params).map_err(|why| why.to_string())?;
+        procedure.session.recorded(STROKES, bytes)?;
     }
-    let found = solved(args, &mut session)?;
-    result::finish(&found, &mut session, &run, client)
+    solve_strokes(args, &mut procedure)?;
+    procedure.finish()
 }
 
 /// The jog shows which way the motor goes; a person says whether that is towards the object.
-fn direction(args: &Args, session: &mut Session, run: &Run<'_>, client: &mut Client) -> Result<(), Error> {
-    motion::tare(run, client)?;
-    run.report("jog: watch the tip. It moves by 0.8 mm and back, with 8 % of duty at most");
-    motion::motion(Task::Jog, run, client)?;
+fn direction(args: &Args, procedure: &mut Procedure<'_>) -> Result<(), Error> {
+    procedure.tare()?;
+    procedure.run.report("jog: watch the tip. It moves by 0.8 mm and back, with 8 % of duty at most");
+    procedure.motion(Task::Jog)?;
     let forward = match args.forward {
         Some(forward) => forward,
-        None => run.ask.yes("did the tip first move towards the object?", "--forward yes or --forward no")?,
+        None => procedure.run.yes("did the tip first move towards the object?", "--forward yes or --forward no")?,
     };
-    let confirmed = i64::from(forward);
-    params::set(&[(table::find(DIRECTION)?, confirmed)], client)?;
+    params::set(&[(table::find(DIRECTION)?, forward.into())], procedure.client)?;
     if !forward {
         return Err(
             "the tip first moved away from the object: swap the motor's leads and the encoder's channels, both, \
@@ -81,13 +74,13 @@ fn direction(args: &Args, session: &mut Session, run: &Run<'_>, client: &mut Cli
                 .into(),
         );
     }
-    session.done(JOG, json!({ "forward": true }))
+    procedure.session.done(JOG, json!({ "forward": true }))
 }
 
-fn solved(args: &Args, session: &mut Session) -> Result<Found, Error> {
-    let bytes = session.record(STROKES).unwrap_or_default();
+fn solve_strokes(args: &Args, procedure: &mut Procedure<'_>) -> Result<(), Error> {
+    let (session, found) = (&mut procedure.session, &mut procedure.found);
+    let bytes = session.records.get(STROKES).map(Vec::as_slice).unwrap_or_default();
     let mut record = solve::record::strokes(bytes, &session.before.params).map_err(|why| why.to_string())?;
-    let mut found = Found::default();
     found.row(DIRECTION, 1.0, None);
     if let Some(ohm) = args.resistance_ohm {
         record.resistance = Value { value: ohm, sigma: OHMMETER * ohm };
@@ -103,12 +96,12 @@ fn solved(args: &Args, session: &mut Session) -> Result<Found, Error> {
     let mut row = |name, unit: f64, value: Value| found.row(name, unit * value.value, Some(unit * value.sigma));
     row("torque_constant_unm_per_a", 1e6, drive.torque_constant);
     row("inertia_ug_m2", 1e9, drive.inertia_kg_m2);
-    let [forward, back] = drive.friction.map(|friction| friction.torque_nm);
+    let [forward, back] = drive.friction_nm;
     let mean = Value { value: (forward.value + back.value) / 2.0, sigma: forward.sigma.max(back.sigma) };
     row("friction_unm", 1e6, mean);
     let (tau, force) = (drive.time_constant_s, drive.force_n);
     found.more.insert("time_constant_s".into(), json!({ "value": tau.value, "sigma": tau.sigma }));
     found.more.insert("friction_each_unm".into(), json!({ "forward": 1e6 * forward.value, "back": 1e6 * back.value }));
     found.notes.push(format!("time constant {tau} s; force that depends on the place {force} N"));
-    Ok(found)
+    Ok(())
 }

@@ -2,14 +2,14 @@
 
 pub(super) mod hold;
 pub(super) mod motion;
-pub(super) mod result;
+mod result;
 
-use super::Interrupt;
-use crate::commands::aside;
-use crate::commands::params::file;
-use crate::{Client, Error, numbers, table, whole};
+use super::params::{self, file};
+use super::{Interrupt, aside};
+use crate::{Client, Error, numbers, whole};
 use fingertip::params::Params;
 use fingertip::shipped::address;
+use result::Found;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
@@ -44,13 +44,6 @@ pub struct Presses {
     pub(super) no_wait: bool,
 }
 
-impl Options {
-    /// Folder of the session.
-    pub(super) fn session(&self) -> Option<&Path> {
-        self.session.as_deref()
-    }
-}
-
 impl Presses {
     /// Refuses questions that `--json` cannot ask.
     pub(super) fn check(&self, json: bool) -> Result<(), Error> {
@@ -62,55 +55,51 @@ impl Presses {
     }
 }
 
-/// Context of a procedure.
+/// A procedure under way: what it may do, the controller, what is kept of it and what it found.
+pub(super) struct Procedure<'a> {
+    pub run: Run<'a>,
+    pub client: &'a mut Client,
+    pub session: Session,
+    pub found: Found,
+}
+
+impl<'a> Procedure<'a> {
+    /// Catches signals from here on, and begins or resumes the session.
+    pub(super) fn begin(
+        command: &'static str,
+        options: &'a Options,
+        json: bool,
+        client: &'a mut Client,
+    ) -> Result<Self, Error> {
+        let run = Run { options, interrupt: Interrupt::catch()?, json };
+        let session = Session::open(options.session.as_deref(), command, client)?;
+        result::same_settings(&session, client)?;
+        Ok(Self { run, client, session, found: Found::default() })
+    }
+}
+
+/// How a procedure runs: its options, and the way to the person at the terminal.
 pub(super) struct Run<'a> {
     options: &'a Options,
     interrupt: Interrupt,
-    pub(super) ask: Ask,
     json: bool,
 }
-
-impl<'a> Run<'a> {
-    /// Catches signals from here on.
-    pub(super) fn begin(options: &'a Options, json: bool) -> Result<Self, Error> {
-        let interrupt = Interrupt::catch()?;
-        let ask = Ask::new(interrupt.clone(), json);
-        Ok(Self { options, interrupt, ask, json })
-    }
-
-    /// Reports progress to people.
-    pub(super) fn report(&self, text: impl std::fmt::Display) {
-        if !self.json {
-            super::aside(text);
-        }
-    }
-}
-
-// Questions to the person at the terminal.
 
 /// Time without a look at the signals, ns.
 const POLL_NS: i64 = 50_000_000;
 /// Wrong answers to one question after which the procedure ends.
 const TRIES: u32 = 3;
 
-/// Asks, unless answers are for scripts.
-pub struct Ask {
-    interrupt: Interrupt,
-    json: bool,
-}
-
-impl Ask {
-    /// Questions that a signal ends.
-    pub fn new(interrupt: Interrupt, json: bool) -> Self {
-        Self { interrupt, json }
+impl Run<'_> {
+    pub fn report(&self, text: impl std::fmt::Display) {
+        if !self.json {
+            aside(text);
+        }
     }
 
-    /// Asks until the answer can be parsed. `idle` runs every 50 ms meanwhile. `option` gives the answer without a question.
-    ///
-    /// # Errors
-    /// With `--json` no question is possible; the text names the option instead. Without it: the input ended, a signal
-    /// came, or three answers were wrong.
-    pub fn parsed<T>(
+    /// Asks until the answer can be parsed, three times at most. `idle` runs every 50 ms meanwhile. `option` gives the answer
+    /// without a question, which `--json` demands.
+    fn parsed<T>(
         &self,
         question: &str,
         option: &str,
@@ -133,18 +122,10 @@ impl Ask {
         Err(format!("{why}. {TRIES} answers to \"{question}\" were not understood; {option} gives the answer").into())
     }
 
-    /// Yes or no.
-    ///
-    /// # Errors
-    /// As [`Self::parsed`].
     pub fn yes(&self, question: &str, option: &str) -> Result<bool, Error> {
         self.parsed(&format!("{question} [yes/no]"), option, yes_or_no, &mut || Ok(()))
     }
 
-    /// Waits for Enter.
-    ///
-    /// # Errors
-    /// As [`Self::parsed`].
     pub fn enter(&self, question: &str, option: &str) -> Result<(), Error> {
         self.parsed(&format!("{question}; then press Enter"), option, |_| Ok(()), &mut || Ok(()))
     }
@@ -182,7 +163,6 @@ fn unbuffered_line() -> io::Result<Option<String>> {
     Ok(Some(String::from_utf8_lossy(&line).into_owned()))
 }
 
-/// Parses yes or no.
 pub fn yes_or_no(text: &str) -> Result<bool, String> {
     match text.to_lowercase().as_str() {
         "y" | "yes" => Ok(true),
@@ -201,43 +181,29 @@ pub fn yes_or_no(text: &str) -> Result<bool, String> {
 // A file is written beside its place and renamed once it is whole. A record is listed in `session.json` after it was
 // written: a kill between the two repeats the motion.
 
-/// Version of `session.json`.
 const VERSION: u64 = 1;
 
 /// Parameters and gains of the controller at one time.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Settings {
-    /// The parameters.
+pub(super) struct Settings {
     pub params: Params,
     /// Gains in 1/16384, row by row.
     pub gains: Vec<Vec<u16>>,
 }
 
 impl Settings {
-    /// Reads them.
-    ///
-    /// # Errors
-    /// See [`Error`].
-    pub fn read(client: &mut Client) -> Result<Self, Error> {
+    fn read(client: &mut Client) -> Result<Self, Error> {
         let bytes = client.again(|client| client.read(address::PARAMS, 4 * Params::COUNT as u16))?;
-        let block = table::Block { first: address::PARAMS, bytes };
-        let mut values = [0; Params::COUNT];
-        for (index, value) in values.iter_mut().enumerate() {
-            *value = block.number(address::PARAMS + 4 * index as u16) as i32;
-        }
-        Ok(Self { params: Params::from_array(&values), gains: file::read_gains(client)? })
+        Ok(Self { params: params::of_bytes(&bytes), gains: file::read_gains(client)? })
     }
 
-    /// Value of a parameter by its name.
-    pub fn get(&self, name: &str) -> Option<i32> {
+    fn get(&self, name: &str) -> Option<i32> {
         let index = Params::RANGES.iter().position(|(known, ..)| *known == name)?;
         self.params.to_array().get(index).copied()
     }
 
     fn json(&self) -> Value {
-        let names = Params::RANGES.iter().map(|(name, ..)| (*name).to_owned());
-        let params: Map<_, _> = names.zip(self.params.to_array().map(Value::from)).collect();
-        json!({ "params": params, "gains": self.gains })
+        json!({ "params": params::named(&self.params), "gains": self.gains })
     }
 
     fn of(value: &Value) -> Option<Self> {
@@ -253,24 +219,21 @@ impl Settings {
     }
 }
 
-/// A session.
+/// What is kept of a procedure.
 #[derive(Debug)]
-pub struct Session {
+pub(super) struct Session {
     folder: Option<PathBuf>,
     command: &'static str,
     id: u8,
     /// Settings with which all records were made.
     pub before: Settings,
-    steps: Map<String, Value>,
-    records: BTreeMap<String, Vec<u8>>,
+    pub steps: Map<String, Value>,
+    pub records: BTreeMap<String, Vec<u8>>,
 }
 
 impl Session {
-    /// Begins a session, or resumes the one in the folder.
-    ///
-    /// # Errors
-    /// The folder cannot be read or written, or has a session of another command or device.
-    pub fn open(folder: Option<&Path>, command: &'static str, client: &mut Client) -> Result<Self, Error> {
+    /// Begins a session, or resumes the one in the folder, which must be of the same command and device.
+    fn open(folder: Option<&Path>, command: &'static str, client: &mut Client) -> Result<Self, Error> {
         let mut session = Self {
             folder: folder.map(Path::to_owned),
             command,
@@ -284,7 +247,7 @@ impl Session {
         let file = folder.join("session.json");
         let text = match fs::read_to_string(&file) {
             Ok(text) => text,
-            Err(why) if why.kind() == std::io::ErrorKind::NotFound => {
+            Err(why) if why.kind() == io::ErrorKind::NotFound => {
                 session.keep()?;
                 return Ok(session);
             }
@@ -309,34 +272,16 @@ impl Session {
         Ok(session)
     }
 
-    /// The folder, for the result.
-    pub fn folder(&self) -> Option<String> {
-        self.folder.as_ref().map(|folder| folder.display().to_string())
+    /// Numbers of a step that is done; none of one that is not.
+    fn numbers(&self, step: &str) -> &[Value] {
+        self.steps.get(step).and_then(Value::as_array).map(Vec::as_slice).unwrap_or_default()
     }
 
-    /// A step that is done.
-    pub fn step(&self, name: &str) -> Option<&Value> {
-        self.steps.get(name)
-    }
-
-    /// A record that was read.
-    pub fn record(&self, name: &str) -> Option<&[u8]> {
-        self.records.get(name).map(Vec::as_slice)
-    }
-
-    /// Keeps a step.
-    ///
-    /// # Errors
-    /// The folder cannot be written.
     pub fn done(&mut self, name: &str, value: Value) -> Result<(), Error> {
         self.steps.insert(name.into(), value);
         self.keep()
     }
 
-    /// Keeps a record.
-    ///
-    /// # Errors
-    /// The folder cannot be written.
     pub fn recorded(&mut self, name: &str, bytes: Vec<u8>) -> Result<(), Error> {
         if let Some(folder) = &self.folder {
             whole::write(&folder.join(name), true, &bytes)?;
@@ -347,9 +292,6 @@ impl Session {
     }
 
     /// Forgets steps that begin with this, so that the next run repeats them.
-    ///
-    /// # Errors
-    /// The folder cannot be written.
     pub fn forget(&mut self, begin: &str) -> Result<(), Error> {
         self.steps.retain(|name, _| !name.starts_with(begin));
         self.records.retain(|name, _| !name.starts_with(begin));

@@ -1,8 +1,7 @@
 //! `fingertip identify`.
 
-use super::guided::result::{self, Found};
-use super::guided::{Options, Presses, Run, Session, motion};
-use crate::commands::press::direction_confirmed;
+use super::guided::{Options, Presses, Procedure};
+use super::press::direction_confirmed;
 use crate::{Client, Error};
 use serde_json::json;
 
@@ -23,20 +22,14 @@ pub struct Args {
 }
 
 /// Measures Young's modulus of the tip by presses onto a hard plate.
-///
-/// # Errors
-/// A motion ended early, no press counts, or the controller refused; nothing was changed then.
 pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     args.how.check(json)?;
     direction_confirmed(client)?;
-    let run = Run::begin(&args.options, json)?;
-    let mut session = Session::open(args.options.session(), "identify", client)?;
-    result::same_settings(&session, client)?;
-    motion::all(args.presses, &args.how, &mut session, &run, client)?;
-    let modulus = motion::solved(args.presses, &mut session, &run)?;
-    let mut found = Found::default();
-    motion::report(&modulus, &mut found);
+    let mut procedure = Procedure::begin("identify", &args.options, json, client)?;
+    procedure.press_all(args.presses, &args.how)?;
+    let modulus = procedure.modulus(args.presses)?;
+    let found = &mut procedure.found;
     found.row("modulus_pa", 1e3 * modulus.kpa, Some(1e3 * modulus.sigma_kpa));
     found.more.insert("remaining".into(), json!({ "modulus_percent": 100.0 * modulus.sigma_kpa / modulus.kpa }));
-    result::finish(&found, &mut session, &run, client)
+    procedure.finish()
 }

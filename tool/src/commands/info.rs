@@ -3,20 +3,8 @@
 use super::{say, say_json};
 use crate::state::{SHAPE, State};
 use crate::{Client, Error, table};
-use fingertip::shipped::{REGISTERS, address};
+use fingertip::shipped::address;
 use serde_json::{Map, json};
-
-/// The counters of errors, side by side.
-const COUNTERS: [u16; 8] = [
-    address::RESULT_ERRORS,
-    address::INSTRUCTION_ERRORS,
-    address::CRC_ERRORS,
-    address::RANGE_ERRORS,
-    address::LENGTH_ERRORS,
-    address::LIMIT_ERRORS,
-    address::ACCESS_ERRORS,
-    address::FRAMING_ERRORS,
-];
 
 /// Shows identity and status of the controller.
 pub fn run(client: &mut Client, json: bool) -> Result<(), Error> {
@@ -43,9 +31,17 @@ pub fn run(client: &mut Client, json: bool) -> Result<(), Error> {
         address::CRASH_CAUSE,
         address::CRASH_COUNT,
         address::GOOD_PACKETS,
+        address::RESULT_ERRORS,
+        address::INSTRUCTION_ERRORS,
+        address::CRC_ERRORS,
+        address::RANGE_ERRORS,
+        address::LENGTH_ERRORS,
+        address::LIMIT_ERRORS,
+        address::ACCESS_ERRORS,
+        address::FRAMING_ERRORS,
     ];
-    for place in wanted.into_iter().chain(COUNTERS) {
-        let scale = REGISTERS.iter().find(|register| register.address == place).map_or(1, |register| register.scale);
+    for place in wanted {
+        let scale = table::register_at(place).map_or(1, |register| register.scale);
         let name = match place {
             address::RETURN_DELAY_TIME => "return_delay_us".to_owned(),
             address::BUS_WATCHDOG => "bus_watchdog_ms".to_owned(),
@@ -58,8 +54,8 @@ pub fn run(client: &mut Client, json: bool) -> Result<(), Error> {
     let known = shape == SHAPE.map(|side| side as i64);
     if json {
         let mut all = Map::new();
-        all.insert("port".into(), json!(client.port()));
-        all.insert("baud".into(), json!(client.baud()));
+        all.insert("port".into(), json!(client.port));
+        all.insert("baud".into(), json!(client.baud));
         all.insert("id".into(), json!(pong.id));
         all.insert("model_number".into(), json!(pong.model));
         all.insert("firmware_version".into(), json!(pong.firmware));
@@ -72,7 +68,7 @@ pub fn run(client: &mut Client, json: bool) -> Result<(), Error> {
         return Ok(());
     }
     let (major, minor) = (pong.firmware / 10, pong.firmware % 10);
-    say(format_args!("fingertip {major}.{minor} at ID {} on {}, {} baud", pong.id, client.port(), client.baud()));
+    say(format_args!("fingertip {major}.{minor} at ID {} on {}, {} baud", pong.id, client.port, client.baud));
     let strange = if known { "" } else { " (this program knows another shape: maps and pressures are not shown)" };
     say(format_args!("array     {} x {}{strange}, control table version {version}", shape[0], shape[1]));
     say(format_args!("mode      {} ({})", state.mode_name(), state.mode));
@@ -80,8 +76,7 @@ pub fn run(client: &mut Client, json: bool) -> Result<(), Error> {
         None => say("fault     none"),
         Some(name) => say(format_args!("fault     {} ({name}): `fingertip recover` once it is mended", state.fault)),
     }
-    let limits = state.limit_names();
-    say(format_args!("limits    {}", if limits.is_empty() { "none".into() } else { limits.join(", ") }));
+    say(format_args!("limits    {}", state.limits_text()));
     say(format_args!("force     {} mN, goal {} mN", state.force_mn, state.goal_mn));
     let hz = if state.period_ns > 0 { 1e9 / state.period_ns as f64 } else { 0.0 };
     say(format_args!("frames    {hz:.0} a second, frame {}", state.frame));

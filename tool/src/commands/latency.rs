@@ -28,7 +28,7 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
         let asked = Instant::now();
         match client.read(FIRST, LENGTH) {
             Ok(_) => took.push(asked.elapsed()),
-            Err(Error::Silent { .. } | Error::Damaged { .. }) => unanswered += 1,
+            Err(Error::Silent(_) | Error::Damaged(_)) => unanswered += 1,
             Err(why) => return Err(why),
         }
     }

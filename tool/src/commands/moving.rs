@@ -28,7 +28,6 @@ const CLEAR_MN: i64 = 10;
 /// a killed program or a lost cable ends in fault 7. Every other end releases the object and turns torque off.
 #[derive(Debug)]
 pub struct Moving<'a> {
-    /// The controller.
     pub client: &'a mut Client,
     /// Watchdog to put back at the end; none once the finger was stopped.
     watchdog: Option<i64>,
@@ -36,9 +35,6 @@ pub struct Moving<'a> {
 
 impl<'a> Moving<'a> {
     /// Sets the bus watchdog. `_interrupt` proves that a signal no longer ends the program on the spot.
-    ///
-    /// # Errors
-    /// The controller does not answer, or its watchdog has tripped.
     pub fn begin(client: &'a mut Client, _interrupt: &Interrupt) -> Result<Self, Error> {
         let watchdog = client.number(address::BUS_WATCHDOG)?.max(0);
         client.set(address::BUS_WATCHDOG, WATCHDOG)?;
@@ -46,9 +42,6 @@ impl<'a> Moving<'a> {
     }
 
     /// Stops the finger, whatever the command came to, and puts the watchdog back.
-    ///
-    /// # Errors
-    /// Errors of the command, and of the stop.
     pub fn finish<T>(mut self, done: Result<T, Error>) -> Result<T, Error> {
         let Err(second) = self.stop() else { return done };
         let why = done.err().map_or(String::new(), |why| format!("{why}; "));
@@ -62,7 +55,7 @@ impl<'a> Moving<'a> {
     fn stop(&mut self) -> Result<(), Error> {
         let Some(watchdog) = self.watchdog.take() else { return Ok(()) };
         let released = release(RELEASE_S, self.client).map(drop);
-        if matches!(released, Err(Error::Silent { .. })) {
+        if matches!(released, Err(Error::Silent(_))) {
             // A line that stalled would deliver torque off together with the goal 0, and friction would keep most of the
             // force. The bus watchdog releases the object, then turns torque off.
             return released;

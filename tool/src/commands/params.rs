@@ -74,21 +74,16 @@ pub enum Command {
 /// A stored register and its value.
 pub type Value = (&'static Register, i64);
 
-/// Does it.
-///
-/// # Errors
-/// See [`Error`]; nothing is half done without a word.
+/// Does it; nothing is half done without a word.
 pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Error> {
     match command {
         Command::Get { names } => get(names, client, json),
         Command::Set { values, save } => change(values, *save, client, json),
-        Command::Save => {
-            save(client, json)?;
+        Command::Save => save(client, json).map(|()| {
             if json {
                 say_json(&json!({ "saved": true }));
             }
-            Ok(())
-        }
+        }),
         Command::Backup { file, force } => {
             let kept = file::Kept { values: read_all(client)?, gains: Some(file::read_gains(client)?) };
             file::write(file, *force, client, &kept)?;
@@ -100,18 +95,22 @@ pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Err
             let file::Kept { mut values, gains } = file::read(file)?;
             // Who moves a device to another address or speed means it, and says so by `set`.
             values.retain(|(register, _)| !is_bus(register));
-            restore(&values, gains.as_deref(), *save, client, json)
+            torque_is_off(client)?;
+            with_gains(gains.as_deref(), client, |client, new| {
+                if new && !json {
+                    say("the taxels' gains are others now: tare");
+                }
+                change(&values, *save, client, json)
+            })
         }
         Command::Diff { file } => diff(file.as_deref(), client, json),
     }
 }
 
 fn get(wanted: &[&'static Register], client: &mut Client, json: bool) -> Result<(), Error> {
-    let values = if wanted.is_empty() {
-        read_all(client)?
-    } else {
-        wanted.iter().map(|register| Ok((*register, client.number(register.address)?))).collect::<Result<_, Error>>()?
-    };
+    let one = |register: &&'static Register| Ok((*register, client.number(register.address)?));
+    let values: Vec<Value> =
+        if wanted.is_empty() { read_all(client)? } else { wanted.iter().map(one).collect::<Result<_, Error>>()? };
     if json {
         say_json(&as_json(&values));
         return Ok(());
@@ -137,22 +136,14 @@ fn read_all(client: &mut Client) -> Result<Vec<Value>, Error> {
     table::stored().map(read).collect()
 }
 
-/// Like [`change`], with the taxels' gains.
-fn restore(
-    values: &[Value],
+/// Sets the taxels' gains, then does `set`, which gets whether they are new; puts them back if that fails.
+pub(super) fn with_gains(
     gains: Option<&[Vec<u16>]>,
-    save: bool,
     client: &mut Client,
-    json: bool,
+    set: impl FnOnce(&mut Client, bool) -> Result<(), Error>,
 ) -> Result<(), Error> {
-    if client.number(address::TORQUE_ENABLE)? != 0 {
-        return Err("torque is on: parameters are set with torque off. Nothing was changed".into());
-    }
     let before = gains.map_or(Ok(None), |gains| file::set_gains(gains, client))?;
-    if before.is_some() && !json {
-        say("the taxels' gains are others now: tare");
-    }
-    change(values, save, client, json).map_err(|why| match before.map(|before| file::set_gains(&before, client)) {
+    set(client, before.is_some()).map_err(|why| match before.map(|before| file::set_gains(&before, client)) {
         None => why,
         Some(Ok(_)) => Error::Other(format!("{why}; the taxels' gains are put back")),
         Some(Err(second)) => Error::Other(format!("{why}; and the taxels' gains could not be put back: {second}")),
@@ -168,9 +159,9 @@ fn change(values: &[Value], save_too: bool, client: &mut Client, json: bool) -> 
     let what = if lines.is_empty() { "nothing differs: nothing was changed".into() } else { lines.join("\n") };
     told(json, &now, &what);
     if save_too {
-        save(client, json)?;
+        return save(client, json);
     }
-    if !save_too && !json && !changed.is_empty() {
+    if !json && !changed.is_empty() {
         say("set until the next reset; `fingertip params save` keeps it");
     }
     Ok(())
@@ -180,7 +171,7 @@ pub(super) fn save(client: &mut Client, json: bool) -> Result<(), Error> {
     let meant = read_all(client)?;
     client.set(address::SAVE_PARAMETERS, 1)?;
     // The core halts while the flash is written, and may stay silent for that long.
-    let timeout = client.set_timeout(SAVE_WITHIN);
+    let timeout = std::mem::replace(&mut client.timeout, SAVE_WITHIN);
     let begun = Instant::now();
     let saved = loop {
         match client.number(address::SAVED_STATE) {
@@ -188,16 +179,17 @@ pub(super) fn save(client: &mut Client, json: bool) -> Result<(), Error> {
             other => break other,
         }
     };
-    client.set_timeout(timeout);
+    client.timeout = timeout;
     let saved = saved?;
     // A controller that restarted has the values of the flash, and reports no difference.
     if saved == SAME && read_all(client)? != meant {
         return Err(format!("not saved: {RESTARTED}, and has what the flash holds. Set them again").into());
     }
     match saved {
-        SAME if json => Ok(()),
         SAME => {
-            say("saved: a reset keeps them");
+            if !json {
+                say("saved: a reset keeps them");
+            }
             Ok(())
         }
         CHANGED => Err("not saved within 5 s: the flash still holds what it did".into()),
@@ -285,11 +277,8 @@ fn told(json: bool, values: &[Value], text: &str) {
 /// A register, its old value, and its new one.
 pub(in crate::commands) type Changed = (&'static Register, i64, i64);
 
-/// Sets parameters; returns those that changed.
-///
-/// # Errors
-/// Something is wrong with a value, or torque is on: nothing was changed. Or the controller refused: the text says
-/// what was changed nevertheless.
+/// Sets parameters; returns those that changed. Where a value is wrong or torque is on, nothing was changed; where the
+/// controller refused, the error says what was changed nevertheless.
 pub(in crate::commands) fn set(values: &[Value], client: &mut Client) -> Result<Vec<Changed>, Error> {
     let wrong: Vec<String> = values.iter().filter_map(wrong).chain(twice(values)).collect();
     if !wrong.is_empty() {
@@ -304,10 +293,11 @@ pub(in crate::commands) fn set(values: &[Value], client: &mut Client) -> Result<
         let at = usize::from(register.address - address::PARAMS);
         after[at..at + 4].copy_from_slice(&table::encode(register, *value));
     }
-    check_together(&after)?;
-    if client.number(address::TORQUE_ENABLE)? != 0 {
-        return Err("torque is on: parameters are set with torque off. Nothing was changed".into());
-    }
+    // Parameters that contradict each other are refused by the core's own check.
+    let config = Config::shipped(&of_bytes(&after));
+    let config = config.map_err(|why| format!("these do not go together: {why}; nothing was changed"))?;
+    config.warnings().for_each(|warning| eprintln!("warning: {warning}"));
+    torque_is_off(client)?;
     for (_, id) in others.iter().filter(|(register, _)| register.address == address::ID) {
         if *id != i64::from(client.id) && client.is_taken(*id as u8)? {
             let why = "two with one ID cannot be told apart, nor set apart again";
@@ -343,13 +333,20 @@ pub(in crate::commands) fn set(values: &[Value], client: &mut Client) -> Result<
     Ok(changed)
 }
 
+fn torque_is_off(client: &mut Client) -> Result<(), Error> {
+    if client.number(address::TORQUE_ENABLE)? == 0 {
+        return Ok(());
+    }
+    Err("torque is on: parameters are set with torque off. Nothing was changed".into())
+}
+
 /// Error after a lost answer.
 fn unsure(why: &Error) -> Error {
     Error::Other(format!("{why}. Whether they are set is not known: `fingertip params get` shows it"))
 }
 
 fn set_one(register: &'static Register, value: i64, client: &mut Client) -> Result<(), Error> {
-    client.set_register(register, value)?;
+    client.set(register.address, value)?;
     match register.address {
         address::ID => client.id = value as u8,
         address::BAUD_RATE => {
@@ -370,17 +367,19 @@ fn wrong((register, value): &Value) -> Option<String> {
     (!(min..=max).contains(value)).then(|| format!("{} of {value}: {min} to {max} are allowed", name(register)))
 }
 
-/// Refuses parameters that contradict each other, by the core's own check.
-fn check_together(bytes: &[u8]) -> Result<(), Error> {
+/// The parameters of their registers' bytes.
+pub(super) fn of_bytes(bytes: &[u8]) -> Params {
     let mut values = [0; Params::COUNT];
     for (value, bytes) in values.iter_mut().zip(bytes.as_chunks::<4>().0) {
         *value = i32::from_le_bytes(*bytes);
     }
-    let checked = Config::shipped(&Params::from_array(&values));
-    let config =
-        checked.map_err(|why| Error::Other(format!("these do not go together: {why}; nothing was changed")))?;
-    config.warnings().for_each(|warning| eprintln!("warning: {warning}"));
-    Ok(())
+    Params::from_array(&values)
+}
+
+/// Parameters by their names.
+pub fn named(params: &Params) -> Map<String, serde_json::Value> {
+    let names = Params::RANGES.iter().map(|(name, ..)| (*name).to_owned());
+    names.zip(params.to_array().map(serde_json::Value::from)).collect()
 }
 
 /// Undoes what was set; the error has the result.

@@ -61,9 +61,6 @@ struct Held {
 }
 
 /// Touches, holds, releases, turns torque off. Whatever ends it, it releases before.
-///
-/// # Errors
-/// The controller is in fault, the tip is not tared, or the force is not reached or not held.
 pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     no_fault(client)?;
     if Limits(client.number(address::LIMITS)? as u16).has(Limits::NOT_TARED) {
@@ -94,8 +91,7 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     if !reached {
         let (mode, force_mn, travel_mm) =
             (held.last.mode_name(), held.last.force_mn, held.last.travel_um as f64 * 1e-3);
-        let limits = held.last.limit_names();
-        let limits = if limits.is_empty() { "none".into() } else { limits.join(", ") };
+        let limits = held.last.limits_text();
         return Err(format!(
             "{goal_mn} mN are not reached within {} s: mode {mode}, {force_mn} mN, travel {travel_mm:.2} mm, \
              limits: {limits}. Is there something to press on?",

@@ -1,14 +1,15 @@
 //! `fingertip record`.
 
 use super::{Interrupt, aside, say_json};
+use crate::captured::{in_words, write_options};
 use crate::messages::{Topic, device};
 use crate::state::{RESTARTED, SHAPE, Stamp, Stamps, State};
 use crate::whole::Part;
 use crate::{Client, Error, numbers};
 use clap::ValueEnum;
+use mcap::Writer;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
-use mcap::{McapError, WriteOptions, Writer};
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -71,9 +72,6 @@ trait Sink {
 }
 
 /// Records until the time is over, Ctrl-C, or the line is lost; what was recorded by then is whole.
-///
-/// # Errors
-/// The file cannot be written, or the line was lost.
 pub fn run(args: &Args, format: Format, client: &mut Client, json: bool) -> Result<(), Error> {
     let interrupt = Interrupt::catch()?;
     let whole = args.file.as_os_str() != "-";
@@ -87,12 +85,13 @@ pub fn run(args: &Args, format: Format, client: &mut Client, json: bool) -> Resu
             let to = BufWriter::with_capacity(BUFFER, to);
             Box::new(Csv::new(to, args.pressures).map_err(file)?)
         }
-        Format::Mcap => Box::new(Mcap::new(to, client.id, device, args.pressures).map_err(file)?),
+        Format::Mcap => Box::new(Mcap::new(to, client.id, device, args.pressures).map_err(in_words).map_err(file)?),
     };
     let begun = Instant::now();
     let taken = take(args, client, &interrupt, &mut *sink);
     let wall_s = begun.elapsed().as_secs_f64();
-    // Who closed the pipe wanted no more.
+    // A pipe that its reader closed is no error.
+    let ended = |why: io::Error| if why.kind() == io::ErrorKind::BrokenPipe { Ok(()) } else { Err(why) };
     sink.finish().or_else(ended).map_err(file)?;
     part.map_or(Ok(()), Part::place)?;
     let (counts, lost) = taken?;
@@ -111,11 +110,6 @@ pub fn run(args: &Args, format: Format, client: &mut Client, json: bool) -> Resu
         ));
     }
     lost.map_or(Ok(()), |why| Err(Error::Other(format!("the recording ends after {:.3} s: {why}", counts.last_s))))
-}
-
-/// A pipe that its reader closed is no error.
-fn ended(why: io::Error) -> io::Result<()> {
-    if why.kind() == io::ErrorKind::BrokenPipe { Ok(()) } else { Err(why) }
 }
 
 #[derive(Default)]
@@ -179,15 +173,12 @@ fn take(
 }
 
 /// The format: the one requested, else that of the file's name.
-///
-/// # Errors
-/// The name has no known ending.
 pub fn format(args: &Args) -> Result<Format, Error> {
     let file = &args.file;
     match (args.format, file.extension().and_then(|extension| extension.to_str())) {
         (Some(format), _) => Ok(format),
-        _ if file.as_os_str() == "-" => Ok(Format::Csv),
         (None, Some("csv")) => Ok(Format::Csv),
+        _ if file.as_os_str() == "-" => Ok(Format::Csv),
         (None, Some("mcap")) => Ok(Format::Mcap),
         _ => Err(Error::NotUnderstood(format!(
             "{}: a name that ends with .csv or .mcap is asked for, or --format",
@@ -282,29 +273,15 @@ impl Write for Chunks {
     }
 }
 
-fn failed(why: McapError) -> io::Error {
-    match why {
-        McapError::Io(why) => why,
-        other => io::Error::other(other),
-    }
-}
-
 impl Mcap {
     /// Into a file, or to standard output.
-    pub fn new(file: Option<File>, id: u8, device: BTreeMap<String, String>, pressures: bool) -> io::Result<Self> {
-        Self::begin(Chunks { file, buffer: Vec::new() }, id, device, pressures).map_err(failed)
-    }
-
-    fn begin(to: Chunks, id: u8, device: BTreeMap<String, String>, pressures: bool) -> mcap::McapResult<Self> {
-        let options = WriteOptions::new().profile("").library(concat!("fingertip/", env!("CARGO_PKG_VERSION")));
-        let mut out = options.disable_seeking(true).create(NoSeek::new(to))?;
+    fn new(file: Option<File>, id: u8, device: BTreeMap<String, String>, pressures: bool) -> mcap::McapResult<Self> {
+        let to = NoSeek::new(Chunks { file, buffer: Vec::new() });
+        let mut out = write_options().disable_seeking(true).create(to)?;
         let metadata = Metadata { name: "fingertip.device".into(), metadata: device };
         out.write_metadata(&metadata)?;
         let topics = [Some(Topic::Scalars), pressures.then_some(Topic::Image)];
-        let channel = |topic: Topic| {
-            let schema = out.add_schema(topic.schema_name(), "jsonschema", &topic.schema())?;
-            Ok((topic, out.add_channel(schema, &topic.name(id), "json", &metadata.metadata)?))
-        };
+        let channel = |topic: Topic| Ok((topic, topic.add_to(&mut out, id, &metadata.metadata)?));
         let channels = topics.into_iter().flatten().map(channel).collect::<mcap::McapResult<_>>()?;
         Ok(Self { out, channels, sequence: 0 })
     }
@@ -315,18 +292,18 @@ impl Sink for Mcap {
         let (sequence, log_time, publish_time) = (self.sequence, stamp.read_ns, stamp.frame_ns);
         for (topic, channel_id) in &self.channels {
             let header = MessageHeader { channel_id: *channel_id, sequence, log_time, publish_time };
-            self.out.write_to_known_channel(&header, &topic.message(stamp, state)).map_err(failed)?;
+            self.out.write_to_known_channel(&header, &topic.message(stamp, state)).map_err(in_words)?;
         }
         self.sequence += 1;
         Ok(())
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.out.flush().map_err(failed)
+        self.out.flush().map_err(in_words)
     }
 
     fn finish(mut self: Box<Self>) -> io::Result<()> {
-        self.out.finish().map_err(failed)?;
+        self.out.finish().map_err(in_words)?;
         let mut chunks = self.out.into_inner().into_inner();
         chunks.hand_on(&[])?;
         // The library may have flushed behind the summary.

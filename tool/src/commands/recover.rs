@@ -12,9 +12,6 @@ const WITHIN: Duration = Duration::from_secs(2);
 const RESULT: u8 = 1;
 
 /// Clears what stopped the motor: one register does it.
-///
-/// # Errors
-/// Something prevents it, or the fault comes back.
 pub fn run(client: &mut Client, json: bool) -> Result<(), Error> {
     let fault = client.number(address::FAULT)?;
     let tripped = client.number(address::BUS_WATCHDOG)? < 0;

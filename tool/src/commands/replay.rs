@@ -23,12 +23,12 @@ pub fn run(args: &Args, json: bool) -> Result<(), Error> {
     }
     let (mut told, mut wrong) = (Vec::new(), 0);
     for file in &files {
-        let (verdict, good) = replay(file);
+        let (verdict, text, good) = replay(file);
         wrong += usize::from(!good);
         if json {
             told.push(verdict);
         } else {
-            say(format_args!("{}: {}", file.display(), in_words(&verdict)));
+            say(format_args!("{}: {}", file.display(), text));
         }
     }
     if json {
@@ -60,39 +60,29 @@ fn find(path: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Result of a file, and whether it is as expected.
-fn replay(file: &Path) -> (Value, bool) {
+/// Result of a file in JSON and in words, and whether it is as expected.
+fn replay(file: &Path) -> (Value, String, bool) {
     let kept = match captured::open(file) {
         Ok(kept) => kept,
-        Err(why) => return (json!({ "file": file, "refused": why }), false),
+        Err(why) => return (json!({ "file": file, "refused": why }), format!("refused: {why}"), false),
     };
     let firmware = kept.about.get("firmware").cloned().unwrap_or_default();
     match captured::through_the_core(&kept.bytes, |_, _| {}) {
-        Err(why) => (json!({ "file": file, "firmware": firmware, "refused": why.to_string() }), false),
+        Err(why) => {
+            let why = why.to_string();
+            let of = if firmware.is_empty() { String::new() } else { format!(" (firmware {firmware})") };
+            let text = format!("refused: {why}{of}");
+            (json!({ "file": file, "firmware": firmware, "refused": why }), text, false)
+        }
         Ok(replayed) => {
-            let difference = replayed.difference.map(|at| {
+            let frames = replayed.head.frames;
+            let at = replayed.difference;
+            let difference = at.map(|at| {
                 json!({ "frame": at.frame, "field": at.field.name(), "captured": at.captured, "replayed": at.replayed })
             });
-            let good = difference.is_none();
-            let frames = replayed.head.frames;
-            (json!({ "file": file, "firmware": firmware, "frames": frames, "difference": difference }), good)
+            let text = at.map_or("the same to the bit".into(), |at| at.to_string());
+            let verdict = json!({ "file": file, "firmware": firmware, "frames": frames, "difference": difference });
+            (verdict, format!("{frames} frames, {text}"), at.is_none())
         }
     }
-}
-
-fn in_words(verdict: &Value) -> String {
-    let firmware = verdict["firmware"].as_str().unwrap_or_default();
-    if let Some(why) = verdict["refused"].as_str() {
-        let of = if firmware.is_empty() { String::new() } else { format!(" (firmware {firmware})") };
-        return format!("refused: {why}{of}");
-    }
-    let (frames, at) = (&verdict["frames"], &verdict["difference"]);
-    if at.is_null() {
-        return format!("{frames} frames, the same to the bit");
-    }
-    let field = at["field"].as_str().unwrap_or_default();
-    format!(
-        "{frames} frames, differs first at frame {}: {field} captured {}, replayed {}",
-        at["frame"], at["captured"], at["replayed"]
-    )
 }

@@ -2,7 +2,7 @@
 
 use super::{aside, say, say_json};
 use crate::client::{BAUD_MIN, Pong, Reach};
-use crate::{Client, Error, line, table};
+use crate::{Client, Error, line};
 use fingertip::store::BAUD_RATES;
 use serde_json::json;
 
@@ -16,9 +16,6 @@ pub struct Args {
 }
 
 /// Lists the devices that answer.
-///
-/// # Errors
-/// No controller is found, or the named port cannot be opened.
 pub fn run(args: &Args, reach: &Reach, json: bool) -> Result<(), Error> {
     let ports = reach.port.clone().map_or_else(line::ports, |port| vec![port]);
     if ports.is_empty() {
@@ -45,13 +42,13 @@ pub fn run(args: &Args, reach: &Reach, json: bool) -> Result<(), Error> {
         let line = |(port, baud, pong): &(&String, u32, Pong)| {
             json!({
                 "port": port, "baud": baud, "id": pong.id, "model_number": pong.model,
-                "firmware_version": pong.firmware, "fingertip": is_fingertip(pong),
+                "firmware_version": pong.firmware, "fingertip": pong.is_fingertip(),
             })
         };
         say_json(&json!(found.iter().map(line).collect::<Vec<_>>()));
     } else {
         for (port, baud, pong) in &found {
-            let what = if is_fingertip(pong) { "fingertip" } else { "another device" };
+            let what = if pong.is_fingertip() { "fingertip" } else { "another device" };
             say(format_args!(
                 "{port}  {baud} baud  ID {}  {what}, model {}, firmware {}",
                 pong.id, pong.model, pong.firmware
@@ -67,8 +64,4 @@ pub fn run(args: &Args, reach: &Reach, json: bool) -> Result<(), Error> {
         .into());
     }
     Ok(())
-}
-
-fn is_fingertip(pong: &Pong) -> bool {
-    i64::from(pong.model) == table::model()
 }

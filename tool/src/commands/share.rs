@@ -7,7 +7,7 @@
 
 use super::{Interrupt, aside, moving, say};
 use crate::client::Reach;
-use crate::{Client, Error, table};
+use crate::{Client, Error};
 use fingertip::link::Reply;
 use fingertip::link::packet::{BROADCAST, Event, HEADER, Packet, Receiver, Sender, StatusError, instruction};
 use fingertip::shipped::address;
@@ -15,7 +15,7 @@ use std::collections::BTreeSet;
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::mpsc::{Receiver as Inbox, RecvTimeoutError, Sender as Outbox, channel};
+use std::sync::mpsc::{Sender as Outbox, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -73,18 +73,15 @@ struct Commander {
 }
 
 /// Serves until Ctrl-C, then stops what is still commanded.
-///
-/// # Errors
-/// The port or the address is taken, or the port is lost.
 pub fn run(args: &Args, reach: &Reach) -> Result<(), Error> {
     let interrupt = Interrupt::catch()?;
     let mut client = Client::open(reach)?;
     // An unanswered packet takes two thirds, half of that for a late answer: the next one is still answered in time.
-    client.set_timeout(Duration::from_millis(reach.timeout_ms.div_ceil(3)));
+    client.timeout = Duration::from_millis(reach.timeout_ms.div_ceil(3));
     let cannot = |why| Error::Other(format!("cannot listen at {}: {why}", args.listen));
     let listener = TcpListener::bind(args.listen).map_err(cannot)?;
     let address = listener.local_addr().map_err(cannot)?;
-    say(format_args!("shares {} at tcp:{address}; Ctrl-C ends it", client.port()));
+    say(format_args!("shares {} at tcp:{address}; Ctrl-C ends it", client.port));
     say(format_args!("next, in other terminals: fingertip --port tcp:{address} view"));
     let bus = Arc::new(Mutex::new(Bus { client, commander: None, stopped: BTreeSet::new() }));
     let (lost, losses) = channel();
@@ -100,19 +97,14 @@ pub fn run(args: &Args, reach: &Reach) -> Result<(), Error> {
             std::thread::spawn(move || converse(stream, &bus, &lost));
         }
     });
-    let ended = wait(&interrupt, &losses);
-    lock(&bus).end_command("`fingertip share` ends");
-    ended
-}
-
-fn wait(interrupt: &Interrupt, losses: &Inbox<Error>) -> Result<(), Error> {
-    while !interrupt.came() {
-        match losses.recv_timeout(super::INTERRUPT_EVERY) {
-            Ok(why) => return Err(why),
-            Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {}
+    let mut ended = Ok(());
+    while !interrupt.came() && ended.is_ok() {
+        if let Ok(why) = losses.recv_timeout(super::INTERRUPT_EVERY) {
+            ended = Err(why);
         }
     }
-    Ok(())
+    lock(&bus).end_command("`fingertip share` ends");
+    ended
 }
 
 fn lock(bus: &Mutex<Bus>) -> MutexGuard<'_, Bus> {
@@ -180,7 +172,7 @@ impl Bus {
         if packet.instruction == instruction::STATUS {
             return Ok(Vec::new());
         }
-        let slack = self.client.timeout();
+        let slack = self.client.timeout;
         let silent = |commander: &Commander| {
             commander.from != from && commander.watchdog.is_some_and(|most| commander.heard.elapsed() > most + slack)
         };
@@ -199,13 +191,10 @@ impl Bus {
                 return Ok(if packet.id == BROADCAST { Vec::new() } else { refusal(packet.id) });
             };
             commander.ids.extend(targets(packet));
-            if covers(packet, address::BUS_WATCHDOG)
-                && let Some(steps @ 1..) = packet.params.get(2)
-            {
-                let watchdog = Duration::from_millis(20 * u64::from(*steps));
-                commander.watchdog = Some(commander.watchdog.map_or(watchdog, |shortest| shortest.min(watchdog)));
-            } else if covers(packet, address::BUS_WATCHDOG) {
-                commander.watchdog = None;
+            if covers(packet, address::BUS_WATCHDOG) {
+                let set = packet.params.get(2).filter(|steps| **steps > 0);
+                let set = set.map(|steps| Duration::from_millis(20 * u64::from(*steps)));
+                commander.watchdog = set.map(|set| commander.watchdog.map_or(set, |shortest| shortest.min(set)));
             }
         }
         if let Some(commander) = self.commander.as_mut().filter(|commander| commander.from == from) {
@@ -234,7 +223,7 @@ impl Bus {
 
 /// Stops a device that is driven. Returns whether it was.
 fn stop(client: &mut Client) -> Result<bool, Error> {
-    if i64::from(client.again(Client::ping)?.model) == table::model() {
+    if client.again(Client::ping)?.is_fingertip() {
         if moving::is_idle(client.again(|client| client.number(address::PRESENT_MODE))?) {
             return Ok(false);
         }
@@ -249,14 +238,14 @@ fn stop(client: &mut Client) -> Result<bool, Error> {
     Ok(drives)
 }
 
-/// Returns whether a packet only stops a finger.
+/// True if a packet only stops a finger.
 fn is_stop(packet: &Packet<'_>) -> bool {
     STOPS.into_iter().any(|register| covers(packet, register))
         && packet.params.len() > 2
         && packet.params.iter().skip(2).all(|byte| *byte == 0)
 }
 
-/// Returns whether a packet writes a register from its first byte on.
+/// True if a packet writes a register from its first byte on.
 fn covers(packet: &Packet<'_>, register: u16) -> bool {
     packet.instruction == instruction::WRITE && packet.params.starts_with(&register.to_le_bytes())
 }

@@ -4,7 +4,7 @@ use super::moving::{self, REST_UM_PER_S};
 use super::{say, say_json, wait_for};
 use crate::client::Reach;
 use crate::state::State;
-use crate::{Client, Error, table};
+use crate::{Client, Error};
 use fingertip::shipped::address;
 use serde_json::{Value, json};
 use std::time::Duration;
@@ -29,9 +29,6 @@ pub struct Args {
 }
 
 /// Turns torque off, which aborts measurements, sets the bus watchdog to 0, and reports what was found and changed.
-///
-/// # Errors
-/// A controller does not answer, or its tip does not come to rest.
 pub fn run(args: &Args, reach: &Reach, json: bool) -> Result<(), Error> {
     if !args.all {
         return super::each(reach, false, |client| {
@@ -51,7 +48,7 @@ pub fn run(args: &Args, reach: &Reach, json: bool) -> Result<(), Error> {
     let (mut all, mut failed) = (Vec::new(), Vec::new());
     for pong in found {
         client.id = pong.id;
-        if i64::from(pong.model) != table::model() {
+        if !pong.is_fingertip() {
             super::aside(format_args!("ID {} is no fingertip: torque off was sent, not checked", pong.id));
             continue;
         }
@@ -83,10 +80,12 @@ fn stop(client: &mut Client, releases: bool, json: bool) -> Result<Value, Error>
     if !json {
         let was = |state: &State| format!("mode {}, {} mN", state.mode_name(), state.force_mn);
         say(format_args!("ID {id}: {} -> {}", was(&before), was(&after)));
-        say(format_args!(
-            "torque is off, measurements are aborted, the bus watchdog is off (it was {})",
-            shown(watchdog)
-        ));
+        let shown = match watchdog {
+            0 => "off".into(),
+            ..0 => "tripped".into(),
+            steps => format!("{} ms", 20 * steps),
+        };
+        say(format_args!("torque is off, measurements are aborted, the bus watchdog is off (it was {shown})"));
         if let Some(fault) = after.fault_name() {
             say(format_args!("fault {} ({fault}) remains: `fingertip recover` clears it", after.fault));
         }
@@ -102,13 +101,4 @@ fn stop(client: &mut Client, releases: bool, json: bool) -> Result<Value, Error>
         "force_mn": after.force_mn, "fault": after.fault, "fault_name": after.fault_name(),
         "watchdog_before": watchdog, "at_rest": true,
     }))
-}
-
-/// The watchdog's number for people.
-fn shown(watchdog: i64) -> String {
-    match watchdog {
-        0 => "off".into(),
-        ..0 => "tripped".into(),
-        steps => format!("{} ms", 20 * steps),
-    }
 }

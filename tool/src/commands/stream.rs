@@ -2,8 +2,10 @@
 
 #[cfg(feature = "foxglove")]
 mod server;
+#[cfg(feature = "foxglove")]
+pub use server::run;
 
-use crate::{Client, Error, numbers};
+use crate::numbers;
 
 /// Address of the stream.
 #[derive(Debug, clap::Args)]
@@ -21,16 +23,8 @@ pub struct Args {
     rate_hz: f64,
 }
 
-/// Streams until Ctrl-C.
-///
-/// # Errors
-/// The port is taken, or this build cannot.
-pub fn run(args: &Args, client: &mut Client) -> Result<(), Error> {
-    #[cfg(feature = "foxglove")]
-    return server::run(args, client);
-    #[cfg(not(feature = "foxglove"))]
-    {
-        let _ = (args, client);
-        Err("this build does not stream: `cargo install --path tool --features foxglove` makes one that does".into())
-    }
+/// Refuses to stream.
+#[cfg(not(feature = "foxglove"))]
+pub fn run(_: &Args, _: &mut crate::Client) -> Result<(), crate::Error> {
+    Err("this build does not stream: `cargo install --path tool --features foxglove` makes one that does".into())
 }

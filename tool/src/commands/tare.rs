@@ -1,7 +1,6 @@
 //! `fingertip tare`.
 
-use super::guided::motion;
-use super::{TOUCHED, no_fault, say, say_json, wait_for};
+use super::{TOUCHED, no_fault_nor_motion, say, say_json, wait_for};
 use crate::{Client, Error, numbers, table};
 use fingertip::shipped::address;
 use fingertip::state::Limits;
@@ -22,27 +21,19 @@ pub struct Args {
 }
 
 /// Tares, and reports the result.
-///
-/// # Errors
-/// Torque is on, there is a fault, or something touched.
 pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
-    no_fault(client)?;
-    motion::alone(client)?;
+    no_fault_nor_motion(client)?;
     if client.number(address::TORQUE_ENABLE)? != 0 {
         return Err("torque is on: the tip may be pressing on something. Turn it off first: `fingertip stop`".into());
     }
     let Tared { touched, least, most } = measure(Duration::from_secs_f64(args.within_s), client)?;
     if json {
-        say_json(
-            &json!({ "id": client.id, "tared": true, "touched": touched, "least_codes": least, "most_codes": most }),
-        );
+        let id = client.id;
+        say_json(&json!({ "id": id, "tared": true, "touched": touched, "least_codes": least, "most_codes": most }));
     } else {
         say(format_args!("tared: zeros of {least} to {most} codes"));
     }
-    if touched {
-        return Err(TOUCHED.into());
-    }
-    Ok(())
+    if touched { Err(TOUCHED.into()) } else { Ok(()) }
 }
 
 /// Result of a tare.

@@ -73,7 +73,7 @@ pub fn run(args: &Args, client: &mut Client) -> Result<(), Error> {
         return Err("the output is no terminal: `fingertip record` writes states to a file or a pipe".into());
     }
     let period = Duration::from_secs_f64(1.0 / args.rate_hz.clamp(0.1, 1e3));
-    let mut seen = Seen { name: format!("ID {} on {}", client.id, client.port()), ..Seen::default() };
+    let mut seen = Seen { name: format!("ID {} on {}", client.id, client.port), ..Seen::default() };
     let failed = |why: io::Error| Error::Other(format!("the terminal: {why}"));
     let mut terminal = ratatui::try_init().map_err(failed)?;
     let watched = watch(args, period, client, &mut seen, &mut terminal).map_err(failed);
@@ -92,7 +92,7 @@ fn watch(
     let (mut due, mut counted, mut updates) = (begun, begun, 0);
     loop {
         let read = State::read_picture(client);
-        if matches!(read, Err(Error::Port { .. })) {
+        if matches!(read, Err(Error::Port(..))) {
             // The port may come back. Until then the screen shows the last state and the reason.
             let _ = client.reopen();
         }
@@ -174,28 +174,25 @@ fn draw_map(state: &State, area: Rect, buffer: &mut Buffer) {
 }
 
 fn draw_words(state: &State, area: Rect, buffer: &mut Buffer) {
-    let millimetres = |um: i64| um as f64 * 1e-3;
-    let newtons = |mn: i64| mn as f64 * 1e-3;
+    // Of a mN and of a um.
+    let thousandths = |number: i64| number as f64 * 1e-3;
     let fault = state.fault_name();
-    let limits = state.limit_names();
-    let limits = if limits.is_empty() { "none".into() } else { limits.join(", ") };
+
+    let [x_mm, y_mm, travel_mm, mm_per_s] =
+        [state.centre_x_um, state.centre_y_um, state.travel_um, state.speed_um_per_s].map(thousandths);
     let lines = vec![
-        Line::from(vec!["force   ".into(), format!("{:8.3} N", newtons(state.force_mn)).bold()]),
-        Line::from(format!("goal    {:8.3} N", newtons(state.goal_mn))),
+        Line::from(vec!["force   ".into(), format!("{:8.3} N", thousandths(state.force_mn)).bold()]),
+        Line::from(format!("goal    {:8.3} N", thousandths(state.goal_mn))),
         Line::from(vec!["mode    ".into(), Span::from(format!("  {}", state.mode_name())).cyan()]),
         Line::from(vec![
             "fault   ".into(),
             fault.map_or("  none".into(), |name| format!("  {} {name}", state.fault).red().bold()),
         ]),
-        Line::from(format!("centre  {:8.2} {:.2} mm", millimetres(state.centre_x_um), millimetres(state.centre_y_um))),
-        Line::from(format!("depth   {:8.3} mm", millimetres(state.indentation_um))),
-        Line::from(format!(
-            "travel  {:8.2} mm at {:.1} mm/s",
-            millimetres(state.travel_um),
-            millimetres(state.speed_um_per_s)
-        )),
+        Line::from(format!("centre  {x_mm:8.2} {y_mm:.2} mm")),
+        Line::from(format!("depth   {:8.3} mm", thousandths(state.indentation_um))),
+        Line::from(format!("travel  {travel_mm:8.2} mm at {mm_per_s:.1} mm/s")),
         Line::from(format!("duty    {:8.1} %", state.duty_permille as f64 * 0.1)),
-        Line::from(format!("limits    {limits}")),
+        Line::from(format!("limits    {}", state.limits_text())),
     ];
     Paragraph::new(lines).wrap(ratatui::widgets::Wrap { trim: false }).render(area, buffer);
 }

@@ -1,7 +1,6 @@
 //! Captures from the host's side: taken, kept as files, replayed; and files that are not as they were written.
 
 use crate::served::Served;
-use crate::stopped::client;
 use fingertip::shipped::address;
 use fingertip_cli::captured;
 use fingertip_cli::captured::{of_bytes, through_the_core};
@@ -29,7 +28,7 @@ fn a_capture_is_taken_and_replays() {
     let told = finger.json(&["replay", &file]);
     assert_eq!((told[0]["frames"].as_u64(), told[0]["difference"].is_null()), (Some(frames), true));
     // The finger released.
-    assert_eq!(client(&finger).number(address::TORQUE_ENABLE).expect("it answers"), 0);
+    assert_eq!(finger.client().number(address::TORQUE_ENABLE).expect("it answers"), 0);
     let full = fs::OpenOptions::new().write(true).open("/dev/full").expect("Linux has it");
     let why = captured::write(full, &kept.bytes, &kept.about).expect_err("it is full");
     assert!(why.contains("No space left"), "{why}");
@@ -44,17 +43,15 @@ fn a_press_from_a_tip_that_touches_is_told_and_ends() {
     let finger = Served::begin("wall");
     finger.done(&["tare"]);
     // Torque goes off while it presses: the tip rests on the wall.
-    let mut bus = client(&finger);
-    bus.set(address::TORQUE_ENABLE, 1).expect("it obeys");
-    bus.set(address::GOAL_FORCE_MN, 1_000).expect("it obeys");
-    while bus.number(address::PRESENT_FORCE_MN).expect("it answers") < 900 {}
-    bus.set(address::TORQUE_ENABLE, 0).expect("it obeys");
-    drop(bus);
+    finger.set(&[(address::TORQUE_ENABLE, 1), (address::GOAL_FORCE_MN, 1_000)]);
+    while finger.true_force_n() < 0.9 {
+        finger.command("state");
+    }
+    finger.set(&[(address::TORQUE_ENABLE, 0)]);
     let file = finger.file("touching.mcap");
-    let why = finger.refused(&["capture", "--press", "1", "--out", &file]);
-    assert!(why.contains("something seemed to touch"), "{why}");
+    finger.refuses(&["capture", "--press", "1", "--out", &file], &["something seemed to touch"]);
     assert!(fs::metadata(&file).is_err(), "nothing was written");
-    assert_eq!(client(&finger).number(address::TORQUE_ENABLE).expect("it answers"), 0);
+    assert_eq!(finger.client().number(address::TORQUE_ENABLE).expect("it answers"), 0);
 }
 
 #[test]
@@ -63,19 +60,16 @@ fn what_cannot_be_captured_is_told() {
     assert!(Served::not_understood(&["capture", "--out", "press.csv"]).contains(".mcap"));
     let file = finger.file("press.mcap");
     finger.done(&["params", "set", "direction_confirmed=0"]);
-    let why = finger.refused(&["capture", "--press", "0.5", "--out", &file]);
-    assert!(why.contains("`fingertip commission`"), "{why}");
+    finger.refuses(&["capture", "--press", "0.5", "--out", &file], &["`fingertip commission`"]);
     finger.done(&["params", "set", "direction_confirmed=1"]);
     finger.done(&["tare"]);
-    client(&finger).set(address::TORQUE_ENABLE, 1).expect("it obeys");
-    let why = finger.refused(&["capture", "--out", &file]);
-    assert!(why.contains("torque is on"), "{why}");
-    client(&finger).set(address::TORQUE_ENABLE, 0).expect("it obeys");
+    finger.set(&[(address::TORQUE_ENABLE, 1)]);
+    finger.refuses(&["capture", "--out", &file], &["torque is on"]);
+    finger.set(&[(address::TORQUE_ENABLE, 0)]);
     finger.command("fault supply-low");
-    client(&finger).set(address::TORQUE_ENABLE, 1).expect("it obeys");
+    finger.set(&[(address::TORQUE_ENABLE, 1)]);
     finger.command("state");
-    let why = finger.refused(&["capture", "--out", &file]);
-    assert!(why.contains("fault 9") && why.contains("`fingertip recover`"), "{why}");
+    finger.refuses(&["capture", "--out", &file], &["fault 9", "`fingertip recover`"]);
     assert!(fs::metadata(&file).is_err(), "nothing was written");
 }
 
@@ -100,22 +94,19 @@ fn a_file_that_is_not_as_it_was_written_is_refused() {
     assert!(of_bytes(&[&whole[..], &[0]].concat()).is_err());
 
     fs::write(&file, &whole[..whole.len() / 2]).expect("it can be written");
-    let why = finger.refused(&["replay", &file]);
-    assert!(why.contains("1 of 1 captures do not replay"), "{why}");
+    finger.refuses(&["replay", &file], &["1 of 1 captures do not replay"]);
     // A whole file about a capture that is cut short.
     let kept = of_bytes(&whole).expect("a capture");
     let cut = &kept.bytes[..kept.bytes.len() - 1];
     let why = through_the_core(cut, |_, _| {}).expect_err("it is cut");
     assert_eq!(why.to_string(), "the capture is cut off");
     assert!(captured::write(std::io::Cursor::new(Vec::new()), cut, &kept.about).is_err());
-    let why = finger.refused(&["replay", &finger.file("nowhere")]);
-    assert!(why.contains("cannot read"), "{why}");
+    finger.refuses(&["replay", &finger.file("nowhere")], &["cannot read"]);
     fs::remove_file(&file).expect("it is there");
     let folder = std::path::Path::new(&file).parent().expect("a folder");
     // Links that lead back are not followed.
     for link in ["one", "two"] {
         std::os::unix::fs::symlink(folder, folder.join(link)).expect("a link");
     }
-    let why = finger.refused(&["replay", folder.to_str().expect("text")]);
-    assert!(why.contains("no capture there"), "{why}");
+    finger.refuses(&["replay", folder.to_str().expect("text")], &["no capture there"]);
 }

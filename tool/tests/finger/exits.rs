@@ -1,23 +1,9 @@
 //! Ends of commands: the exit codes of docs/host.md, errors in JSON, and the help of every command.
 
-use crate::served::Served;
+use crate::served::{Served, line_with};
 use serde_json::Value;
-use std::io::{BufRead as _, BufReader, Read as _};
+use std::io::Read as _;
 use std::os::fd::OwnedFd;
-use std::process::Child;
-
-/// Reads standard error until a line begins with this.
-fn said(child: &mut Child, begin: &str) {
-    let mut reader = BufReader::new(child.stderr.take().expect("a pipe"));
-    let (mut line, mut all) = (String::new(), String::new());
-    while !line.starts_with(begin) {
-        line.clear();
-        assert!(reader.read_line(&mut line).expect("text") > 0, "no line begins with {begin}: {all}");
-        all += &line;
-    }
-    // Later output is read and dropped, so that it does not block the program.
-    std::thread::spawn(move || reader.read_to_end(&mut Vec::new()));
-}
 
 /// Runs each example of the table. Two of them end by what happens meanwhile: 3 by an object that goes away, 130 by
 /// Ctrl-C.
@@ -32,18 +18,17 @@ fn the_exit_codes_are_those_of_the_documentation() {
         let cells: Vec<&str> = row.trim_matches('|').split('|').collect();
         let code: i32 = cells[0].trim().parse().expect("a code");
         codes.push(code);
-        let examples = cells[2].split('`').filter_map(|text| text.strip_prefix("fingertip "));
-        let examples: Vec<&str> = examples.collect();
+        let examples: Vec<&str> = cells[2].split('`').filter_map(|text| text.strip_prefix("fingertip ")).collect();
         assert!(!examples.is_empty(), "{row}");
         for example in examples {
             let mut child = finger.start(&example.split_whitespace().collect::<Vec<_>>());
             match code {
                 3 => {
-                    said(&mut child, "reached");
+                    line_with("reached", child.stderr.take().expect("a pipe"));
                     finger.command("remove");
                 }
                 130 => {
-                    said(&mut child, "reached");
+                    line_with("reached", child.stderr.take().expect("a pipe"));
                     Served::interrupt(&child);
                 }
                 _ => {}

@@ -1,31 +1,30 @@
 //! The guided procedures: `commission`, `identify` and `calibrate` against a served finger.
 
-use crate::served::Served;
-use crate::stopped::{RESIDUAL_N, is_at_rest, patient};
+use crate::served::{self, Served};
+use crate::stopped::{RESIDUAL_N, end_behind, is_at_rest};
 use fingertip::link::packet::instruction::REBOOT;
 use rustix::process::Signal;
 use serde_json::{Value, json};
 use std::fs;
 use std::io::{BufRead as _, BufReader, Write as _};
-use std::process::{Output, Stdio};
-use std::sync::Mutex;
+use std::process::Stdio;
 
 /// Options of a calibration without questions and without the pause of a real sensor.
 const QUICK: [&str; 6] = ["calibrate", "--no-wait", "--pause-s", "0", "--within-s", "3600"];
 
 fn output(finger: &Served, arguments: &[&str]) -> (Option<i32>, Value, String) {
     let output = finger.fingertip(&[arguments, &["--json"]].concat()).output().expect("it starts");
-    let text = String::from_utf8_lossy(&output.stderr).into_owned();
-    (output.status.code(), serde_json::from_slice(&output.stdout).unwrap_or(Value::Null), text)
+    let (code, text) = served::ended(&output);
+    (code, serde_json::from_slice(&output.stdout).unwrap_or(Value::Null), text)
 }
 
-/// Runs a command whose questions get these lines as answers.
-fn answered(finger: &Served, arguments: &[&str], answers: &str) -> Output {
+/// Exit code and errors of a command whose questions get these lines as answers.
+fn answered(finger: &Served, arguments: &[&str], answers: &str) -> (Option<i32>, String) {
     let mut command = finger.fingertip(arguments);
     let command = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().expect("it starts");
     child.stdin.take().expect("a pipe").write_all(answers.as_bytes()).expect("it reads");
-    child.wait_with_output().expect("it ends")
+    served::ended(&child.wait_with_output().expect("it ends"))
 }
 
 fn parameters(finger: &Served) -> Value {
@@ -43,7 +42,7 @@ fn near(number: &Value, wanted: f64, part: f64) -> bool {
 
 #[test]
 fn a_program_commissions_and_calibrates_a_finger() {
-    let finger = patient("wall");
+    let finger = Served::patient("wall");
     finger.done(&["params", "set", "direction_confirmed=0", "torque_constant_unm_per_a=5000"]);
     let session = finger.file("drive");
     let commission = ["commission", "--forward", "yes", "--resistance-ohm", "3.53", "--apply", "--session", &session];
@@ -76,15 +75,16 @@ fn a_program_commissions_and_calibrates_a_finger() {
     assert_eq!(finger.json(&calibrate), array, "a session that is complete gives the same again");
     assert!(finger.heard() - heard < 60, "nothing moves");
     finger.done(&["params", "set", "tip_radius_um=9000"]);
-    let why = finger.refused(&calibrate);
-    assert!(why.contains("tip_radius_um changed since this session began"), "{why}");
-    let why = finger.refused(&["commission", "--forward", "yes", "--session", &session]);
-    assert!(why.contains("a session of the command \"calibrate\""), "{why}");
+    finger.refuses(&calibrate, &["tip_radius_um changed since this session began"]);
+    finger.refuses(
+        &["commission", "--forward", "yes", "--session", &session],
+        &["a session of the command \"calibrate\""],
+    );
 }
 
 #[test]
 fn a_killed_session_resumes_where_it_was() {
-    let finger = patient("wall");
+    let finger = Served::patient("wall");
     let (session, record) = (finger.file("killed"), finger.file("killed/press-1.fts"));
     let calibrate = [&QUICK[..], &["--presses", "2", "--no-scale", "--session", &session]].concat();
     let before = parameters(&finger);
@@ -124,14 +124,13 @@ fn a_killed_session_resumes_where_it_was() {
     assert_eq!((&weighed["after"]["creep_permille"], &weighed["refused"]), (&0.into(), &json!([])), "{weighed}");
     // A damaged record is not solved.
     fs::write(&record, &bytes[..bytes.len() - 4]).expect("a file");
-    let why = finger.refused(&calibrate);
-    assert!(why.contains("press-1.fts: the series has"), "{why}");
+    finger.refuses(&calibrate, &["press-1.fts: the series has"]);
 }
 
 /// KILL after each packet of a session that has all records: what is left are the write and the tare.
 #[test]
 fn a_write_that_is_killed_leaves_old_or_new_parameters_and_is_completed() {
-    let finger = patient("wall");
+    let finger = Served::patient("wall");
     let session = finger.file("written");
     let calibrate = [&QUICK[..], &["--presses", "1", "--no-scale", "--session", &session]].concat();
     let before = parameters(&finger);
@@ -164,18 +163,15 @@ fn a_write_that_is_killed_leaves_old_or_new_parameters_and_is_completed() {
 
 #[test]
 fn a_wrong_answer_changes_nothing() {
-    let finger = patient("wall");
+    let finger = Served::patient("wall");
     let before = parameters(&finger);
-    let said = answered(&finger, &["commission"], "perhaps\nyes\n");
-    let text = String::from_utf8_lossy(&said.stderr).into_owned();
+    let (_, text) = answered(&finger, &["commission"], "perhaps\nyes\n");
     assert!(text.contains("`perhaps`: yes or no is expected") && text.contains("give --apply"), "{text}");
     assert_eq!(parameters(&finger), before);
-    let said = answered(&finger, &["commission"], "no\n");
-    let text = String::from_utf8_lossy(&said.stderr).into_owned();
-    assert!(text.contains("swap the motor's leads") && said.status.code() == Some(1), "{text}");
+    let (code, text) = answered(&finger, &["commission"], "no\n");
+    assert!(text.contains("swap the motor's leads") && code == Some(1), "{text}");
     assert_eq!(parameters(&finger)["direction_confirmed"], 0, "torque is refused from here on");
-    let why = finger.refused(&["identify", "--no-wait"]);
-    assert!(why.contains("`fingertip commission`"), "{why}");
+    finger.refuses(&["identify", "--no-wait"], &["`fingertip commission`"]);
     finger.done(&["params", "set", "direction_confirmed=1"]);
 
     // What the scale shows is ten times what is read.
@@ -201,7 +197,7 @@ fn a_wrong_answer_changes_nothing() {
 
 #[test]
 fn a_program_is_asked_nothing() {
-    let finger = patient("wall");
+    let finger = Served::patient("wall");
     for (arguments, option) in [
         (&["commission"][..], "--forward yes"),
         (&["identify"], "--no-wait"),
@@ -233,9 +229,6 @@ const ENDS: [End; 6] = [
 /// Force at the tip that the dry friction of the scene's motor holds, N: 0.12 mN m, a gear of 43, a drum of 12 mm.
 const FRICTION_N: f64 = 0.12e-3 * 43.0 / 12e-3;
 
-/// Fingers that are served side by side where many instants are tried.
-const FINGERS: usize = 12;
-
 /// An instant of an end of each procedure, drawn with a fixed seed: no force is left, the parameters are those before or
 /// all of the new ones, and the same session gives the same result. All ends, at more instants, with
 /// `INSTANTS=42 cargo test -p fingertip-cli --profile host --test finger ends_at_any -- --nocapture`.
@@ -245,35 +238,19 @@ fn a_procedure_that_ends_at_any_instant_resumes() {
     let mut random = fastrand::Rng::with_seed(30);
     let calibrate = [&QUICK[..], &["--presses", "2", "--no-scale", "--apply"]].concat();
     for procedure in [vec!["commission", "--forward", "yes", "--within-s", "3600", "--apply"], calibrate] {
-        let finger = patient("wall");
+        let finger = Served::patient("wall");
         let begun = finger.heard();
         let reference = finger.json(&procedure)["after"].clone();
         let packets = finger.heard() - begun;
-        let cases = (0..instants.map_or(1, |instants| instants * ENDS.len())).map(|number| {
-            let end = if instants.is_some() { ENDS[number % ENDS.len()] } else { ENDS[random.usize(0..ENDS.len())] };
-            (end, random.u64(1..packets))
-        });
-        let (cases, totals) = (Mutex::new(cases), Mutex::new((0, 0, 0.0_f64)));
-        // A served finger goes at the pace of real time, and mostly waits.
-        std::thread::scope(|scope| {
-            for _ in 0..instants.map_or(1, |_| FINGERS) {
-                scope.spawn(|| {
-                    let next = || cases.lock().expect("no case panics here").next();
-                    while let Some((end, packets)) = next() {
-                        let (kept, off) = resumes(&procedure, end, packets, &reference);
-                        let mut totals = totals.lock().expect("no case panics here");
-                        totals.0 += u32::from(kept);
-                        totals.1 += u32::from(!kept);
-                        totals.2 = totals.2.max(off);
-                    }
-                });
-            }
-        });
-        let (before, after, worst) = totals.into_inner().expect("no case panics here");
+        let ends = instants.map_or_else(|| vec![ENDS[random.usize(0..ENDS.len())]], |instants| ENDS.repeat(instants));
+        let resumed: Vec<_> =
+            ends.into_iter().map(|end| resumes(&procedure, end, random.u64(1..packets), &reference)).collect();
+        let before = resumed.iter().filter(|(kept, _)| *kept).count();
         println!(
-            "{}: {before} ends before the write, {after} behind it, none within; resumed, at most {:.2} % off",
+            "{}: {before} ends before the write, {} behind it, none within; resumed, at most {:.2} % off",
             procedure[0],
-            100.0 * worst
+            resumed.len() - before,
+            100.0 * resumed.iter().map(|(_, off)| *off).fold(0.0, f64::max)
         );
     }
 }
@@ -281,34 +258,21 @@ fn a_procedure_that_ends_at_any_instant_resumes() {
 /// Ends a procedure after the given number of packets and resumes it: whether the parameters were those before, and by
 /// how much the result is off.
 fn resumes(procedure: &[&str], end: End, packets: u64, reference: &Value) -> (bool, f64) {
-    let finger = patient("wall");
+    let finger = Served::patient("wall");
     let (old, session, what) =
         (parameters(&finger), finger.file("session"), format!("{end:?} after {packets} packets"));
     let arguments = [procedure, &["--session", &session]].concat();
-    let begun = finger.heard();
-    let mut child = if matches!(end, End::Cable) {
-        finger.command(&format!("deaf after {packets} for {}", u64::MAX));
-        finger.start(&[&arguments[..], &["--json", "--timeout-ms", "100"]].concat())
-    } else {
-        finger.start(&[&arguments[..], &["--json"]].concat())
-    };
-    while finger.heard() - begun < packets && child.try_wait().expect("it was started").is_none() {
-        std::thread::sleep(Served::LOOK);
-    }
+    let json = [&arguments[..], &["--json"]].concat();
     match end {
-        End::Signal(signal) if child.try_wait().expect("it was started").is_none() => Served::signal(&child, signal),
-        End::Signal(_) | End::Cable => {}
+        End::Signal(signal) => end_behind(&finger, packets, &json, Some(signal)),
+        End::Cable => end_behind(&finger, packets, &json, None),
         End::Power => {
-            finger.command(&format!("raw {REBOOT}"));
+            finger.command(&format!("restart after {packets}"));
+            end_behind(&finger, u64::MAX, &json, Some(Signal::KILL));
         }
     }
-    child.wait().expect("it ends");
     // After a loss of power nothing drives the finger away: the motor's friction holds the tip in place.
     let left_n = if matches!(end, End::Power) { FRICTION_N } else { RESIDUAL_N };
-    let ended_s = finger.now_s();
-    while finger.now_s() < ended_s + 1.0 {
-        finger.command("state");
-    }
     let state = finger.command("state");
     assert!(finger.true_force_n() < left_n, "{what}: {state}");
     if matches!(end, End::Power) {

@@ -25,8 +25,7 @@ fn it_is_found_and_tells_what_it_is() {
         "port": finger.port, "baud": 1_000_000, "id": 1, "model_number": 21574, "firmware_version": 1, "fingertip": true,
     }]);
     assert_eq!(found, expected);
-    let nothing = finger.refused(&["scan", "--speeds", "115200"]);
-    assert!(nothing.contains("nothing answers") && nothing.contains("at 115200 baud"), "{nothing}");
+    finger.refuses(&["scan", "--speeds", "115200"], &["nothing answers", "at 115200 baud"]);
 
     let info = finger.json(&["info"]);
     assert_eq!((info["rows"].as_i64(), info["columns"].as_i64()), (Some(10), Some(10)));
@@ -40,17 +39,13 @@ fn it_is_found_and_tells_what_it_is() {
 #[test]
 fn who_is_not_there_is_told() {
     let finger = Served::begin("wall");
-    let why = finger.refused(&["--id", "3", "--timeout-ms", "10", "info"]);
-    assert!(why.contains("ping: no answer of ID 3") && why.contains("fingertip scan"), "{why}");
-    let why = finger.refused(&["--baud", "115200", "--timeout-ms", "10", "info"]);
-    assert!(why.contains("at 115200 baud"), "{why}");
-    let why = finger.refused(&["--port", "/nowhere", "info"]);
-    assert!(why.contains("cannot open /nowhere"), "{why}");
+    finger.refuses(&["--id", "3", "--timeout-ms", "10", "info"], &["ping: no answer of ID 3", "fingertip scan"]);
+    finger.refuses(&["--baud", "115200", "--timeout-ms", "10", "info"], &["at 115200 baud"]);
+    finger.refuses(&["--port", "/nowhere", "info"], &["cannot open /nowhere"]);
     // One line has one host.
     let mut first = finger.start(&["record", &finger.file("first.csv")]);
     Served::begun(&finger.file("first.csv.part"));
-    let why = finger.refused(&["info"]);
-    assert!(why.contains("another program has it open"), "{why}");
+    finger.refuses(&["info"], &["another program has it open"]);
     Served::interrupt(&first);
     assert!(first.wait().expect("it ends").success());
     finger.done(&["info"]);
@@ -81,8 +76,7 @@ fn several_ids_are_asked_one_after_the_other() {
 #[test]
 fn it_tares_presses_and_lets_go() {
     let finger = Served::begin("wall");
-    let why = finger.refused(&["press", "1"]);
-    assert!(why.contains("not tared") && why.contains("`fingertip tare`"), "{why}");
+    finger.refuses(&["press", "1"], &["not tared", "`fingertip tare`"]);
     let tared = finger.json(&["tare"]);
     assert_eq!((&tared["tared"], &tared["touched"]), (&true.into(), &false.into()));
     let held = finger.json(&["press", "1.5", "--seconds", "0.3", "--within-s", "3600"]);
@@ -94,8 +88,7 @@ fn it_tares_presses_and_lets_go() {
     assert!(why.contains("goal_force_mn to 9000") && why.contains("error 6"), "{why}");
     assert!(why.contains("force_max_mn is 7000"), "{why}");
     finger.command("remove");
-    let why = finger.refused(&["press", "1", "--within-s", "0.5"]);
-    assert!(why.contains("not reached") && why.contains("mode approach"), "{why}");
+    finger.refuses(&["press", "1", "--within-s", "0.5"], &["not reached", "mode approach"]);
     assert_eq!(finger.json(&["info"])["torque_enable"], 0, "torque is off all the same");
 }
 
@@ -104,12 +97,9 @@ fn a_fault_is_told_and_cleared() {
     let finger = Served::begin("wall");
     finger.done(&["tare"]);
     finger.command("fault supply-low");
-    let why = finger.refused(&["press", "1", "--within-s", "3600"]);
-    assert!(why.contains("fault 9 (supply low)") && why.contains("`fingertip recover`"), "{why}");
-    let why = finger.refused(&["recover"]);
-    assert!(why.contains("cannot be cleared: the supply is below supply_min_mv"), "{why}");
-    let why = finger.refused(&["tare"]);
-    assert!(why.contains("fault 9"), "{why}");
+    finger.refuses(&["press", "1", "--within-s", "3600"], &["fault 9 (supply low)", "`fingertip recover`"]);
+    finger.refuses(&["recover"], &["cannot be cleared: the supply is below supply_min_mv"]);
+    finger.refuses(&["tare"], &["fault 9"]);
     finger.command("mend");
     finger.command("state");
     let cleared = finger.json(&["recover"]);
@@ -136,8 +126,7 @@ fn parameters_are_set_all_or_none_and_saved() {
         (&["tip_radius_um=9000", "contact_on_mn=10"], "contact_off_mn of 15"),
         (&["tip_radius_um=9000", "goal_force_mn=5"], "goal_force_mn is no parameter"),
     ] {
-        let said = finger.refused(&[&["params", "set"], values].concat());
-        assert!(said.contains(why), "{said}");
+        finger.refuses(&[&["params", "set"], values].concat(), &[why]);
     }
     for (values, why) in [
         (&["tip_radius_um=9000", "radius=5"][..], "no register `radius`; did you mean tip_radius_um?"),
@@ -166,8 +155,7 @@ fn a_backup_is_restored_whole() {
     let file = finger.file("backup.toml");
     finger.done(&["params", "set", "modulus_pa=300000", "fit_level=4"]);
     finger.done(&["params", "backup", &file]);
-    let why = finger.refused(&["params", "backup", &file]);
-    assert!(why.contains("is there already: --force"), "{why}");
+    finger.refuses(&["params", "backup", &file], &["is there already: --force"]);
     finger.done(&["params", "backup", "--force", &file]);
     finger.done(&["params", "set", "modulus_pa=200000", "fit_level=1", "clearance_um=500"]);
     let differing: BTreeMap<String, serde_json::Value> =
@@ -192,8 +180,7 @@ fn a_backup_is_restored_whole() {
         (text.replace("row_3 = ", "row_3 = 1 #"), "row_3"),
     ] {
         fs::write(&file, text).expect("a file");
-        let said = finger.refused(&["params", "restore", &file]);
-        assert!(said.contains(why), "{said}");
+        finger.refuses(&["params", "restore", &file], &[why]);
         assert_eq!(finger.json(&["params", "diff"])["gains"]["now"][3][3], 20_000);
     }
     fs::write(&file, &text).expect("a file");
@@ -208,8 +195,7 @@ fn a_backup_is_restored_whole() {
         ("modulus_pa = ", "modulus_pa ", "cannot read"),
     ] {
         fs::write(&file, text.replace(from, to).replace("fit_level = 4", "fit_level = 2")).expect("a file");
-        let said = finger.refused(&["params", "restore", &file]);
-        assert!(said.contains(why), "{said}");
+        finger.refuses(&["params", "restore", &file], &[why]);
         let now = finger.json(&["params", "get", "modulus_pa", "fit_level"]);
         assert_eq!(now, serde_json::json!({ "modulus_pa": 300_000, "fit_level": 4 }));
     }

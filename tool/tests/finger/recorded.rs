@@ -1,6 +1,6 @@
 //! Recordings: their times, their owners, and the rest of one whose program was killed.
 
-use crate::served::Served;
+use crate::served::{Served, ended};
 use mcap::read::Options;
 use mcap::{MessageStream, Summary};
 use std::fs;
@@ -11,6 +11,11 @@ fn unix_s() -> f64 {
     SystemTime::now().duration_since(UNIX_EPOCH).expect("after 1970").as_secs_f64()
 }
 
+/// Messages of a whole file.
+fn messages(bytes: &[u8]) -> Vec<mcap::Message<'_>> {
+    MessageStream::new(bytes).expect("MCAP").map(|message| message.expect("whole")).collect()
+}
+
 #[test]
 fn states_are_recorded_with_the_controllers_times() {
     let finger = Served::begin("wall");
@@ -18,14 +23,11 @@ fn states_are_recorded_with_the_controllers_times() {
     let begun_s = unix_s() - 1.0;
     let done = finger.json(&["record", "--seconds", "0.5", "--rate-hz", "200", "--pressures", &file]);
     let text = fs::read_to_string(&file).expect("it was written");
-    let rows: Vec<Vec<f64>> = text
-        .lines()
-        .skip(1)
-        .map(|line| line.split(',').map(|cell| cell.parse().expect("a number")).collect())
-        .collect();
+    let row = |line: &str| line.split(',').map(|cell| cell.parse().expect("a number")).collect();
+    let rows: Vec<Vec<f64>> = text.lines().skip(1).map(row).collect();
     assert!(text.starts_with("time_s,unix_time_s,frame,mode,fault,limits,goal_mn,force_mn,"));
     assert_eq!(text.lines().next().map(|head| head.split(',').count()), Some(116));
-    assert_eq!((rows.len() as u64, done["states"].as_u64()), (rows.len() as u64, Some(rows.len() as u64)));
+    assert_eq!(done["states"].as_u64(), Some(rows.len() as u64));
     assert!(rows.len() > 1 && rows.iter().all(|row| row.len() == 116));
     for pair in rows.windows(2) {
         // Time is that of the frames: 99.786 us each, cut to microseconds.
@@ -36,15 +38,11 @@ fn states_are_recorded_with_the_controllers_times() {
     let mcap = finger.file("force.mcap");
     let done = finger.json(&["record", "--seconds", "0.2", "--pressures", &mcap]);
     let bytes = fs::read(&mcap).expect("it was written");
-    let messages: Vec<_> =
-        mcap::MessageStream::new(&bytes).expect("MCAP").map(|message| message.expect("whole")).collect();
+    let messages = messages(&bytes);
     // The log has the host's time, the publishing the controller's intervals.
     let (first, last) = (&messages[0], &messages[messages.len() - 1]);
-    assert!(
-        first.log_time as f64 * 1e-9 > begun_s && last.log_time as f64 * 1e-9 < unix_s() + 1.0,
-        "{}",
-        first.log_time
-    );
+    let [first_s, last_s] = [first, last].map(|message| message.log_time as f64 * 1e-9);
+    assert!(first_s > begun_s && last_s < unix_s() + 1.0, "{first_s}");
     assert_eq!(first.publish_time, first.log_time);
     let numbers: serde_json::Value = serde_json::from_slice(&messages[messages.len() - 2].data).expect("JSON");
     let since_s = (last.publish_time - first.publish_time) as f64 * 1e-9;
@@ -63,8 +61,8 @@ fn states_are_recorded_with_the_controllers_times() {
 fn a_recording_that_is_interrupted_is_whole() {
     let finger = Served::begin("wall");
     let file = finger.file("stopped.csv");
-    let mut child = finger.start(&["record", &file]);
-    // Until something is on its way.
+    // A state in a quarter of an hour: the pause between states ends at once.
+    let mut child = finger.start(&["record", "--rate-hz", "0.001", &file]);
     Served::begun(&format!("{file}.part"));
     Served::interrupt(&child);
     assert!(child.wait().expect("it ends").success());
@@ -77,9 +75,8 @@ fn a_recording_that_is_interrupted_is_whole() {
     let child = finger.start(&["record", &lost]);
     Served::begun(&format!("{lost}.part"));
     finger.end();
-    let output = child.wait_with_output().expect("it ends");
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(1), "{said}");
+    let (code, said) = ended(&child.wait_with_output().expect("it ends"));
+    assert_eq!(code, Some(1), "{said}");
 }
 
 #[test]
@@ -99,7 +96,7 @@ fn a_recording_tells_whose_it_is() {
     let file = finger.file("tare.mcap");
     finger.done(&["--id", "2", "capture", "--frames", "60", "--out", &file]);
     let bytes = fs::read(&file).expect("it was written");
-    let messages: Vec<_> = MessageStream::new(&bytes).expect("MCAP").map(|message| message.expect("whole")).collect();
+    let messages = messages(&bytes);
     let mut topics: Vec<&str> = messages.iter().map(|message| message.channel.topic.as_str()).collect();
     topics.sort_unstable();
     topics.dedup();
@@ -161,8 +158,7 @@ fn a_killed_recording_is_kept_and_can_be_read() {
             assert!(bytes.starts_with(b"time_s,") && bytes.iter().filter(|byte| **byte == b'\n').count() > 20);
         }
         // The next recording leaves it alone.
-        let why = finger.refused(&["record", "--seconds", "0.1", &file]);
-        assert!(why.contains(&part) && why.contains("--force"), "{why}");
+        finger.refuses(&["record", "--seconds", "0.1", &file], &[&part, "--force"]);
         assert_eq!(fs::read(&part).expect("it is there"), bytes);
         finger.done(&["record", "--seconds", "0.1", "--force", &file]);
         assert!(fs::exists(&file).expect("a folder") && !fs::exists(&part).expect("a folder"));
@@ -181,8 +177,7 @@ fn no_file_is_written_over_without_force() {
         let file = finger.file(name);
         fs::write(&file, "mine").expect("a file");
         let arguments = [command, &[&*file]].concat();
-        let why = finger.refused(&arguments);
-        assert!(why.contains("is there already: --force"), "{arguments:?}: {why}");
+        finger.refuses(&arguments, &["is there already: --force"]);
         assert_eq!(fs::read(&file).expect("it is there"), b"mine");
         assert!(!fs::exists(format!("{file}.part")).expect("a folder"));
         finger.done(&[&[command[0]], &command[1..], &[&file, "--force"]].concat());
@@ -194,9 +189,8 @@ fn no_file_is_written_over_without_force() {
     Served::begun(&part);
     fs::write(&file, "mine").expect("a file");
     Served::interrupt(&child);
-    let output = child.wait_with_output().expect("it ends");
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.code() == Some(1) && said.contains(&part), "{said}");
+    let (code, said) = ended(&child.wait_with_output().expect("it ends"));
+    assert!(code == Some(1) && said.contains(&part), "{said}");
     assert_eq!(fs::read(&file).expect("it is there"), b"mine");
     assert!(fs::read_to_string(&part).expect("it is there").starts_with("time_s,"));
 }

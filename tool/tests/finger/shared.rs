@@ -1,17 +1,13 @@
 //! `fingertip share`: one client commands, all read, anyone stops.
 
-use crate::served::Served;
-use fingertip::link::Reply;
-use fingertip::link::packet::{BROADCAST, Sender, instruction};
+use crate::served::{Served, client, line_with, packet};
+use crate::stopped::RESIDUAL_N;
+use fingertip::link::packet::{BROADCAST, instruction};
 use fingertip::shipped::address;
 use fingertip_cli::Client;
-use fingertip_cli::client::Reach;
-use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
 use std::process::{Child, Command, Output, Stdio};
-
-/// A force that a stopped finger may still show, N.
-const RESIDUAL_N: f64 = 0.05;
 
 /// Time that a client of the broker waits by its `--timeout-ms`.
 const TIMEOUT: &str = "3000";
@@ -26,23 +22,20 @@ struct Shared {
 /// Starts a broker; it and its address, once it listens.
 fn broker(finger: &Served, listen: &str) -> (Child, String) {
     let mut broker = finger.start(&["share", "--listen", listen, "--timeout-ms", TIMEOUT]);
-    let mut line = String::new();
-    BufReader::new(broker.stdout.take().expect("a pipe")).read_line(&mut line).expect("it says where");
+    let line = line_with("tcp:", broker.stdout.take().expect("a pipe"));
     let address = line.split("tcp:").nth(1).and_then(|rest| rest.split(';').next()).expect("an address");
     (broker, address.to_owned())
 }
 
 impl Shared {
     fn begin(scene: &str) -> Self {
-        let finger = Served::begin(scene);
-        finger.command("patient on");
+        let finger = Served::patient(scene);
         let (broker, address) = broker(&finger, "127.0.0.1:0");
         Self { finger, broker, address }
     }
 
     fn client(&self) -> Client {
-        let port = Some(format!("tcp:{}", self.address));
-        Client::open(&Reach { port, baud: 1_000_000, ids: vec![1], timeout_ms: 600_000 }).expect("it listens")
+        client(&format!("tcp:{}", self.address))
     }
 
     /// A client in a process of its own.
@@ -72,14 +65,6 @@ impl Shared {
             std::thread::sleep(Served::LOOK);
         }
     }
-}
-
-fn packet(id: u8, instruction: u8, params: &[u8]) -> Vec<u8> {
-    let mut packet = Reply::new();
-    let mut sender = Sender::new(&mut packet, id, instruction);
-    params.iter().for_each(|byte| sender.push(*byte));
-    sender.finish();
-    packet.to_vec()
 }
 
 impl Drop for Shared {
@@ -150,7 +135,7 @@ fn clients_that_send_junk_or_read_nothing_block_nobody() {
     let shared = Shared::begin("wall");
     let connect = || TcpStream::connect(&shared.address).expect("it listens");
     let mut client = shared.client();
-    client.set_timeout(std::time::Duration::from_secs(60));
+    client.timeout = std::time::Duration::from_secs(60);
     client.set(address::TARE, 1).expect("it obeys");
     let mut random = fastrand::Rng::with_seed(7);
     let mut half = connect();
@@ -177,7 +162,7 @@ fn clients_that_send_junk_or_read_nothing_block_nobody() {
         assert_eq!(client.ping().expect("it answers").id, 1);
     }
     client.set(address::TARE, 1).expect("it obeys");
-    client.set_timeout(std::time::Duration::from_secs(5));
+    client.timeout = std::time::Duration::from_secs(5);
     assert_eq!(client.ping_all().expect("it answers").len(), 1);
 }
 
@@ -198,9 +183,8 @@ fn who_was_stopped_does_not_take_the_command_from_who_stopped_it() {
 
 #[test]
 fn a_finger_of_a_group_is_stopped_once_its_commander_has_left() {
-    let finger = Served::begin("grasp");
-    finger.command("patient on");
-    let mut own = crate::stopped::client(&finger);
+    let finger = Served::patient("grasp");
+    let mut own = finger.client();
     for id in [1, 2] {
         own.id = id;
         own.set(address::TARE, 1).expect("it obeys");
@@ -229,7 +213,7 @@ fn clients_that_ask_an_absent_id_do_not_starve_a_press() {
     assert!(shared.output(&["tare"]).status.success());
     let mut press = shared.client();
     // What is left of `TIMEOUT` is for its own answer: a USB port may delay it.
-    press.set_timeout(std::time::Duration::from_millis(2_500));
+    press.timeout = std::time::Duration::from_millis(2_500);
     for (register, value) in [(address::BUS_WATCHDOG, 25), (address::TORQUE_ENABLE, 1), (address::GOAL_FORCE_MN, 1_000)]
     {
         press.set(register, value).expect("it obeys");
@@ -238,7 +222,7 @@ fn clients_that_ask_an_absent_id_do_not_starve_a_press() {
     let _pollers: Vec<Client> = std::iter::repeat_with(|| {
         let mut client = shared.client();
         client.id = 9;
-        client.set_timeout(std::time::Duration::from_millis(1));
+        client.timeout = std::time::Duration::from_millis(1);
         client.ping().expect_err("it is absent");
         client
     })
@@ -261,7 +245,7 @@ fn a_lost_port_is_opened_again_once_it_is_back() {
     client.ping().expect("it answers");
     shared.broker.kill().expect("it runs");
     shared.broker.wait().expect("it ends");
-    assert!(matches!(client.ping(), Err(fingertip_cli::Error::Port { .. })));
+    assert!(matches!(client.ping(), Err(fingertip_cli::Error::Port(..))));
     assert!(client.reopen().is_err(), "it is not back");
     (shared.broker, _) = broker(&shared.finger, &shared.address);
     client.reopen().expect("it is back");

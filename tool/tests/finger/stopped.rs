@@ -1,10 +1,8 @@
 //! A signal, a kill or `fingertip stop` in the middle of each motion: the finger is at rest afterwards.
 
-use crate::served::Served;
+use crate::served::{Served, ended};
 use fingertip::measure::Ended;
 use fingertip::shipped::address;
-use fingertip_cli::Client;
-use fingertip_cli::client::Reach;
 use rustix::process::Signal;
 use std::io::{Read as _, Write as _};
 use std::net::{Shutdown, TcpListener};
@@ -24,29 +22,15 @@ const MOTIONS: [(&[&str], &str); 4] = [
     (&["capture", "--press", "1", "--within-s", "3600", "--force", "--out"], "Force:"),
 ];
 
-pub fn client(finger: &Served) -> Client {
-    let port = Some(finger.port.clone());
-    Client::connect(&Reach { port, baud: 1_000_000, ids: vec![1], timeout_ms: 600_000 }).expect("it answers")
-}
-
 /// Starts a command and waits until it is in the middle of its motion: a press until it presses.
 fn caught(finger: &Served, arguments: &[&str], mode: &str) -> Child {
     finger.done(&["tare"]);
-    let file = finger.file("caught.mcap");
-    let out: &[&str] = if arguments[0] == "capture" { &[&file] } else { &[] };
-    let child = finger.start(&[arguments, out].concat());
+    let child = finger.start(&with_file(arguments, &finger.file("caught.mcap")));
     finger.until(mode);
     while mode == "Press:" && finger.true_force_n() < 0.5 {
         std::thread::sleep(Served::LOOK);
     }
     child
-}
-
-/// A finger that does not outrun its host on a loaded machine.
-pub fn patient(scene: &str) -> Served {
-    let finger = Served::begin(scene);
-    finger.command("patient on");
-    finger
 }
 
 pub fn is_at_rest(finger: &Served, what: &str) {
@@ -57,7 +41,7 @@ pub fn is_at_rest(finger: &Served, what: &str) {
 
 #[test]
 fn a_signal_leaves_every_motion_at_rest_and_clear_of_the_object() {
-    let finger = patient("wall");
+    let finger = Served::patient("wall");
     for (arguments, mode) in MOTIONS {
         for signal in [Signal::INT, Signal::TERM, Signal::HUP] {
             let what = format!("{arguments:?} {signal:?}");
@@ -69,16 +53,15 @@ fn a_signal_leaves_every_motion_at_rest_and_clear_of_the_object() {
                 most_n = most_n.max(finger.true_force_n());
                 std::thread::sleep(Served::LOOK);
             }
-            let output = child.wait_with_output().expect("it ends");
-            let said = String::from_utf8_lossy(&output.stderr).into_owned();
-            assert_eq!(output.status.code(), Some(130), "{what}: {said}");
+            let (code, said) = ended(&child.wait_with_output().expect("it ends"));
+            assert_eq!(code, Some(130), "{what}: {said}");
             assert!(said.contains("interrupted before its end; torque is off"), "{what}: {said}");
             assert!(finger.true_force_n() < RESIDUAL_N, "{what}: {}", finger.command("state"));
             is_at_rest(&finger, &what);
             assert!(most_n < CUT_SHORT_N, "{what}: {most_n} N after the signal");
             assert_eq!(finger.json(&["params", "get"]), parameters, "{what}");
             if ["Press:", "Strokes:"].contains(&mode) {
-                let ended = client(&finger).number(address::MEASURE_ENDED).expect("it answers");
+                let ended = finger.client().number(address::MEASURE_ENDED).expect("it answers");
                 assert_eq!(ended, Ended::Interrupted as i64, "{what}");
             }
         }
@@ -88,7 +71,7 @@ fn a_signal_leaves_every_motion_at_rest_and_clear_of_the_object() {
 /// The controller releases the object by itself once its bus is silent.
 #[test]
 fn a_killed_command_leaves_no_force_and_the_fault_of_the_watchdog() {
-    let finger = patient("wall");
+    let finger = Served::patient("wall");
     for (arguments, mode) in MOTIONS {
         let mut child = caught(&finger, arguments, mode);
         child.kill().expect("it runs");
@@ -133,7 +116,7 @@ fn with_file<'a>(arguments: &[&'a str], file: &'a str) -> Vec<&'a str> {
 
 /// Packets that a command sends from its beginning to its end.
 fn packets_of(arguments: &[&str]) -> u64 {
-    let finger = patient("wall");
+    let finger = Served::patient("wall");
     finger.done(&["tare"]);
     let begun = finger.heard();
     finger.done(&with_file(arguments, &finger.file("ended.mcap")));
@@ -142,10 +125,17 @@ fn packets_of(arguments: &[&str]) -> u64 {
 
 /// Ends a command behind a number of its packets, and judges the true force 1 s later.
 fn ends_without_force(arguments: &[&str], end: Option<Signal>, packets: u64) {
-    let finger = patient("wall");
+    let finger = Served::patient("wall");
     finger.done(&["tare"]);
-    let (begun, file) = (finger.heard(), finger.file("ended.mcap"));
-    let mut arguments = with_file(arguments, &file);
+    end_behind(&finger, packets, &with_file(arguments, &finger.file("ended.mcap")), end);
+    let state = finger.command("state");
+    assert!(finger.true_force_n() < RESIDUAL_N, "{arguments:?} {end:?} after {packets} packets: {state}");
+}
+
+/// Ends a command behind a number of its packets by a signal, or by a cable that is pulled out; then 1 s goes by.
+pub fn end_behind(finger: &Served, packets: u64, arguments: &[&str], end: Option<Signal>) {
+    let begun = finger.heard();
+    let mut arguments = arguments.to_vec();
     if end.is_none() {
         finger.command(&format!("deaf after {packets} for {}", u64::MAX));
         arguments.extend(["--timeout-ms", "100"]);
@@ -163,16 +153,11 @@ fn ends_without_force(arguments: &[&str], end: Option<Signal>, packets: u64) {
     while finger.now_s() < ended_s + 1.0 {
         finger.command("state");
     }
-    assert!(
-        finger.true_force_n() < RESIDUAL_N,
-        "{arguments:?} {end:?} after {packets} packets: {}",
-        finger.command("state")
-    );
 }
 
 #[test]
 fn stop_stops_every_mode() {
-    let finger = patient("wall");
+    let finger = Served::patient("wall");
     let press: &[(u16, i64)] = &[(address::TORQUE_ENABLE, 1), (address::GOAL_FORCE_MN, 1_000)];
     for (writes, mode) in [
         (&[][..], "Off:"),
@@ -182,12 +167,7 @@ fn stop_stops_every_mode() {
         (&[(address::MEASURE, 2)], "Strokes:"),
     ] {
         finger.done(&["tare"]);
-        let mut bus = client(&finger);
-        bus.set(address::BUS_WATCHDOG, 100).expect("it obeys");
-        for (register, value) in writes {
-            bus.set(*register, *value).expect("it obeys");
-        }
-        drop(bus);
+        finger.set(&[&[(address::BUS_WATCHDOG, 100)], writes].concat());
         finger.until_alone(mode);
         let stopped = finger.json(&["stop"]);
         assert_eq!((&stopped["mode"], &stopped["at_rest"]), (&"off".into(), &true.into()), "{mode} {stopped}");
@@ -199,12 +179,9 @@ fn stop_stops_every_mode() {
 
 #[test]
 fn stop_works_in_a_fault_and_on_a_line_that_loses_packets() {
-    let finger = patient("wall");
+    let finger = Served::patient("wall");
     finger.done(&["tare"]);
-    let mut bus = client(&finger);
-    bus.set(address::TORQUE_ENABLE, 1).expect("it obeys");
-    bus.set(address::GOAL_FORCE_MN, 1_000).expect("it obeys");
-    drop(bus);
+    finger.set(&[(address::TORQUE_ENABLE, 1), (address::GOAL_FORCE_MN, 1_000)]);
     finger.until_alone("Force:");
     finger.command("deaf after 0 for 2");
     let said = finger.done(&["--timeout-ms", "1000", "stop"]);
@@ -212,7 +189,7 @@ fn stop_works_in_a_fault_and_on_a_line_that_loses_packets() {
     is_at_rest(&finger, "lost packets");
 
     finger.command("fault supply-low");
-    client(&finger).set(address::TORQUE_ENABLE, 1).expect("it obeys");
+    finger.set(&[(address::TORQUE_ENABLE, 1)]);
     finger.until_alone("SupplyLow");
     let said = finger.done(&["stop"]);
     assert!(said.contains("fault 9 (supply low) remains: `fingertip recover`"), "{said}");
@@ -234,11 +211,11 @@ fn stop_says_that_a_port_is_busy() {
 
 #[test]
 fn one_packet_stops_all_fingers() {
-    let finger = patient("grasp");
+    let finger = Served::patient("grasp");
     let both = |word: &str| finger.command("state").matches(word).count() == 2;
     let press = || {
         for id in [1, 2] {
-            let mut bus = client(&finger);
+            let mut bus = finger.client();
             bus.id = id;
             bus.set(address::TARE, 1).expect("it obeys");
             while bus.number(address::TARE_STATE).expect("it answers") != 2 {}

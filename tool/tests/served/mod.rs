@@ -4,12 +4,15 @@
 use fingertip::link::Reply;
 use fingertip::link::packet::instruction::REBOOT;
 use fingertip::link::packet::{self, BROADCAST};
+use fingertip_cli::Client;
+use fingertip_cli::client::Reach;
 use rustix::process::Signal;
 use serve::native::Native;
 use serve::{Place, Port, Stop};
 use sim::effects::Named;
 use sim::native::served::Bus;
 use std::cell::RefCell;
+use std::io::{BufRead as _, BufReader, Read};
 use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -31,6 +34,12 @@ pub struct Served {
 struct Told {
     native: Native<Named>,
     commands: Receiver<(String, Sender<Result<String, String>>)>,
+    line: Line,
+}
+
+/// The way of packets to a finger.
+#[derive(Default)]
+struct Line {
     /// Packets until it stops receiving, packets that it misses then, and packets that came.
     ears: Option<(u64, u64, u64)>,
     /// An instruction to all that comes as soon as the finger's state has this word.
@@ -55,44 +64,22 @@ impl Told {
     fn told(&mut self, command: &str) -> Option<Result<String, String>> {
         let words: Vec<&str> = command.split_whitespace().collect();
         let number = |text: &str| text.parse().expect("a number");
+        let line = &mut self.line;
         match words[..] {
             // As another host on the bus would.
-            ["raw", instruction_number] => {
-                self.native.0.hear(&instruction(number(instruction_number) as u8));
-                Some(Ok(String::new()))
-            }
-            ["trap", word, instruction_number] => {
-                self.trap = Some((word.into(), number(instruction_number) as u8));
-                Some(Ok(String::new()))
-            }
-            ["restart", "after", packets] => {
-                self.restart = Some(number(packets));
-                Some(Ok(String::new()))
-            }
-            ["patient", patient] => {
-                self.patient = patient == "on";
-                Some(Ok(String::new()))
-            }
-            ["restarted"] => Some(Ok(self.restart.is_none().to_string())),
-            ["deaf", "after", packets, "for", lost] => {
-                self.ears = Some((number(packets), number(lost), 0));
-                Some(Ok(String::new()))
-            }
-            ["deaf", "no", "more"] => {
-                self.ears = None;
-                Some(Ok(String::new()))
-            }
-            ["stall"] => {
-                self.stalled = Some(Vec::new());
-                Some(Ok(String::new()))
-            }
-            ["go", "on"] => {
-                self.stalled.take().into_iter().flatten().for_each(|bytes| self.native.0.hear(&bytes));
-                Some(Ok(String::new()))
-            }
-            ["unheard"] => Some(Ok(self.ears.map_or(0, |(.., unheard)| unheard).to_string())),
-            _ => None,
+            ["raw", instruction_number] => self.native.0.hear(&instruction(number(instruction_number) as u8)),
+            ["trap", word, instruction_number] => line.trap = Some((word.into(), number(instruction_number) as u8)),
+            ["restart", "after", packets] => line.restart = Some(number(packets)),
+            ["patient", patient] => line.patient = patient == "on",
+            ["deaf", "after", packets, "for", lost] => line.ears = Some((number(packets), number(lost), 0)),
+            ["deaf", "no", "more"] => line.ears = None,
+            ["stall"] => line.stalled = Some(Vec::new()),
+            ["go", "on"] => line.stalled.take().into_iter().flatten().for_each(|bytes| self.native.0.hear(&bytes)),
+            ["restarted"] => return Some(Ok(line.restart.is_none().to_string())),
+            ["unheard"] => return Some(Ok(line.ears.map_or(0, |(.., unheard)| unheard).to_string())),
+            _ => return None,
         }
+        Some(Ok(String::new()))
     }
 }
 
@@ -109,7 +96,7 @@ impl serve::Finger for Told {
             let look = match command.as_str() {
                 "look" => Some(self.native.command("state")),
                 "now" => Some(Ok(self.now_s().to_string())),
-                "heard" => Some(Ok(self.heard.to_string())),
+                "heard" => Some(Ok(self.line.heard.to_string())),
                 _ => None,
             };
             if let Some(look) = look {
@@ -121,23 +108,23 @@ impl serve::Finger for Told {
             (0..20).for_each(|_| self.native.0.frame());
             answer.send(done).expect("somebody waits for it");
         }
-        if let Some((_, number)) =
-            self.trap.take_if(|(word, _)| self.native.command("state").is_ok_and(|state| state.contains(word.as_str())))
-        {
+        let mut in_state = |word: &str| self.native.command("state").is_ok_and(|state| state.contains(word));
+        if let Some((_, number)) = self.line.trap.take_if(|(word, _)| in_state(word)) {
             self.native.0.hear(&instruction(number));
         }
-        let last_s = if self.patient { self.heard_s + PATIENT_S } else { time_s };
+        let last_s = if self.line.patient { self.line.heard_s + PATIENT_S } else { time_s };
         self.native.run_until(time_s.min(last_s))
     }
 
     fn hear(&mut self, bytes: &[u8]) -> Result<(), Self::Error> {
-        if let Some(stalled) = &mut self.stalled {
+        let line = &mut self.line;
+        if let Some(stalled) = &mut line.stalled {
             stalled.push(bytes.to_vec());
             return Ok(());
         }
-        self.heard_s = self.native.now_s();
-        self.heard += 1;
-        if let Some((left, lost, unheard)) = &mut self.ears {
+        line.heard_s = self.native.now_s();
+        line.heard += 1;
+        if let Some((left, lost, unheard)) = &mut line.ears {
             if *left > 0 {
                 *left -= 1;
             } else if *unheard < *lost {
@@ -145,11 +132,11 @@ impl serve::Finger for Told {
                 return Ok(());
             }
         }
-        if self.restart.take_if(|left| *left == 0).is_some() {
+        if line.restart.take_if(|left| *left == 0).is_some() {
             self.native.0.hear(&instruction(REBOOT));
             (0..20).for_each(|_| self.native.0.frame());
         }
-        self.restart = self.restart.map(|left| left - 1);
+        line.restart = line.restart.map(|left| left - 1);
         self.native.hear(bytes)
     }
 
@@ -181,17 +168,7 @@ impl Served {
         let (commands, commanded) = channel();
         let thread = std::thread::spawn(move || {
             let native = Native(Bus::new(&scene).expect("a world"));
-            let mut told = Told {
-                native,
-                commands: commanded,
-                ears: None,
-                stalled: None,
-                trap: None,
-                restart: None,
-                patient: false,
-                heard_s: 0.0,
-                heard: 0,
-            };
+            let mut told = Told { native, commands: commanded, line: Line::default() };
             let served = serve::serve(&mut told, &mut port, Duration::from_secs(3600), false);
             served.map(drop).unwrap_or_else(|never| match never {});
         });
@@ -199,6 +176,24 @@ impl Served {
             std::env::temp_dir().join(format!("fingertip-cli-{}-{}", std::process::id(), name.replace('/', "-")));
         std::fs::create_dir_all(&folder).expect("a folder");
         Self { port: name, folder, stop, commands, thread: RefCell::new(Some(thread)) }
+    }
+
+    /// A finger that does not outrun its host on a loaded machine.
+    pub fn patient(scene: &str) -> Self {
+        let finger = Self::begin(scene);
+        finger.command("patient on");
+        finger
+    }
+
+    /// A client of its own.
+    pub fn client(&self) -> Client {
+        client(&self.port)
+    }
+
+    /// Writes registers of one number.
+    pub fn set(&self, values: &[(u16, i64)]) {
+        let mut client = self.client();
+        values.iter().for_each(|(register, value)| client.set(*register, *value).expect("it obeys"));
     }
 
     /// Has something done at its side.
@@ -275,6 +270,13 @@ impl Served {
         complained(&self.fingertip(arguments).output().expect("it starts"))
     }
 
+    /// Asserts that a command fails, and that its error has these words.
+    #[track_caller]
+    pub fn refuses(&self, arguments: &[&str], words: &[&str]) {
+        let said = self.refused(arguments);
+        assert!(words.iter().all(|word| said.contains(word)), "{arguments:?}: {said}");
+    }
+
     /// The same without a port.
     pub fn nobody(arguments: &[&str]) -> String {
         let mut command = Command::new(env!("CARGO_BIN_EXE_fingertip"));
@@ -283,13 +285,10 @@ impl Served {
 
     /// Error of a command line that is not understood.
     pub fn not_understood(arguments: &[&str]) -> String {
-        let output = Command::new(env!("CARGO_BIN_EXE_fingertip"))
-            .env("FINGERTIP_PORT", "/nowhere")
-            .args(arguments)
-            .output()
-            .expect("it starts");
-        let err = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {err}");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_fingertip"));
+        let (code, err) =
+            ended(&command.env("FINGERTIP_PORT", "/nowhere").args(arguments).output().expect("it starts"));
+        assert_eq!(code, Some(2), "{arguments:?}: {err}");
         err
     }
 
@@ -354,21 +353,49 @@ impl Drop for Served {
     }
 }
 
-/// An instruction to all devices without parameters; no device answers.
-fn instruction(number: u8) -> Vec<u8> {
+/// A client of a port whose answers come in the end.
+pub fn client(port: &str) -> Client {
+    let reach = Reach { port: Some(port.into()), baud: 1_000_000, ids: vec![1], timeout_ms: 600_000 };
+    Client::open(&reach).expect("it listens")
+}
+
+/// An instruction packet.
+pub fn packet(id: u8, instruction: u8, params: &[u8]) -> Vec<u8> {
     let mut packet = Reply::new();
-    packet::Sender::new(&mut packet, BROADCAST, number).finish();
+    let mut sender = packet::Sender::new(&mut packet, id, instruction);
+    params.iter().for_each(|byte| sender.push(*byte));
+    sender.finish();
     packet.to_vec()
 }
 
+/// An instruction to all devices without parameters; no device answers.
+fn instruction(number: u8) -> Vec<u8> {
+    packet(BROADCAST, number, &[])
+}
+
+/// Reads lines up to one with this text, which is returned; later ones are read and dropped, so that nothing blocks.
+pub fn line_with(text: &str, from: impl Read + Send + 'static) -> String {
+    let (mut reader, mut line) = (BufReader::new(from), String::new());
+    while !line.contains(text) {
+        line.clear();
+        assert!(reader.read_line(&mut line).expect("text") > 0, "no line with {text}");
+    }
+    std::thread::spawn(move || std::io::copy(&mut reader, &mut std::io::sink()));
+    line
+}
+
+/// Exit code of a command, and what it said on standard error.
+pub fn ended(output: &Output) -> (Option<i32>, String) {
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
 fn said(output: &Output) -> String {
-    let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-    assert!(output.status.success(), "{out}{err}");
-    out.into_owned()
+    assert!(output.status.success(), "{output:?}");
+    String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
 fn complained(output: &Output) -> String {
-    let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-    assert_eq!(output.status.code(), Some(1), "{out}{err}");
-    err.into_owned()
+    let (code, err) = ended(output);
+    assert_eq!(code, Some(1), "{output:?}");
+    err
 }

@@ -9,13 +9,8 @@ const STEPS: usize = 6;
 const DELAYED: usize = 2;
 pub const DELAY_S: f64 = FRAME_S * DELAYED as f64 / STEPS as f64;
 
-/// The share of the additional friction that is left at a speed of `r` Stribeck speeds.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Falls {
-    Lorentzian,
-    Gaussian,
-    Exponential,
-}
+/// Shares of the additional friction that may be left at a speed of `r` Stribeck speeds.
+const FALLS: [fn(f64) -> f64; 3] = [|r| 1.0 / (1.0 + r * r), |r| (-r * r).exp(), |r| (-r).exp()];
 
 #[derive(Clone, Debug)]
 pub struct SimulatedDrive {
@@ -27,7 +22,7 @@ pub struct SimulatedDrive {
     pub friction_nm: f64,
     pub stiction: f64,
     pub stribeck: f64,
-    pub falls: Falls,
+    pub falls: fn(f64) -> f64,
     pub gear_loss: f64,
     pub play_mm: f64,
     pub counts_per_turn: f64,
@@ -74,7 +69,7 @@ impl SimulatedDrive {
             friction_nm: uniform(rng, 0.03e-3, 0.25e-3),
             stiction: uniform(rng, 0.0, 0.5),
             stribeck: 5.0,
-            falls: Falls::Lorentzian,
+            falls: FALLS[0],
             gear_loss: uniform(rng, 0.05, 0.25),
             play_mm: uniform(rng, 0.0, 0.2),
             counts_per_turn: log_uniform(rng, 256.0, 4096.0).round(),
@@ -100,7 +95,7 @@ impl SimulatedDrive {
         Self {
             friction_nm: volts * drive.k / drive.ohm(),
             stribeck: log_uniform(rng, 2.0, 30.0),
-            falls: [Falls::Lorentzian, Falls::Gaussian, Falls::Exponential][rng.usize(..3)],
+            falls: FALLS[rng.usize(..3)],
             ..drive
         }
     }
@@ -138,8 +133,6 @@ pub struct Rig {
     supply_v: f64,
     /// Friction of this motion as a share of the mean.
     unrest: f64,
-    /// Time that went by.
-    pub time_s: f64,
     /// Largest distance from the start and largest force so far.
     pub travel_mm: f64,
     pub force_n: f64,
@@ -159,7 +152,6 @@ impl Rig {
             speed: 0.0,
             current: 0.0,
             unrest: 1.0,
-            time_s: 0.0,
             duty: 0.0,
             supply_v,
             travel_mm: 0.0,
@@ -177,7 +169,6 @@ impl Rig {
             self.unrest = 1.0 + self.drive.unrest * uniform(&mut self.rng, -1.0, 1.0);
         }
         self.duty = duty;
-        self.time_s += FRAME_S;
     }
 
     pub fn view(&mut self) -> RigReading {
@@ -198,11 +189,7 @@ impl Rig {
         self.supply_v = d.source_v - d.source_ohm * duty * self.current;
         let load = d.force_n(self.tip_mm) * 1e-3 / d.rad_per_mm;
         let r = self.speed.abs() / d.stribeck;
-        let share = match d.falls {
-            Falls::Lorentzian => 1.0 / (1.0 + r * r),
-            Falls::Gaussian => (-r * r).exp(),
-            Falls::Exponential => (-r).exp(),
-        };
+        let share = (d.falls)(r);
         let geared = (1.0 / (1.0 - d.gear_loss) - 1.0) * load;
         let rippled = 1.0 + d.ripple * (self.angle / d.period_rad * TAU).sin();
         let friction = d.friction_nm * rippled * self.unrest * (1.0 + d.stiction * share) + geared;

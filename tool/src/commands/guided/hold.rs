@@ -1,6 +1,6 @@
 //! Forces that are held on a scale, and a weight that lies on the tip.
 
-use super::{Run, Session};
+use super::{Procedure, Run};
 use crate::commands::moving::Moving;
 use crate::commands::{press, stopped};
 use crate::state::State;
@@ -24,49 +24,89 @@ const AVERAGED: Duration = Duration::from_millis(500);
 const NEAR: f64 = 0.05;
 const NEAR_MN: f64 = 20.0;
 const LOOK: Duration = Duration::from_millis(10);
-/// Step of the session.
-const STEP: &str = "holds";
+/// Steps of the session.
+pub const HOLDS: &str = "holds";
+pub const WEIGHT: &str = "weight";
 /// A weight on the tip: least force, and time to lay it there.
 const WEIGHT_MN: i64 = 100;
 const WEIGHT_WITHIN: Duration = Duration::from_secs(60);
 
-/// Reading of a held force.
-#[derive(Default)]
-struct Reading {
-    count: f64,
-    force_mn: f64,
-    pressures_pa: Vec<f64>,
-}
-
-impl Reading {
-    /// Adds a state; creep and temperature drift are taken off its force.
-    fn add(&mut self, client: &mut Client) -> Result<(), Error> {
-        let state = client.again(State::read_picture)?;
-        let creep_mn = client.again(|client| client.number(address::PRESENT_CREEP_MN))?;
-        let drift_mn = client.again(|client| client.number(address::PRESENT_DRIFT_MN))?;
-        self.count += 1.0;
-        self.force_mn += (state.force_mn - creep_mn - drift_mn) as f64;
-        self.pressures_pa.resize(state.pressures_pa.len(), 0.0);
-        self.pressures_pa.iter_mut().zip(state.pressures_pa).for_each(|(sum, one)| *sum += one as f64);
-        Ok(())
+impl Procedure<'_> {
+    /// Holds each force in turn. Before its reading the finger goes to the goals of [`SWINGS`] around it. The tip is at rest
+    /// and clear of the plate afterwards.
+    pub fn hold_all(&mut self, goals_mn: &[i64], shown_n: &[f64]) -> Result<(), Error> {
+        if self.session.steps.contains_key(HOLDS) {
+            return Ok(());
+        }
+        let moving = Moving::begin(self.client, &self.run.interrupt)?;
+        let held = hold(goals_mn, shown_n, &self.run, moving.client);
+        let held = moving.finish(held)?;
+        self.session.done(HOLDS, held.into())
     }
-}
 
-/// Holds each force in turn. Before its reading the finger goes to the goals of [`SWINGS`] around it. The tip is at rest and clear of the plate afterwards.
-pub fn all(
-    goals_mn: &[i64],
-    shown_n: &[f64],
-    session: &mut Session,
-    run: &Run<'_>,
-    client: &mut Client,
-) -> Result<(), Error> {
-    if session.step(STEP).is_some() {
-        return Ok(());
+    /// Shown and read forces. The controller read them with the gains before; `factors` are gains to write over gains before,
+    /// by which each taxel's part of the force changes. Numbers of the command line replace those of the session.
+    pub fn held(&self, factors: &[f64], shown_n: &[f64]) -> Vec<Held> {
+        let holds = self.session.numbers(HOLDS);
+        let replaced = |index: usize| shown_n.get(index).copied().filter(|_| shown_n.len() == holds.len());
+        let one = |(index, hold): (usize, &Value)| {
+            let pressures = hold["pressures_pa"].as_array()?.iter().filter_map(Value::as_f64);
+            let (mut sum, mut after) = (0.0, 0.0);
+            for (pressure, factor) in pressures.zip(factors) {
+                (sum, after) = (sum + pressure, after + pressure * factor);
+            }
+            let change = if sum > 0.0 { after / sum } else { 1.0 };
+            let shown_n = replaced(index).or(hold["shown_n"].as_f64())?;
+            Some(Held { shown_n, read_n: hold["read_n"].as_f64()? * change })
+        };
+        holds.iter().enumerate().filter_map(one).collect()
     }
-    let moving = Moving::begin(client, &run.interrupt)?;
-    let held = hold(goals_mn, shown_n, run, moving.client);
-    let held = moving.finish(held)?;
-    session.done(STEP, held.into())
+
+    /// Readings under a weight that a person lays on the tip, with torque off. A force that the loop holds would not do: the
+    /// loop keeps the reading constant, and creep would be in the force.
+    pub fn weight(&mut self, seconds: f64) -> Result<HeldSeries, Error> {
+        if !self.session.steps.contains_key(WEIGHT) {
+            self.run.report(format_args!(
+                "lay a weight of 50 to 500 g on the tip within 60 s, and leave it there for {seconds} s"
+            ));
+            if !self.force_within(|force_mn| force_mn >= WEIGHT_MN)? {
+                return Err("no weight of 100 mN was laid on the tip within 60 s: run without --creep-s".into());
+            }
+            let settled = Instant::now() + SETTLED;
+            self.force_within(|_| Instant::now() > settled)?;
+            let (begun, mut readings) = (Instant::now(), Vec::new());
+            while begun.elapsed().as_secs_f64() < seconds {
+                self.run.interrupt.check()?;
+                let force_mn = self.client.again(State::read)?.force_mn;
+                let time_s = begun.elapsed().as_secs_f64();
+                if force_mn < WEIGHT_MN / 2 {
+                    return Err(format!("the weight was taken off after {time_s:.1} s").into());
+                }
+                readings.push(json!([time_s, force_mn as f64 * 1e-3]));
+                std::thread::sleep(10 * LOOK);
+            }
+            self.session.done(WEIGHT, readings.into())?;
+            self.run.report("take the weight off the tip within 60 s");
+            if !self.force_within(|force_mn| force_mn < WEIGHT_MN / 2)? {
+                return Err("the weight still lies on the tip: take it off and run again".into());
+            }
+        }
+        let pair = |pair: &Value| Some([pair[0].as_f64()?, pair[1].as_f64()?]);
+        Ok(HeldSeries { readings: self.session.numbers(WEIGHT).iter().filter_map(pair).collect() })
+    }
+
+    /// Waits for a force on the tip, with torque off. Returns false if it does not come in time.
+    fn force_within(&mut self, wanted: impl Fn(i64) -> bool) -> Result<bool, Error> {
+        let until = Instant::now() + WEIGHT_WITHIN;
+        while !wanted(self.client.again(State::read)?.force_mn) {
+            self.run.interrupt.check()?;
+            if Instant::now() > until {
+                return Ok(false);
+            }
+            std::thread::sleep(LOOK);
+        }
+        Ok(true)
+    }
 }
 
 fn hold(goals_mn: &[i64], shown_n: &[f64], run: &Run<'_>, client: &mut Client) -> Result<Vec<Value>, Error> {
@@ -95,28 +135,30 @@ fn hold(goals_mn: &[i64], shown_n: &[f64], run: &Run<'_>, client: &mut Client) -
             Some(shown) => *shown,
             None => {
                 let question = format!("{goal_n} N are held: what does the scale show, in N (1 g is 0.00981 N)?");
-                run.ask.parsed(&question, "--shown-n", newtons, &mut || same_goal(*goal_mn, client))?
+                run.parsed(&question, "--shown-n", numbers::shown_n, &mut || same_goal(*goal_mn, client).map(drop))?
             }
         };
-        let (until, mut reading) = (Instant::now() + AVERAGED, Reading::default());
-        while Instant::now() < until || reading.count == 0.0 {
+        let until = Instant::now() + AVERAGED;
+        let (mut count, mut sum_mn, mut sums_pa) = (0.0, 0.0, Vec::new());
+        while Instant::now() < until || count == 0.0 {
             run.interrupt.check()?;
             same_goal(*goal_mn, client)?;
-            reading.add(client)?;
+            let state = client.again(State::read_picture)?;
+            // Creep and temperature drift are taken off the force.
+            let creep_mn = client.again(|client| client.number(address::PRESENT_CREEP_MN))?;
+            let drift_mn = client.again(|client| client.number(address::PRESENT_DRIFT_MN))?;
+            count += 1.0;
+            sum_mn += (state.force_mn - creep_mn - drift_mn) as f64;
+            sums_pa.resize(state.pressures_pa.len(), 0.0);
+            sums_pa.iter_mut().zip(state.pressures_pa).for_each(|(sum, pa)| *sum += pa as f64);
             std::thread::sleep(LOOK);
         }
-        let Reading { count, force_mn, pressures_pa } = reading;
-        let pressures: Vec<f64> = pressures_pa.iter().map(|sum| (sum / count).round()).collect();
+        let pressures: Vec<f64> = sums_pa.iter().map(|sum| (sum / count).round()).collect();
         held.push(json!({
-            "goal_n": goal_n, "shown_n": shown, "read_n": force_mn / count * 1e-3, "pressures_pa": pressures,
+            "goal_n": goal_n, "shown_n": shown, "read_n": sum_mn / count * 1e-3, "pressures_pa": pressures,
         }));
     }
     Ok(held)
-}
-
-/// A number in N.
-pub fn newtons(text: &str) -> Result<f64, String> {
-    numbers::shown_mn(text).map(|shown_mn| shown_mn as f64 * 1e-3)
 }
 
 /// Waits until the force has been held for a second.
@@ -124,7 +166,7 @@ fn reach(goal_mn: i64, run: &Run<'_>, client: &mut Client) -> Result<(), Error> 
     let (begun, mut near_since) = (Instant::now(), None);
     loop {
         run.interrupt.check()?;
-        let state = same_goal_state(goal_mn, client)?;
+        let state = same_goal(goal_mn, client)?;
         let tolerance_mn = (NEAR * goal_mn as f64).max(NEAR_MN);
         let near = state.mode == Mode::Force as i64 && ((state.force_mn - goal_mn) as f64).abs() <= tolerance_mn;
         near_since = if near { near_since.or(Some(Instant::now())) } else { None };
@@ -142,12 +184,8 @@ fn reach(goal_mn: i64, run: &Run<'_>, client: &mut Client) -> Result<(), Error> 
     }
 }
 
-fn same_goal(goal_mn: i64, client: &mut Client) -> Result<(), Error> {
-    same_goal_state(goal_mn, client).map(drop)
-}
-
-/// Fails in a fault, and where another program stopped the finger. Reading the state also feeds the bus watchdog.
-fn same_goal_state(goal_mn: i64, client: &mut Client) -> Result<State, Error> {
+/// The state. Fails in a fault, and where another program stopped the finger. Reading it also feeds the bus watchdog.
+fn same_goal(goal_mn: i64, client: &mut Client) -> Result<State, Error> {
     let state = client.again(State::read)?;
     if state.fault != 0 {
         return Err(stopped(state.fault));
@@ -156,76 +194,4 @@ fn same_goal_state(goal_mn: i64, client: &mut Client) -> Result<State, Error> {
         return Err("another program stopped the finger while the force was held".into());
     }
     Ok(state)
-}
-
-/// Shown and read forces. The controller read them with the gains before; `factors` are gains to write over gains before,
-/// by which each taxel's part of the force changes. Numbers of the command line replace those of the session.
-pub fn read(factors: &[f64], shown_n: &[f64], session: &Session) -> Vec<Held> {
-    let holds = session.step(STEP).and_then(Value::as_array).map(Vec::as_slice).unwrap_or_default();
-    let replaced = |index: usize| shown_n.get(index).copied().filter(|_| shown_n.len() == holds.len());
-    let one = |(index, hold): (usize, &Value)| {
-        let pressures = hold["pressures_pa"].as_array()?.iter().filter_map(Value::as_f64);
-        let (mut sum, mut after) = (0.0, 0.0);
-        for (pressure, factor) in pressures.zip(factors) {
-            (sum, after) = (sum + pressure, after + pressure * factor);
-        }
-        let change = if sum > 0.0 { after / sum } else { 1.0 };
-        let shown_n = replaced(index).or(hold["shown_n"].as_f64())?;
-        Some(Held { shown_n, read_n: hold["read_n"].as_f64()? * change })
-    };
-    holds.iter().enumerate().filter_map(one).collect()
-}
-
-/// Forgets what a scale showed, so that the next run holds again.
-pub fn forget(session: &mut Session) -> Result<(), Error> {
-    session.forget(STEP)
-}
-
-/// Waits for a force on the tip, with torque off. Returns false if it does not come in time.
-fn force_within(wanted: impl Fn(i64) -> bool, run: &Run<'_>, client: &mut Client) -> Result<bool, Error> {
-    let until = Instant::now() + WEIGHT_WITHIN;
-    while !wanted(client.again(State::read)?.force_mn) {
-        run.interrupt.check()?;
-        if Instant::now() > until {
-            return Ok(false);
-        }
-        std::thread::sleep(LOOK);
-    }
-    Ok(true)
-}
-
-/// Step of the session with a weight's readings.
-const WEIGHT: &str = "weight";
-
-/// Readings under a weight that a person lays on the tip, with torque off. A force that the loop holds would not do: the
-/// loop keeps the reading constant, and creep would be in the force.
-pub fn weight(seconds: f64, session: &mut Session, run: &Run<'_>, client: &mut Client) -> Result<HeldSeries, Error> {
-    if session.step(WEIGHT).is_none() {
-        run.report(format_args!(
-            "lay a weight of 50 to 500 g on the tip within 60 s, and leave it there for {seconds} s"
-        ));
-        if !force_within(|force_mn| force_mn >= WEIGHT_MN, run, client)? {
-            return Err("no weight of 100 mN was laid on the tip within 60 s: run without --creep-s".into());
-        }
-        let settled = Instant::now() + SETTLED;
-        force_within(|_| Instant::now() > settled, run, client)?;
-        let (begun, mut readings) = (Instant::now(), Vec::new());
-        while begun.elapsed().as_secs_f64() < seconds {
-            run.interrupt.check()?;
-            let force_mn = client.again(State::read)?.force_mn;
-            if force_mn < WEIGHT_MN / 2 {
-                return Err(format!("the weight was taken off after {:.1} s", begun.elapsed().as_secs_f64()).into());
-            }
-            readings.push(json!([begun.elapsed().as_secs_f64(), force_mn as f64 * 1e-3]));
-            std::thread::sleep(10 * LOOK);
-        }
-        session.done(WEIGHT, readings.into())?;
-        run.report("take the weight off the tip within 60 s");
-        if !force_within(|force_mn| force_mn < WEIGHT_MN / 2, run, client)? {
-            return Err("the weight still lies on the tip: take it off and run again".into());
-        }
-    }
-    let readings = session.step(WEIGHT).and_then(Value::as_array).map(Vec::as_slice).unwrap_or_default();
-    let pair = |pair: &Value| Some([pair[0].as_f64()?, pair[1].as_f64()?]);
-    Ok(HeldSeries { readings: readings.iter().filter_map(pair).collect() })
 }

@@ -14,10 +14,7 @@ const LOOK: Duration = Duration::from_millis(50);
 const TOPICS: [Topic; 2] = [Topic::Scalars, Topic::Image];
 
 /// Streams until Ctrl-C. Without a client the bus is not used.
-///
-/// # Errors
-/// The port is taken.
-pub(super) fn run(args: &Args, client: &mut Client) -> Result<(), Error> {
+pub fn run(args: &Args, client: &mut Client) -> Result<(), Error> {
     let interrupt = Interrupt::catch()?;
     let context = Context::new();
     let device = device(client)?;

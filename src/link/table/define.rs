@@ -2,7 +2,7 @@
 //!
 //! From a definition the macro makes addresses, documentation, reading and writing.
 
-use super::registers::{FIXED, address};
+use super::registers::{FIXED, Source, address};
 use super::{indirect, mirrors, pictures};
 use crate::params::Params;
 
@@ -12,6 +12,27 @@ macro_rules! count {
     };
     ($count:expr) => {
         $count as u16
+    };
+}
+
+macro_rules! unit {
+    () => {
+        ("", 1)
+    };
+    ($unit:literal) => {
+        ($unit, 1)
+    };
+    ($unit:literal $scale:literal) => {
+        ($unit, $scale)
+    };
+}
+
+macro_rules! range {
+    ($kind:ident) => {
+        Kind::$kind.range()
+    };
+    ($kind:ident $min:literal $max:literal) => {
+        ($min, $max)
     };
 }
 
@@ -25,8 +46,8 @@ macro_rules! optional {
 }
 
 macro_rules! control_table {
-    ($($(#[doc = $doc:literal])+ $address:literal $name:ident: $kind:ident $([$count:expr])? $access:ident,
-       $unit:literal * $scale:literal, $min:literal to $max:literal $(= $default:expr)?,
+    ($($(#[doc = $doc:literal])+ $address:literal $name:ident: $kind:ident $([$count:expr])? $access:ident
+       $($unit:literal $(* $scale:literal)?)? $(in $min:literal..=$max:literal)? $(= $default:expr)?,
        $get:expr $(, $set:expr)?;)*) => {
         /// Address of each register.
         pub mod address {
@@ -35,35 +56,39 @@ macro_rules! control_table {
             pub const PARAMS: u16 = 512;
         }
 
-        pub(super) const FIXED: &[Register] = &[$(Register {
-            name: stringify!($name),
-            address: $address,
-            kind: Kind::$kind,
-            count: count!($($count)?),
-            access: Access::$access,
-            unit: $unit,
-            scale: $scale,
-            min: $min,
-            max: $max,
-            default: optional!($($default)?),
-            doc: concat!($($doc),+),
-        }),*];
+        /// Value that a register reads and writes.
+        #[expect(non_camel_case_types, clippy::upper_case_acronyms, reason = "the registers' names")]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub(in crate::link) enum Source {
+            $($name,)*
+            Params,
+            /// Addresses of the indirect data from this place on.
+            Addresses(u8),
+            /// Indirect data from this place on.
+            Data(u8),
+            Pressures,
+            RawCodes,
+            TareCodes,
+            Gains,
+        }
 
-        pub(super) static CELLS: [Cell; FIXED.len()] = [
-            $(Cell {
+        pub(super) const FIXED: &[Register] = &[$({
+            let ((unit, scale), (min, max)) = (unit!($($unit $($scale)?)?), range!($kind $($min $max)?));
+            Register {
+                name: stringify!($name),
                 address: $address,
-                of: $address,
                 kind: Kind::$kind,
                 count: count!($($count)?),
                 access: Access::$access,
-            }),*
-        ];
-
-        /// End of the registers.
-        pub(super) const END: u16 = {
-            let last = &FIXED[FIXED.len() - 1];
-            last.address + last.kind.width() * last.count
-        };
+                unit,
+                scale,
+                min,
+                max,
+                default: optional!($($default)?),
+                doc: concat!($($doc),+),
+                source: Source::$name,
+            }
+        }),*];
 
         /// The register that begins at an address.
         pub(super) const fn fixed(address: u16) -> Register {
@@ -74,36 +99,33 @@ macro_rules! control_table {
             FIXED[place]
         }
 
-        /// The value of an element, as its low bytes; 0 where there is no such register.
-        pub(super) fn get<const ROWS: usize, const COLUMNS: usize>(
-            view: TableView<'_, ROWS, COLUMNS>,
-            address: u16,
-            element: usize,
-        ) -> u32 {
-            match address {
-                $($address => {
-                    let get: fn(TableView<'_, ROWS, COLUMNS>, usize) -> u32 = $get;
-                    get(view, element)
-                })*
-                _ => super::pictures::get(view, address, element),
+        impl<const ROWS: usize, const COLUMNS: usize> TableView<'_, ROWS, COLUMNS> {
+            /// Returns the low bytes of an element of a register.
+            pub(super) fn register(&self, source: Source, element: usize) -> u32 {
+                match source {
+                    $(Source::$name => {
+                        let get: fn(&Self, usize) -> u32 = $get;
+                        get(self, element)
+                    })*
+                    _ => self.picture(source, element),
+                }
             }
         }
 
-        /// Sets a register that can be written.
-        pub(super) fn set<const ROWS: usize, const COLUMNS: usize>(
-            staged: &mut Staged<ROWS, COLUMNS>,
-            address: u16,
-            value: i64,
-        ) -> Result<(), StatusError> {
-            match address {
-                $($($address => {
-                    if !($min..=$max).contains(&value) {
-                        return Err(StatusError::Range);
-                    }
-                    let set: fn(&mut Staged<ROWS, COLUMNS>, i64) -> Result<(), StatusError> = $set;
-                    set(staged, value)
-                })?)*
-                _ => Err(StatusError::Access),
+        impl<const ROWS: usize, const COLUMNS: usize> Staged<'_, ROWS, COLUMNS> {
+            /// Sets a register that can be written.
+            pub(super) fn set_register(&mut self, source: Source, value: i64) -> Result<(), StatusError> {
+                match source {
+                    $($(Source::$name => {
+                        let Register { min, max, .. } = const { fixed($address) };
+                        if !(min..=max).contains(&value) {
+                            return Err(StatusError::Range);
+                        }
+                        let set: fn(&mut Self, i64) -> Result<(), StatusError> = $set;
+                        set(self, value)
+                    })?)*
+                    _ => Err(StatusError::Access),
+                }
             }
         }
     };
@@ -151,6 +173,18 @@ impl Kind {
         }
     }
 
+    /// Least and largest number.
+    pub(super) const fn range(self) -> (i64, i64) {
+        match self {
+            Self::U8 => (0, u8::MAX as i64),
+            Self::I8 => (i8::MIN as i64, i8::MAX as i64),
+            Self::U16 => (0, u16::MAX as i64),
+            Self::I16 => (i16::MIN as i64, i16::MAX as i64),
+            Self::U32 => (0, u32::MAX as i64),
+            Self::I32 => (i32::MIN as i64, i32::MAX as i64),
+        }
+    }
+
     /// The number that `bytes` make, or none where there are not enough of them.
     pub(super) fn decode(self, bytes: &[u8]) -> Option<i64> {
         Some(match self {
@@ -189,6 +223,7 @@ pub struct Register {
     pub default: Option<i64>,
     /// Meaning of the register.
     pub doc: &'static str,
+    pub(in crate::link) source: Source,
 }
 
 impl Register {
@@ -247,6 +282,7 @@ const fn params() -> [Register; Params::COUNT] {
             max: max as i64,
             default: Some(default as i64),
             doc: Params::DOCS[place],
+            source: Source::Params,
         };
         place += 1;
     }

@@ -214,6 +214,8 @@ pub struct Head<const ROWS: usize, const COLUMNS: usize> {
 
 /// First bytes of a capture.
 pub const MAGIC: [u8; 4] = [b'F', b'T', b'C', VERSION];
+/// Number of words before those that make the digest's initial value.
+const SEEDED_FROM: usize = 7;
 /// Number of bytes before the parameters.
 const FIXED: usize = 40 + 4 * WINDING_WORDS;
 
@@ -239,30 +241,24 @@ impl<const ROWS: usize, const COLUMNS: usize> Head<ROWS, COLUMNS> {
 
     /// Initial value of the digest of the steps: the digest of the state before the first one.
     pub fn seed(&self) -> u32 {
-        let first = [self.missed_frames, self.taken.word(), self.frame_ns];
+        digest_words(LAYOUT, self.words().skip(SEEDED_FROM))
+    }
+
+    fn words(&self) -> impl Iterator<Item = u32> {
+        let shape = u32::from_le_bytes([ROWS as u8, COLUMNS as u8, self.ended as u8, 0]);
+        let counts = [self.frames, self.bits, self.digest, self.check, self.missed_frames];
         let params = self.params.to_array().map(i32::cast_unsigned);
-        let gains = (0..Gains::<ROWS, COLUMNS>::WORDS).map(|word| self.gains.word(word));
-        digest_words(LAYOUT, first.into_iter().chain(self.winding).chain(params).chain(gains))
+        [u32::from_le_bytes(MAGIC), shape, LAYOUT]
+            .into_iter()
+            .chain(counts)
+            .chain([self.taken.word(), self.frame_ns])
+            .chain(self.winding)
+            .chain(params)
+            .chain((0..Gains::<ROWS, COLUMNS>::WORDS).map(|word| self.gains.word(word)))
     }
 
     fn write(&self, bytes: &mut [u8]) {
-        let mut rest = bytes;
-        let mut put = |word: [u8; 4]| {
-            if let Some((place, after)) = core::mem::take(&mut rest).split_first_chunk_mut() {
-                *place = word;
-                rest = after;
-            }
-        };
-        put(MAGIC);
-        put([ROWS as u8, COLUMNS as u8, self.ended as u8, 0]);
-        for word in [LAYOUT, self.frames, self.bits, self.digest, self.check, self.missed_frames] {
-            put(word.to_le_bytes());
-        }
-        put(self.taken.word().to_le_bytes());
-        put(self.frame_ns.to_le_bytes());
-        self.winding.iter().for_each(|word| put(word.to_le_bytes()));
-        self.params.to_array().iter().for_each(|value| put(value.to_le_bytes()));
-        (0..Gains::<ROWS, COLUMNS>::WORDS).for_each(|word| put(self.gains.word(word).to_le_bytes()));
+        bytes.as_chunks_mut().0.iter_mut().zip(self.words()).for_each(|(to, word)| *to = word.to_le_bytes());
     }
 
     /// Completes a written head with the reason of the end, frames, bits, digest and check sum.

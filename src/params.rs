@@ -48,9 +48,6 @@ macro_rules! params {
             pub const DEFAULT: Self = Self { $($name: $default,)* };
 
             /// Refuses the first parameter that is out of its range.
-            ///
-            /// # Errors
-            /// Names the parameter, its value and its range.
             pub fn check(&self) -> Result<(), ParamError> {
                 let mut all = Self::RANGES.iter().zip(self.to_array());
                 match all.find(|&(&(_, _, min, max), value)| value < min || value > max) {

@@ -90,12 +90,6 @@ impl<const ROWS: usize, const COLUMNS: usize> Record<ROWS, COLUMNS> {
     };
 }
 
-impl<const ROWS: usize, const COLUMNS: usize> Default for Record<ROWS, COLUMNS> {
-    fn default() -> Self {
-        Self::DEFAULT
-    }
-}
-
 /// Number of values before the parameters.
 const HEAD_COUNT: usize = 4;
 /// Number of values of this firmware without the gains.
@@ -123,6 +117,11 @@ const fn numbers() -> [u32; COUNT] {
     while place < COUNT {
         let name = if place < HEAD_COUNT { HEAD[place].0 } else { Params::RANGES[place - HEAD_COUNT].0 };
         numbers[place] = number(name);
+        let mut other = 0;
+        while other < place {
+            assert!(numbers[other] != numbers[place], "two names have the same number: rename one");
+            other += 1;
+        }
         place += 1;
     }
     numbers
@@ -151,19 +150,6 @@ const fn gains_stand_apart(rows: usize, columns: usize) -> bool {
     }
     true
 }
-
-const _: () = {
-    let numbers = numbers();
-    let mut one = 0;
-    while one < COUNT {
-        let mut other = 0;
-        while other < one {
-            assert!(numbers[one] != numbers[other], "two names have the same number: rename one");
-            other += 1;
-        }
-        one += 1;
-    }
-};
 
 /// Returns name, least and largest value of the value in a place.
 fn range(place: usize) -> (&'static str, i32, i32) {
@@ -411,13 +397,4 @@ fn read_record(bytes: &[u8]) -> Option<Found<'_>> {
     let whole = check.first_chunk() == Some(&CRC.checksum(body).to_le_bytes());
     let values = values.as_chunks().0;
     whole.then_some(Found { sequence: u32::from_le_bytes(sequence), bytes: slot_bytes(count), values })
-}
-
-/// Returns the end of the used part of a sector: all behind it is blank.
-fn end_of_records(sector: &[u8]) -> usize {
-    let used = sector.chunks_exact(GRID).rposition(|chunk| {
-        let (words, _) = chunk.as_chunks::<4>();
-        words.iter().any(|word| *word != [BLANK; 4])
-    });
-    used.map_or(0, |place| (place + 1) * GRID)
 }

@@ -32,12 +32,6 @@ pub struct Capture<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> 
     bytes: [u8; BYTES],
 }
 
-impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Default for Capture<ROWS, COLUMNS, BYTES> {
-    fn default() -> Self {
-        Self::NEW
-    }
-}
-
 impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, COLUMNS, BYTES> {
     /// Capture before any request. All its bytes are zero.
     pub const NEW: Self = Self {

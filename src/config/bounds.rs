@@ -51,24 +51,26 @@ pub struct Bounds {
     pub change_unsure: i32,
 }
 
-/// Constants of frame, encoder and motor from the configuration.
-pub(crate) struct Drives {
+/// Constants of frame, encoder and motor.
+pub(super) struct Drive {
     pub frame_s: f32,
     pub mm_per_count: f32,
-    /// The motor's inertia at the tip, kg.
-    pub mass: f32,
-    /// g V_max, mm/s^2.
-    pub driven: f32,
+    /// The motor's inertia at the tip.
+    pub mass_kg: f32,
+    /// c.
+    pub damping_per_s: f32,
+    /// g V_max.
+    pub voltage_max_mm_per_s2: f32,
 }
 
 impl Bounds {
-    pub(crate) fn new(p: &Params, tip: &Tip, drives: &Drives) -> Self {
-        let Drives { frame_s, mm_per_count, mass, driven } = *drives;
+    pub(super) fn new(p: &Params, tip: &Tip, drive: &Drive) -> Self {
+        let Drive { frame_s, mm_per_count, mass_kg, voltage_max_mm_per_s2, .. } = *drive;
         let tau_s = (TAU_S * (mm_per_count / COUNT_MM).max(1.0).min(LONGER)).max(TAU_FRAMES * frame_s);
         let friction_n = 1e-6 * p.friction_unm as f32 * p.reduction_mrad_per_mm as f32;
-        let change_per_n = 1e3 / mass * tau_s;
+        let change_per_n = 1e3 / mass_kg * tau_s;
         let (count, rubbed) = (mm_per_count / tau_s, friction_n * change_per_n);
-        let change_least = (0.25 * driven * tau_s).min(CHANGE).max(RUBBED * rubbed) + COUNTS * count;
+        let change_least = (0.25 * voltage_max_mm_per_s2 * tau_s).min(CHANGE).max(RUBBED * rubbed) + COUNTS * count;
         let change_free = VARIES * rubbed + 0.25 * COUNTS * count + OFF;
         let deepest = tip.indentation(newtons(p.force_max_mn));
         Self {
@@ -77,7 +79,7 @@ impl Bounds {
             speed_any: speed(p.speed_max_um_per_s + p.speed_max_um_per_s / 2),
             frames_per_s: (1.0 / frame_s) as i32,
             leak: narrow(frame_s / tau_s * exp2(16)),
-            acceleration_per_n: narrow(1e3 / mass * exp2(8)),
+            acceleration_per_n: narrow(1e3 / mass_kg * exp2(8)),
             change_per_n: narrow(change_per_n * exp2(16)),
             change_least: narrow(change_least * exp2(16)),
             change_free: narrow(change_free * exp2(16)),
@@ -185,17 +187,9 @@ pub struct Motions {
     um_per_count_q16: i64,
 }
 
-/// Constants of frame, encoder and motor from the configuration.
-pub(crate) struct Driven {
-    pub frame_s: f32,
-    pub mm_per_count: f32,
-    /// c, 1/s.
-    pub damping: f32,
-}
-
 impl Motions {
-    pub(crate) fn new(p: &Params, driven: &Driven) -> Self {
-        let Driven { frame_s, mm_per_count, damping } = *driven;
+    pub(super) fn new(p: &Params, drive: &Drive) -> Self {
+        let Drive { frame_s, mm_per_count, damping_per_s, .. } = *drive;
         let counts = |mm: f32| (mm / mm_per_count).clamp(4.0, COUNTS_MAX) as i32;
         let frames = |s: f32| (s / frame_s).max(2.0) as u32;
         let microvolts = |uv: f32| uv.clamp(1.0, UV_MAX) as i32;
@@ -204,7 +198,7 @@ impl Motions {
         let uv_s_per_mm = k * rad_per_mm;
         let uv_per_newton = p.resistance_mohm as f32 * 1e6 / uv_s_per_mm;
         let approach = p.approach_um_per_s as f32 * 1e-3;
-        let fastest_uv = uv_s_per_mm * SPEED_MM_PER_S.min(ROLL_MM * damping).min(approach);
+        let fastest_uv = uv_s_per_mm * SPEED_MM_PER_S.min(ROLL_MM * damping_per_s).min(approach);
         let span_part = frames(SPAN_S / SPAN_PARTS as f32).max(1);
         let span_s = span_part as f32 * SPAN_PARTS as f32 * frame_s;
         let push_mm_per_s = PUSH_MN as f32 * 1e-3 * uv_per_newton / uv_s_per_mm;
@@ -225,7 +219,7 @@ impl Motions {
             span_part,
             push: counts(push_mm_per_s * span_s),
             push_mn: PUSH_MN,
-            roll_q8: narrow(ROLL / damping / (span_s / 4.0) * 256.0),
+            roll_q8: narrow(ROLL / damping_per_s / (span_s / 4.0) * 256.0),
             still: frames(STILL_S),
             rest: frames(REST_S),
             longest: frames(STROKE_S),

@@ -85,12 +85,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Staged<'_, ROWS, COLUMNS> {
         self.settings.command.torque || self.strokes()
     }
 
-    /// Refuses settings that no register's own range can refuse, and requests that cannot be carried out.
-    ///
-    /// # Errors
-    /// A parameter out of its range, parameters that contradict each other, or a goal beyond the largest force. A goal
-    /// above 0 in a fault, which releases the object. A tare in a fault that is not cleared. A press without torque or
-    /// tare. A jog or strokes with torque, in a fault or without a tare. A save while the loop drives, is about to or
+    /// Refuses settings that no register's own range can refuse, and requests that cannot be carried out: a goal above
+    /// 0 in a fault, which releases the object; a tare in a fault that is not cleared; a press without torque or tare;
+    /// a jog or strokes with torque, in a fault or without a tare; and a save while the loop drives, is about to or
     /// tares, when it must not wait for the flash.
     pub fn check(&self, before: &Settings<ROWS, COLUMNS>) -> Result<(), StatusError> {
         let Settings { record, command, .. } = &self.settings;

@@ -126,7 +126,7 @@ pub enum Event {
 }
 
 /// Finds packets in a stream of bytes.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Receiver {
     /// The last four bytes as they came.
     window: u32,
@@ -143,30 +143,20 @@ pub struct Receiver {
     crc: u16,
     crc_low: u8,
     params: Vec<u8, PARAMS_MAX>,
-    complete: bool,
+    /// True if parameters did not fit.
+    cut: bool,
 }
 
 impl Receiver {
     /// Creates a receiver.
-    pub const fn new() -> Self {
-        Self {
-            window: 0,
-            place: None,
-            end: 0,
-            stray: 0,
-            shared: 0,
-            head: [0; 4],
-            crc: CRC_START,
-            crc_low: 0,
-            params: Vec::new(),
-            complete: true,
-        }
+    pub fn new() -> Self {
+        Self::default()
     }
 
     /// Packet of the last event; valid until the next byte.
     pub fn packet(&self) -> Packet<'_> {
         let [id, _, _, instruction] = self.head;
-        Packet { id, instruction, params: &self.params, complete: self.complete }
+        Packet { id, instruction, params: &self.params, complete: !self.cut }
     }
 
     /// Takes one byte.
@@ -202,7 +192,7 @@ impl Receiver {
                 *slot = byte;
                 self.check_head(place);
             }
-            None if !stuffing => self.complete &= self.params.push(byte).is_ok(),
+            None if !stuffing => self.cut |= self.params.push(byte).is_err(),
             None => {}
         }
         None
@@ -221,7 +211,7 @@ impl Receiver {
         self.shared = 0;
         self.crc = update_crc(CRC_START, &HEADER);
         self.params.clear();
-        self.complete = true;
+        self.cut = false;
         (self.place, self.end) = (Some(0), u16::MAX);
     }
 
@@ -250,12 +240,6 @@ impl Receiver {
             return Event::Framing;
         }
         Event::BadCrc
-    }
-}
-
-impl Default for Receiver {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

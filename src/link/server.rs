@@ -44,19 +44,13 @@ impl Counters {
     }
 }
 
-/// A write that waits for its Action.
-#[derive(Clone, Debug)]
-pub(super) struct Registered {
-    address: u16,
-    data: Vec<u8, REG_WRITE_MAX>,
-}
-
 /// State of the device.
 #[derive(Clone, Debug)]
 pub(super) struct Device<const ROWS: usize, const COLUMNS: usize> {
     pub settings: Settings<ROWS, COLUMNS>,
     pub counters: Counters,
-    pub registered: Option<Registered>,
+    /// Address and data of a write that waits for its Action.
+    pub registered: Option<(u16, Vec<u8, REG_WRITE_MAX>)>,
     /// Actions that wait for the firmware.
     pub actions: Actions,
     turn: Turn,

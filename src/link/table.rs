@@ -75,10 +75,7 @@ impl Cell {
         self.address + self.kind.width() * self.count
     }
 
-    /// Returns the cell that a byte belongs to.
-    ///
-    /// # Errors
-    /// The byte is in a gap, which ends at this address.
+    /// Returns the cell that a byte belongs to, or the end of the gap that contains it.
     fn at<const ROWS: usize, const COLUMNS: usize>(address: u16) -> Result<Self, u16> {
         let cells = const { &cells::<ROWS, COLUMNS>() };
         let (before, after) = cells.split_at(cells.partition_point(|cell| cell.address <= address));
@@ -115,10 +112,7 @@ pub(super) struct Staged<'a, const ROWS: usize, const COLUMNS: usize> {
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Staged<'_, ROWS, COLUMNS> {
-    /// Writes whole registers side by side.
-    ///
-    /// # Errors
-    /// Reason to refuse the first register that is invalid; the copy must then be dropped.
+    /// Writes whole registers side by side. After an error the copy must be dropped.
     pub fn write(&mut self, address: u16, data: &[u8]) -> Result<(), StatusError> {
         if data.is_empty() {
             return Err(StatusError::Length);

@@ -1,7 +1,7 @@
 //! Execution of each instruction.
 
 use super::answer::{Request, Shared, Turn};
-use super::{Device, Exchange, Registered};
+use super::{Device, Exchange};
 use crate::link::packet::{BROADCAST, Packet, Sender, StatusError, instruction};
 use crate::link::settings::Saved;
 use crate::link::table::{Staged, TableView, address};
@@ -48,7 +48,7 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> Exchange<'a, ROWS, COLUMNS> {
             instruction::WRITE => word(params).and_then(|(address, data)| self.write(address, data)),
             instruction::REG_WRITE => self.register(params),
             instruction::ACTION => match self.state.registered.take() {
-                Some(registered) => self.write(registered.address, &registered.data),
+                Some((address, data)) => self.write(address, &data),
                 None => Err(StatusError::Result),
             },
             instruction::FACTORY_RESET => self.factory_reset(params, own),
@@ -116,8 +116,7 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> Exchange<'a, ROWS, COLUMNS> {
         let mut staged = self.staged();
         staged.write(address, data)?;
         staged.check(&self.state.settings)?;
-        let data = Vec::from_slice(data).map_err(|_| StatusError::Length)?;
-        self.state.registered = Some(Registered { address, data });
+        self.state.registered = Some((address, Vec::from_slice(data).map_err(|_| StatusError::Length)?));
         Ok(())
     }
 

@@ -6,45 +6,6 @@ use super::registers::{FIXED, Source, address};
 use super::{indirect, mirrors, pictures};
 use crate::params::Params;
 
-macro_rules! count {
-    () => {
-        1
-    };
-    ($count:expr) => {
-        $count as u16
-    };
-}
-
-macro_rules! unit {
-    () => {
-        ("", 1)
-    };
-    ($unit:literal) => {
-        ($unit, 1)
-    };
-    ($unit:literal $scale:literal) => {
-        ($unit, $scale)
-    };
-}
-
-macro_rules! range {
-    ($kind:ident) => {
-        Kind::$kind.range()
-    };
-    ($kind:ident $min:literal $max:literal) => {
-        ($min, $max)
-    };
-}
-
-macro_rules! optional {
-    () => {
-        None
-    };
-    ($value:expr) => {
-        Some($value as i64)
-    };
-}
-
 macro_rules! control_table {
     ($($(#[doc = $doc:literal])+ $address:literal $name:ident: $kind:ident $([$count:expr])? $access:ident
        $($unit:literal $(* $scale:literal)?)? $(in $min:literal..=$max:literal)? $(= $default:expr)?,
@@ -72,23 +33,16 @@ macro_rules! control_table {
             Gains,
         }
 
-        pub(super) const FIXED: &[Register] = &[$({
-            let ((unit, scale), (min, max)) = (unit!($($unit $($scale)?)?), range!($kind $($min $max)?));
-            Register {
-                name: stringify!($name),
-                address: $address,
-                kind: Kind::$kind,
-                count: count!($($count)?),
-                access: Access::$access,
-                unit,
-                scale,
-                min,
-                max,
-                default: optional!($($default)?),
-                doc: concat!($($doc),+),
-                source: Source::$name,
-            }
-        }),*];
+        pub(super) const FIXED: &[Register] = &[$(
+            Register::new(
+                (stringify!($name), Source::$name),
+                $address,
+                Kind::$kind,
+                Access::$access,
+                concat!($($doc),+),
+            )
+            $(.count($count))? $(.unit($unit) $(.scale($scale))?)? $(.range($min, $max))? $(.default($default as i64))?
+        ),*];
 
         /// The register that begins at an address.
         pub(super) const fn fixed(address: u16) -> Register {
@@ -174,27 +128,20 @@ impl Kind {
     }
 
     /// Least and largest number.
-    pub(super) const fn range(self) -> (i64, i64) {
+    const fn range(self) -> (i64, i64) {
+        let numbers = 1 << (8 * self.width());
         match self {
-            Self::U8 => (0, u8::MAX as i64),
-            Self::I8 => (i8::MIN as i64, i8::MAX as i64),
-            Self::U16 => (0, u16::MAX as i64),
-            Self::I16 => (i16::MIN as i64, i16::MAX as i64),
-            Self::U32 => (0, u32::MAX as i64),
-            Self::I32 => (i32::MIN as i64, i32::MAX as i64),
+            Self::U8 | Self::U16 | Self::U32 => (0, numbers - 1),
+            Self::I8 | Self::I16 | Self::I32 => (-numbers / 2, numbers / 2 - 1),
         }
     }
 
     /// The number that `bytes` make, or none where there are not enough of them.
     pub(super) fn decode(self, bytes: &[u8]) -> Option<i64> {
-        Some(match self {
-            Self::U8 => i64::from(u8::from_le_bytes(*bytes.first_chunk()?)),
-            Self::I8 => i64::from(i8::from_le_bytes(*bytes.first_chunk()?)),
-            Self::U16 => i64::from(u16::from_le_bytes(*bytes.first_chunk()?)),
-            Self::I16 => i64::from(i16::from_le_bytes(*bytes.first_chunk()?)),
-            Self::U32 => i64::from(u32::from_le_bytes(*bytes.first_chunk()?)),
-            Self::I32 => i64::from(i32::from_le_bytes(*bytes.first_chunk()?)),
-        })
+        let bytes = bytes.get(..usize::from(self.width()))?;
+        let number = bytes.iter().rev().fold(0, |number, byte| number << 8 | i64::from(*byte));
+        let (min, max) = self.range();
+        Some(if number > max { number - max - 1 + min } else { number })
     }
 }
 
@@ -227,6 +174,38 @@ pub struct Register {
 }
 
 impl Register {
+    /// A register of one element, a plain number without limits or default.
+    pub(super) const fn new(
+        (name, source): (&'static str, Source),
+        address: u16,
+        kind: Kind,
+        access: Access,
+        doc: &'static str,
+    ) -> Self {
+        let (min, max) = kind.range();
+        Self { name, address, kind, count: 1, access, unit: "", scale: 1, min, max, default: None, doc, source }
+    }
+
+    pub(super) const fn count(self, count: usize) -> Self {
+        Self { count: count as u16, ..self }
+    }
+
+    pub(super) const fn unit(self, unit: &'static str) -> Self {
+        Self { unit, ..self }
+    }
+
+    pub(super) const fn scale(self, scale: u16) -> Self {
+        Self { scale, ..self }
+    }
+
+    pub(super) const fn range(self, min: i64, max: i64) -> Self {
+        Self { min, max, ..self }
+    }
+
+    pub(super) const fn default(self, default: i64) -> Self {
+        Self { default: Some(default), ..self }
+    }
+
     /// Bytes on the bus.
     pub const fn bytes(&self) -> u16 {
         self.kind.width() * self.count
@@ -270,20 +249,10 @@ const fn params() -> [Register; Params::COUNT] {
     let mut place = 0;
     while place < all.len() {
         let (name, default, min, max) = Params::RANGES[place];
-        all[place] = Register {
-            name,
-            address: address::PARAMS + 4 * place as u16,
-            kind: Kind::I32,
-            count: 1,
-            access: Access::Stored,
-            unit: "",
-            scale: 1,
-            min: min as i64,
-            max: max as i64,
-            default: Some(default as i64),
-            doc: Params::DOCS[place],
-            source: Source::Params,
-        };
+        let at = address::PARAMS + 4 * place as u16;
+        all[place] = Register::new((name, Source::Params), at, Kind::I32, Access::Stored, Params::DOCS[place])
+            .range(min as i64, max as i64)
+            .default(default as i64);
         place += 1;
     }
     all

@@ -47,23 +47,11 @@ pub(super) const REGISTERS: [Register; 4] = [
 ];
 
 const fn addresses(name: &'static str, address: u16, first: usize) -> Register {
-    Register {
-        name,
-        address,
-        kind: Kind::U16,
-        count: BLOCK as u16,
-        access: Access::ReadWrite,
-        unit: "",
-        scale: 1,
-        min: 0,
-        max: 0xFFFF,
-        default: Some(0),
-        doc: ADDRESS_DOC,
-        source: Source::Addresses(first as u8),
-    }
+    let source = Source::Addresses(first as u8);
+    Register::new((name, source), address, Kind::U16, Access::ReadWrite, ADDRESS_DOC).count(BLOCK).default(0)
 }
 
 const fn data(name: &'static str, address: u16, first: usize) -> Register {
     let source = Source::Data(first as u8);
-    Register { kind: Kind::U8, max: 0xFF, default: None, doc: DATA_DOC, source, ..addresses(name, address, first) }
+    Register::new((name, source), address, Kind::U8, Access::ReadWrite, DATA_DOC).count(BLOCK)
 }

@@ -14,6 +14,13 @@ const FIRST_OF_MANY: u16 = 8_192;
 /// Number of images.
 pub const COUNT: usize = 4;
 
+const PRESSURES_DOC: &str = " Pressure on each taxel, row by row; 0 before the first tare.";
+const RAW_DOC: &str =
+    " Converter codes of the last frame, row by row; the last row is that of the columns with no row driven.";
+const TARE_DOC: &str = " Zero of each taxel in converter codes, row by row.";
+const GAINS_DOC: &str =
+    " What each taxel's reading is multiplied by, row by row: a half to just below 2. New gains need a new tare.";
+
 /// Addresses of the images in an array's table: pressures, raw codes, tare codes, gains.
 pub const fn at<const ROWS: usize, const COLUMNS: usize>() -> [u16; COUNT] {
     const { Shape::<ROWS, COLUMNS>::CHECKED };
@@ -33,52 +40,22 @@ const fn at_from<const ROWS: usize, const COLUMNS: usize>(pressures: u16) -> [u1
 
 /// The registers of the images, as documented.
 pub(super) const fn registers<const ROWS: usize, const COLUMNS: usize>() -> [Register; COUNT] {
+    let (taxels, codes) = (Shape::<ROWS, COLUMNS>::TAXELS, Shape::<ROWS, COLUMNS>::SLOTS * COLUMNS);
     let [pressures, raw, tare, gains] = at::<ROWS, COLUMNS>();
-    let image = Register {
-        name: "PRESSURES",
-        address: pressures,
-        kind: Kind::U16,
-        count: Shape::<ROWS, COLUMNS>::TAXELS as u16,
-        access: Access::ReadOnly,
-        unit: "Pa",
-        scale: 10,
-        min: 0,
-        max: 0xFFFF,
-        default: None,
-        doc: " Pressure on each taxel, row by row; 0 before the first tare.",
-        source: Source::Pressures,
-    };
-    let tare = Register {
-        name: "TARE_CODES",
-        address: tare,
-        unit: "",
-        scale: 1,
-        max: 4095,
-        doc: " Zero of each taxel in converter codes, row by row.",
-        source: Source::TareCodes,
-        ..image
-    };
-    let raw = Register {
-        name: "RAW_CODES",
-        address: raw,
-        count: (Shape::<ROWS, COLUMNS>::SLOTS * COLUMNS) as u16,
-        doc: " Converter codes of the last frame, row by row; the last row is that of the columns with no row driven.",
-        source: Source::RawCodes,
-        ..tare
-    };
-    let gains = Register {
-        name: "GAINS",
-        address: gains,
-        access: Access::Stored,
-        unit: "1/16384",
-        min: GAIN_ONE as i64 / 2,
-        max: GAIN_MAX as i64,
-        default: Some(GAIN_ONE as i64),
-        doc: " What each taxel's reading is multiplied by, row by row: a half to just below 2. New gains need a new tare.",
-        source: Source::Gains,
-        ..tare
-    };
-    [image, raw, tare, gains]
+    let pressures = image("PRESSURES", Source::Pressures, pressures, Access::ReadOnly, PRESSURES_DOC);
+    let raw = image("RAW_CODES", Source::RawCodes, raw, Access::ReadOnly, RAW_DOC);
+    let tare = image("TARE_CODES", Source::TareCodes, tare, Access::ReadOnly, TARE_DOC);
+    let gains = image("GAINS", Source::Gains, gains, Access::Stored, GAINS_DOC);
+    [
+        pressures.count(taxels).unit("Pa").scale(10),
+        raw.count(codes).range(0, 4095),
+        tare.count(taxels).range(0, 4095),
+        gains.count(taxels).unit("1/16384").range(GAIN_ONE as i64 / 2, GAIN_MAX as i64).default(GAIN_ONE as i64),
+    ]
+}
+
+const fn image(name: &'static str, source: Source, address: u16, access: Access, doc: &'static str) -> Register {
+    Register::new((name, source), address, Kind::U16, access, doc)
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> TableView<'_, ROWS, COLUMNS> {

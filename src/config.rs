@@ -313,6 +313,7 @@ fn wide(value: f32) -> i64 {
 }
 
 /// Converts a constant that the loop multiplies with 32 bits, such as an acceleration within its type, 8388 m/s^2.
+#[inline(never)]
 pub(crate) fn narrow(value: f32) -> i32 {
     wide(value).min(i64::from(i32::MAX)) as i32
 }

@@ -90,6 +90,12 @@ impl<const ROWS: usize, const COLUMNS: usize> Record<ROWS, COLUMNS> {
     };
 }
 
+impl<const ROWS: usize, const COLUMNS: usize> Default for Record<ROWS, COLUMNS> {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
 /// Number of values before the parameters.
 const HEAD_COUNT: usize = 4;
 /// Number of values of this firmware without the gains.

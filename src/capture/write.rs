@@ -60,9 +60,12 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
     /// being kept.
     pub fn arm(&mut self) {
         if self.standing.state != CaptureState::Recording {
-            self.standing =
-                CaptureStatus { state: CaptureState::Armed, count: self.standing.count, ..CaptureStatus::default() };
+            self.restart(CaptureState::Armed, self.standing.count);
         }
+    }
+
+    fn restart(&mut self, state: CaptureState, count: u8) {
+        self.standing = CaptureStatus { state, count, ..CaptureStatus::default() };
     }
 
     /// Returns true if the capture should begin: it is armed, and the next step would acknowledge a tare.
@@ -102,8 +105,7 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
         pipeline.renew(taken, missed_frames, winding);
         self.place = Place::START;
         self.last = Last { digest: head.seed(), ..Last::NONE };
-        let count = self.standing.count.wrapping_add(1);
-        self.standing = CaptureStatus { state: CaptureState::Recording, count, ..CaptureStatus::default() };
+        self.restart(CaptureState::Recording, self.standing.count.wrapping_add(1));
     }
 
     /// Keeps the inputs and the results of a step.
@@ -147,23 +149,19 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
         let motion = pipeline.status().measure;
         let runs = motion.state == measure::MeasureState::Running;
         let ran = core::mem::replace(&mut self.ran, runs);
-        let begins = runs && !ran;
-        if begins && motion.task != Task::Jog && self.standing.state != CaptureState::Recording {
+        if runs && !ran && motion.task != Task::Jog && self.standing.state != CaptureState::Recording {
             let press = motion.task == Task::Press;
             self.series = Series {
                 kind: if press { 1 } else { 2 },
                 shape: [ROWS as u8, COLUMNS as u8],
-                ended: measure::Ended::Complete,
-                rows: 0,
                 check: CHECK,
                 frame_ns: pipeline.config().timing.frame_ns,
                 origin: pipeline.measured_from(),
                 delay_ns: if press { 0 } else { measure::strokes::DELAY_NS },
-                value: 0,
+                ..Series::NONE
             };
             self.length = HEAD;
-            let count = self.standing.count.wrapping_add(1);
-            self.standing = CaptureStatus { state: CaptureState::Recording, count, ..CaptureStatus::default() };
+            self.restart(CaptureState::Recording, self.standing.count.wrapping_add(1));
         }
         let Self { series: head, length, bytes, row: begun, .. } = self;
         if head.kind == 0 {

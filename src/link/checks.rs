@@ -26,26 +26,6 @@ pub(super) enum Hindrance {
     SaveWaits = 4,
 }
 
-/// Returns the obstacle to a recovery from a fault.
-pub(super) fn hindrance<const ROWS: usize, const COLUMNS: usize>(
-    snapshot: &Snapshot<'_, ROWS, COLUMNS>,
-    params: &Params,
-    actions: Actions,
-) -> Hindrance {
-    let supply_mv = i32::from(snapshot.supply_mv);
-    if supply_mv < params.supply_min_mv {
-        Hindrance::SupplyLow
-    } else if supply_mv > params.supply_max_mv {
-        Hindrance::SupplyHigh
-    } else if i32::from(snapshot.status.contact.bad_taxels) > params.bad_taxels_max {
-        Hindrance::BadTaxels
-    } else if actions.save {
-        Hindrance::SaveWaits
-    } else {
-        Hindrance::None
-    }
-}
-
 impl<const ROWS: usize, const COLUMNS: usize> Snapshot<'_, ROWS, COLUMNS> {
     /// Returns true in a fault.
     pub(super) fn faulted(&self) -> bool {
@@ -55,6 +35,22 @@ impl<const ROWS: usize, const COLUMNS: usize> Snapshot<'_, ROWS, COLUMNS> {
     /// Returns true while frames are being kept for a capture.
     pub(super) fn records(&self) -> bool {
         self.capture.standing.state == CaptureState::Recording
+    }
+
+    /// Returns the obstacle to a recovery from a fault.
+    pub(super) fn hindrance(&self, params: &Params, actions: Actions) -> Hindrance {
+        let supply_mv = i32::from(self.supply_mv);
+        if supply_mv < params.supply_min_mv {
+            Hindrance::SupplyLow
+        } else if supply_mv > params.supply_max_mv {
+            Hindrance::SupplyHigh
+        } else if i32::from(self.status.contact.bad_taxels) > params.bad_taxels_max {
+            Hindrance::BadTaxels
+        } else if actions.save {
+            Hindrance::SaveWaits
+        } else {
+            Hindrance::None
+        }
     }
 }
 

@@ -290,10 +290,8 @@ impl<'r> Sender<'r> {
     /// Ends the packet with its length and CRC.
     pub fn finish(mut self) {
         let length = (self.reply.len() + 2).saturating_sub(STUFFED_FROM) as u16;
-        for (place, byte) in (LENGTH_PLACE..).zip(length.to_le_bytes()) {
-            if let Some(slot) = self.reply.get_mut(place) {
-                *slot = byte;
-            }
+        if let Some(place) = self.reply.get_mut(LENGTH_PLACE..).and_then(|rest| rest.first_chunk_mut()) {
+            *place = length.to_le_bytes();
         }
         for byte in update_crc(CRC_START, self.reply).to_le_bytes() {
             self.raw(byte);

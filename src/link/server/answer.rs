@@ -54,7 +54,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Exchange<'_, ROWS, COLUMNS> {
         let mut put = |byte| {
             self.reply.push(byte).ok();
         };
-        shared.opening().for_each(&mut put);
+        if shared.first() {
+            shared.head().into_iter().for_each(&mut put);
+        }
         put(error_byte(error, self.snapshot.faulted()));
         put(self.state.settings.record.id);
         if error.is_none() {
@@ -166,11 +168,6 @@ impl Shared {
     /// Returns true if this device begins the packet.
     pub fn first(&self) -> bool {
         self.ahead == 0
-    }
-
-    /// Returns the bytes that this device sends before its part: the packet's beginning, if it is the first.
-    pub fn opening(&self) -> impl Iterator<Item = u8> {
-        self.head().into_iter().take(if self.first() { FAST_HEAD } else { 0 })
     }
 
     /// Takes a byte of the bus. Returns false if it does not belong to the packet.

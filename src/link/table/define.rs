@@ -219,12 +219,13 @@ pub const COUNT: usize =
 /// Every register of an array of this shape, in the order of the addresses.
 pub const fn registers<const ROWS: usize, const COLUMNS: usize>() -> [Register; COUNT] {
     let mut all = [FIXED[0]; COUNT];
-    let mut count = 0;
-    count = add(&mut all, count, FIXED);
+    let mut count = add(&mut all, 0, FIXED);
     count = add(&mut all, count, mirrors::REGISTERS);
     count = add(&mut all, count, &indirect::REGISTERS);
-    count = add(&mut all, count, &params());
-    add(&mut all, count, &pictures::registers::<ROWS, COLUMNS>());
+    count = add(&mut all, count, &pictures::registers::<ROWS, COLUMNS>());
+    while count < COUNT {
+        count = add(&mut all, count, &[param(count + Params::COUNT - COUNT)]);
+    }
     all
 }
 
@@ -244,18 +245,12 @@ const fn add(all: &mut [Register], count: usize, more: &[Register]) -> usize {
     count + more.len()
 }
 
-const fn params() -> [Register; Params::COUNT] {
-    let mut all = [FIXED[0]; Params::COUNT];
-    let mut place = 0;
-    while place < all.len() {
-        let (name, default, min, max) = Params::RANGES[place];
-        let at = address::PARAMS + 4 * place as u16;
-        all[place] = Register::new((name, Source::Params), at, Kind::I32, Access::Stored, Params::DOCS[place])
-            .range(min as i64, max as i64)
-            .default(default as i64);
-        place += 1;
-    }
-    all
+const fn param(place: usize) -> Register {
+    let (name, default, min, max) = Params::RANGES[place];
+    let at = address::PARAMS + 4 * place as u16;
+    Register::new((name, Source::Params), at, Kind::I32, Access::Stored, Params::DOCS[place])
+        .range(min as i64, max as i64)
+        .default(default as i64)
 }
 
 // The parameters end where the state before the pressures begins, and that ends where these do.

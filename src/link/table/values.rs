@@ -3,7 +3,7 @@
 use super::{Staged, TableView};
 use crate::capture::CaptureState;
 use crate::config::newtons;
-use crate::link::checks::{Hindrance, hindrance};
+use crate::link::checks::Hindrance;
 use crate::link::packet::StatusError;
 use crate::link::settings::Settings;
 use crate::measure::{MeasureState, Task};
@@ -78,7 +78,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Staged<'_, ROWS, COLUMNS> {
         if value == 0 || !self.snapshot.faulted() && !self.settings.watchdog_tripped {
             return Ok(());
         }
-        if hindrance(self.snapshot, &self.settings.record.params, self.actions) != Hindrance::None {
+        if self.snapshot.hindrance(&self.settings.record.params, self.actions) != Hindrance::None {
             return Err(StatusError::Result);
         }
         if self.settings.watchdog_tripped {
@@ -117,7 +117,7 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> TableView<'a, ROWS, COLUMNS> {
     }
 
     pub(super) fn hindrance(&self) -> u32 {
-        hindrance(self.snapshot, &self.settings().record.params, self.state.actions) as u32
+        self.snapshot.hindrance(&self.settings().record.params, self.state.actions) as u32
     }
 
     pub(super) fn watchdog(&self) -> u32 {

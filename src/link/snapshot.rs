@@ -130,15 +130,7 @@ pub fn hardware_error(fault: Option<Fault>) -> u8 {
         Some(Fault::Bridge) => 1 << 4,
         Some(Fault::OverForce) => 1 << 5,
         Some(Fault::ArrayBroken | Fault::RowStuck | Fault::ArrayFrozen | Fault::Unseen) => 1 << 6,
-        Some(
-            Fault::LostFrames
-            | Fault::BusSilent
-            | Fault::BrokenParameters
-            | Fault::MissedDeadline
-            | Fault::Crash
-            | Fault::Runaway
-            | Fault::NoClock
-            | Fault::BrownOutLevel,
-        ) => 1 << 7,
+        // Controller and bus.
+        Some(_) => 1 << 7,
     }
 }

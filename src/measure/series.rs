@@ -158,10 +158,13 @@ impl<'a> Out<'a> {
                 self.means(sums.get(..half).unwrap_or_default(), taken);
             }
             1 => self.means(sums.get(half..).unwrap_or_default(), taken),
-            2 => self.variances(step.squares.as_flattened().iter().zip(sums.iter().zip(first)).take(half), taken),
             _ => {
-                self.variances(step.squares.as_flattened().iter().zip(sums.iter().zip(first)).skip(half), taken);
-                self.bits(step);
+                let taxels = step.squares.as_flattened().iter().zip(sums.iter().zip(first));
+                let (from, count) = if part == 2 { (0, half) } else { (half, ROWS * COLUMNS) };
+                self.variances(taxels.skip(from).take(count), taken);
+                if part > 2 {
+                    self.bits(step);
+                }
             }
         }
     }

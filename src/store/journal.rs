@@ -68,7 +68,6 @@ pub struct Loaded<const ROWS: usize, const COLUMNS: usize> {
 pub struct Journal {
     /// Current sector for saves: that of the newest whole record.
     current: Sector,
-    sequence: u32,
     /// Positions in the current sector, and in the other one.
     sectors: [SectorContent; 2],
 }
@@ -82,8 +81,7 @@ impl Journal {
             (a, b) => a.is_none() && b.is_some(),
         };
         let (current, sectors) = if b_is_newer { (Sector::B, [b, a]) } else { (Sector::A, [a, b]) };
-        let sequence = sectors[0].newest.map_or(0, |newest| newest.sequence);
-        Self { current, sequence, sectors }
+        Self { current, sectors }
     }
 
     /// Loads the newest whole record, as far as this firmware can take it. `tell` is called with every remark.
@@ -143,7 +141,7 @@ impl Journal {
         between: impl FnMut(),
     ) -> Result<(), SaveError<F::Error>> {
         let [own, other] = self.sectors;
-        let length = record.slot_bytes();
+        let (length, sequence) = (record.slot_bytes(), own.newest.map_or(0, |newest| newest.sequence).wrapping_add(1));
         let room = |sector, content: SectorContent| flash.bytes(sector).len().saturating_sub(content.end) >= length;
         if !room(self.current, own) {
             if other.newest.is_some() || !room(self.current.other(), other) {
@@ -153,11 +151,9 @@ impl Journal {
             self.sectors = [other, own];
         }
         let start = self.sectors[0].end;
-        let sequence = self.sequence.wrapping_add(1);
         let written = write(flash, self.current, start, || words(record, sequence), between);
         if written.is_ok() {
             let end = start + length;
-            self.sequence = sequence;
             self.sectors[0] = SectorContent { end, newest: Some(Whole { start, end, sequence }) };
         } else {
             // Whatever the result, the next record goes behind it.

@@ -36,6 +36,7 @@ use crate::frame::{Frame, Sense};
 use crate::params::Params;
 use crate::pipeline::{AcknowledgedRequests, Status};
 use crate::pressure::Gains;
+use crate::state::numbered;
 use crate::units::Duty;
 use write::{WIDTH_MAX, mix};
 
@@ -57,37 +58,23 @@ pub enum CaptureState {
     Done = 3,
 }
 
-/// Reason why a capture ended. The numbers are stable.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Ended {
-    /// The capture did not end.
-    #[default]
-    No = 0,
-    /// The memory is full.
-    Full = 1,
-    /// The host stopped it.
-    Asked = 2,
-    /// Parameters or gains changed.
-    Configured = 3,
-    /// The firmware stopped the motor between two steps: frames were lost, or a step came too late.
-    Stopped = 4,
-    /// The firmware shorted the motor at a broken array before its frame was whole.
-    Cut = 5,
-}
-
-impl Ended {
-    /// Returns the reason with this number; none for an unknown number.
-    pub const fn of(number: u8) -> Option<Self> {
-        Some(match number {
-            0 => Self::No,
-            1 => Self::Full,
-            2 => Self::Asked,
-            3 => Self::Configured,
-            4 => Self::Stopped,
-            5 => Self::Cut,
-            _ => return None,
-        })
+numbered! {
+    /// Reason why a capture ended. The numbers are stable.
+    #[derive(Default)]
+    pub enum Ended {
+        /// The capture did not end.
+        #[default]
+        No = 0,
+        /// The memory is full.
+        Full = 1,
+        /// The host stopped it.
+        Asked = 2,
+        /// Parameters or gains changed.
+        Configured = 3,
+        /// The firmware stopped the motor between two steps: frames were lost, or a step came too late.
+        Stopped = 4,
+        /// The firmware shorted the motor at a broken array before its frame was whole.
+        Cut = 5,
     }
 }
 
@@ -214,6 +201,8 @@ pub struct Head<const ROWS: usize, const COLUMNS: usize> {
 
 /// First bytes of a capture.
 pub const MAGIC: [u8; 4] = [b'F', b'T', b'C', VERSION];
+/// Number of words before those that make the digest's initial value.
+const SEEDED_FROM: usize = 7;
 /// Number of bytes before the parameters.
 const FIXED: usize = 40 + 4 * WINDING_WORDS;
 
@@ -239,30 +228,28 @@ impl<const ROWS: usize, const COLUMNS: usize> Head<ROWS, COLUMNS> {
 
     /// Initial value of the digest of the steps: the digest of the state before the first one.
     pub fn seed(&self) -> u32 {
-        let first = [self.missed_frames, self.taken.word(), self.frame_ns];
-        let params = self.params.to_array().map(i32::cast_unsigned);
-        let gains = (0..Gains::<ROWS, COLUMNS>::WORDS).map(|word| self.gains.word(word));
-        digest_words(LAYOUT, first.into_iter().chain(self.winding).chain(params).chain(gains))
+        let (mut place, mut seed) = (0, LAYOUT);
+        self.words(&mut |word| {
+            seed = if place < SEEDED_FROM { seed } else { mix(seed, word) };
+            place += 1;
+        });
+        seed
     }
 
     fn write(&self, bytes: &mut [u8]) {
-        let mut rest = bytes;
-        let mut put = |word: [u8; 4]| {
-            if let Some((place, after)) = core::mem::take(&mut rest).split_first_chunk_mut() {
-                *place = word;
-                rest = after;
-            }
-        };
-        put(MAGIC);
-        put([ROWS as u8, COLUMNS as u8, self.ended as u8, 0]);
-        for word in [LAYOUT, self.frames, self.bits, self.digest, self.check, self.missed_frames] {
-            put(word.to_le_bytes());
-        }
-        put(self.taken.word().to_le_bytes());
-        put(self.frame_ns.to_le_bytes());
-        self.winding.iter().for_each(|word| put(word.to_le_bytes()));
-        self.params.to_array().iter().for_each(|value| put(value.to_le_bytes()));
-        (0..Gains::<ROWS, COLUMNS>::WORDS).for_each(|word| put(self.gains.word(word).to_le_bytes()));
+        let mut rest = bytes.as_chunks_mut().0.iter_mut();
+        self.words(&mut |word| rest.next().into_iter().for_each(|to| *to = word.to_le_bytes()));
+    }
+
+    /// Passes every word of the head on.
+    #[inline(never)]
+    fn words(&self, each: &mut dyn FnMut(u32)) {
+        let [magic, shape] = [MAGIC, [ROWS as u8, COLUMNS as u8, self.ended as u8, 0]].map(u32::from_le_bytes);
+        let Self { frames, bits, digest, check, missed_frames, taken, frame_ns, .. } = *self;
+        let fixed = [magic, shape, LAYOUT, frames, bits, digest, check, missed_frames, taken.word(), frame_ns];
+        fixed.iter().chain(&self.winding).for_each(|word| each(*word));
+        self.params.to_array().iter().for_each(|value| each(value.cast_unsigned()));
+        (0..Gains::<ROWS, COLUMNS>::WORDS).for_each(|word| each(self.gains.word(word)));
     }
 
     /// Completes a written head with the reason of the end, frames, bits, digest and check sum.

@@ -24,7 +24,7 @@ use crate::params::{ParamError, Params};
 use crate::scan::{Clocks, ScanTiming};
 use crate::units::{Duty, Kilopascals, Millimetres, MillimetresPerSecond, Newtons};
 use array::{codes_at_full_range, force_seen, places, sag_max, saturated_codes};
-use bounds::{Driven, Drives};
+use bounds::Drive;
 use core::ops::{Deref, DerefMut};
 use fixed::types::{I8F24, I16F16};
 
@@ -209,11 +209,11 @@ impl Config {
         // g = k_t N / (R m) with m = J N^2, in mm/s^2 for a V; c = k_t^2 N^2 / (R m).
         let g = torque_constant / (resistance * inertia * travel_rad_per_m) * 1e3;
         let c = torque_constant * torque_constant / (resistance * inertia);
-        let mass = inertia * travel_rad_per_m * travel_rad_per_m;
+        let mass_kg = inertia * travel_rad_per_m * travel_rad_per_m;
         let turn_rad = 2.0 * core::f32::consts::PI;
         let mm_per_count = turn_rad * 1e3 / (p.encoder_counts_per_turn as f32 * travel_rad_per_m);
-        let bounds =
-            Bounds::new(p, &tip, &Drives { frame_s, mm_per_count, mass, driven: g * p.voltage_max_mv as f32 * 1e-3 });
+        let voltage_max_mm_per_s2 = g * p.voltage_max_mv as f32 * 1e-3;
+        let drive = Drive { frame_s, mm_per_count, mass_kg, damping_per_s: c, voltage_max_mm_per_s2 };
 
         let sag_q32 = (p.row_sag_ppb_per_code as f32 * 1e-9 * exp2(32)) as u16;
         let pitch_mm = p.pitch_um as f32 * 1e-3;
@@ -221,8 +221,8 @@ impl Config {
         let newtons_per_sum = pitch_mm * pitch_mm * 1e-3 / (16.0 * codes_per_kpa);
         let creep = p.creep_permille as f32 * 1e-3;
         let mm_per_count_q40 = wide(mm_per_count * exp2(40));
-        let gain_sets = motor::gain_sets(frame_s, mm_per_count, g * p.voltage_max_mv as f32 * 1e-3);
-        let voltage_max_q8_mm_per_s2 = narrow(g * p.voltage_max_mv as f32 * 1e-3 * exp2(8));
+        let gain_sets = motor::gain_sets(frame_s, mm_per_count, voltage_max_mm_per_s2);
+        let voltage_max_q8_mm_per_s2 = narrow(voltage_max_mm_per_s2 * exp2(8));
         let current_max_q8_mm_per_s2 = narrow(g * resistance * p.current_max_ma as f32 * 1e-3 * exp2(8));
         let voltage_shift = voltage_max_q8_mm_per_s2.max(1).leading_zeros() - 1;
         // The full duty for the supply's voltage: 32767 for a mV at 1 mV.
@@ -271,10 +271,10 @@ impl Config {
             ))),
             travel_max: millimetres(p.travel_max_um),
             clearance: millimetres(p.clearance_um),
-            bounds,
+            bounds: Bounds::new(p, &tip, &drive),
             drift: ArrayDrift::new(p, shape),
             heat: Heat::new(p, frame_s, current_max_q8_mm_per_s2),
-            motions: Motions::new(p, &Driven { frame_s, mm_per_count, damping: c }),
+            motions: Motions::new(p, &drive),
             force_fault: newtons(p.force_fault_mn),
             force_max: newtons(p.force_max_mn),
             force_seen,
@@ -313,6 +313,7 @@ fn wide(value: f32) -> i64 {
 }
 
 /// Converts a constant that the loop multiplies with 32 bits, such as an acceleration within its type, 8388 m/s^2.
+#[inline(never)]
 pub(crate) fn narrow(value: f32) -> i32 {
     wide(value).min(i64::from(i32::MAX)) as i32
 }
@@ -370,11 +371,8 @@ pub struct Shaped<const ROWS: usize, const COLUMNS: usize> {
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Shaped<ROWS, COLUMNS> {
-    /// Checks the parameters and derives the loop's constants, with the clocks of a board.
-    ///
-    /// # Errors
-    /// Names the parameter with its value and its range, the scan that cannot be timed, or the two parameters that
-    /// contradict each other.
+    /// Checks the parameters and derives the loop's constants, with the clocks of a board. An error names the parameter
+    /// with its value and its range, the scan that cannot be timed, or the two parameters that contradict each other.
     pub fn new(params: &Params, clocks: &Clocks) -> Result<Self, ConfigError> {
         const { Shape::<ROWS, COLUMNS>::CHECKED };
         let config = Config::new(params, [ROWS, COLUMNS], clocks)?;

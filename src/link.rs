@@ -30,11 +30,11 @@
 //! | Control Table Backup | `01 "CTRL"` is `save_parameters`; there is no older backup to restore (`02 "CTRL"`): range error |
 //! | Factory Reset, Reboot | as the protocol has them; Factory Reset needs torque off and saves |
 
+mod checks;
 pub mod packet;
 pub mod server;
 pub mod settings;
 pub mod snapshot;
-mod stand;
 pub mod table;
 
 pub use packet::{REPLY_MAX, Reply};

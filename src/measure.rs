@@ -18,27 +18,24 @@ pub mod strokes;
 pub use press::Press;
 pub use strokes::Strokes;
 
+use crate::state::numbered;
 use crate::units::Newtons;
 use press::Step;
 
-/// Proof that the library was built with the feature `measure`. Every motion holds this proof. Without the feature there is
-/// no such value: no motion can begin, and the compiler leaves the code of all of them out.
-#[cfg(feature = "measure")]
+/// Proof that the library was built with the feature `measure`. Every motion holds this proof. Without the feature
+/// there is no such value: no motion can begin, and the compiler leaves the code of all of them out.
 #[derive(Clone, Copy, Debug)]
-pub struct BuiltIn(());
-
-/// Without the feature `measure` this type has no value, so no motion can begin.
-#[cfg(not(feature = "measure"))]
-#[derive(Clone, Copy, Debug)]
-pub enum BuiltIn {}
+pub struct BuiltIn(#[cfg(not(feature = "measure"))] core::convert::Infallible);
 
 impl BuiltIn {
     /// The proof, if there is one.
-    #[cfg(feature = "measure")]
-    pub const PROOF: Option<Self> = Some(Self(()));
-    /// The proof, if there is one.
-    #[cfg(not(feature = "measure"))]
-    pub const PROOF: Option<Self> = None;
+    pub const PROOF: Option<Self> = {
+        #[cfg(feature = "measure")]
+        let proof = Some(Self());
+        #[cfg(not(feature = "measure"))]
+        let proof = None;
+        proof
+    };
 }
 
 /// Task of a measurement. The numbers are stable.
@@ -73,59 +70,38 @@ impl Task {
     }
 }
 
-/// End of a motion. The numbers are stable. The meaning of [`MeasureStatus::value`] is in brackets.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Ended {
-    /// The motion was completed, or has not ended.
-    #[default]
-    Complete = 0,
-    /// A stop, torque, a fault, a tare or new parameters ended the motion.
-    Interrupted = 1,
-    /// A tare is missing, something touches the tip, torque is not as the task needs it, an encoder count is above
-    /// 0.1 mm, or the library was built without its feature `measure`.
-    NotReady = 2,
-    /// The direction is not confirmed.
-    Unconfirmed = 3,
-    /// The encoder did not count up to this voltage (mV).
-    Still = 4,
-    /// The encoder counts against the voltage (counts).
-    Reversed = 5,
-    /// The tip left the range of the strokes (um).
-    Astray = 6,
-    /// The array measured a touch, or in a press more than the largest goal (mN).
-    Touched = 7,
-    /// The motor measured a force that the array did not (mN).
-    Pushed = 8,
-    /// The tip did not come to rest (counts in the last half of the time).
-    Restless = 10,
-    /// The travel ended without a contact (um).
-    NoContact = 11,
-    /// The tip did not move on for a second (um of travel).
-    Stalled = 12,
-    /// The memory is full (rows).
-    Full = 13,
-}
-
-impl Ended {
-    /// Returns the end with this number.
-    pub fn of(number: u8) -> Option<Self> {
-        let all = [
-            Self::Complete,
-            Self::Interrupted,
-            Self::NotReady,
-            Self::Unconfirmed,
-            Self::Still,
-            Self::Reversed,
-            Self::Astray,
-            Self::Touched,
-            Self::Pushed,
-            Self::Restless,
-            Self::NoContact,
-            Self::Stalled,
-            Self::Full,
-        ];
-        all.into_iter().find(|ended| *ended as u8 == number)
+numbered! {
+    /// End of a motion. The numbers are stable. The meaning of [`MeasureStatus::value`] is in brackets.
+    #[derive(Default)]
+    pub enum Ended {
+        /// The motion was completed, or has not ended.
+        #[default]
+        Complete = 0,
+        /// A stop, torque, a fault, a tare or new parameters ended the motion.
+        Interrupted = 1,
+        /// A tare is missing, something touches the tip, torque is not as the task needs it, an encoder count is above
+        /// 0.1 mm, or the library was built without its feature `measure`.
+        NotReady = 2,
+        /// The direction is not confirmed.
+        Unconfirmed = 3,
+        /// The encoder did not count up to this voltage (mV).
+        Still = 4,
+        /// The encoder counts against the voltage (counts).
+        Reversed = 5,
+        /// The tip left the range of the strokes (um).
+        Astray = 6,
+        /// The array measured a touch, or in a press more than the largest goal (mN).
+        Touched = 7,
+        /// The motor measured a force that the array did not (mN).
+        Pushed = 8,
+        /// The tip did not come to rest (counts in the last half of the time).
+        Restless = 10,
+        /// The travel ended without a contact (um).
+        NoContact = 11,
+        /// The tip did not move on for a second (um of travel).
+        Stalled = 12,
+        /// The memory is full (rows).
+        Full = 13,
     }
 }
 

@@ -37,7 +37,7 @@ macro_rules! params {
         /// let wrong = Params { modulus_pa: 4, ..Params::DEFAULT };
         /// assert_eq!(wrong.check().unwrap_err().to_string(), "modulus_pa of 4: 20000 to 2000000 are allowed");
         /// ```
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[derive(Clone, Copy, Debug, Eq)]
         pub struct Params { $($(#[doc = $doc])+ pub $name: i32,)* }
 
         impl Params {
@@ -48,20 +48,21 @@ macro_rules! params {
             pub const DEFAULT: Self = Self { $($name: $default,)* };
 
             /// Refuses the first parameter that is out of its range.
-            ///
-            /// # Errors
-            /// Names the parameter, its value and its range.
-            pub const fn check(&self) -> Result<(), ParamError> {
-                $(if self.$name < $min || self.$name > $max {
-                    return Err(ParamError { name: stringify!($name), value: self.$name, min: $min, max: $max });
-                })*
-                Ok(())
+            pub fn check(&self) -> Result<(), ParamError> {
+                let mut all = Self::RANGES.iter().zip(self.to_array());
+                match all.find(|&(&(_, _, min, max), value)| value < min || value > max) {
+                    Some((&(name, _, min, max), value)) => Err(ParamError { name, value, min, max }),
+                    None => Ok(()),
+                }
             }
 
             /// The values in the order of their definition, for storage.
+            // Not inlined, as the inverse: each of the values takes instructions of its own.
+            #[inline(never)]
             pub const fn to_array(&self) -> [i32; Self::COUNT] { [$(self.$name),*] }
 
             /// The inverse of [`Params::to_array`]; unchecked.
+            #[inline(never)]
             pub const fn from_array(values: &[i32; Self::COUNT]) -> Self {
                 let [$($name),*] = *values;
                 Self { $($name),* }
@@ -176,6 +177,13 @@ params! {
     /// Distance below the converter's largest code, 4,095, within which a column amplifier may clip. A taxel that reads
     /// this close to it counts as saturated. 255 codes are 205 mV.
     headroom_codes = 255 in 5..=2_000;
+}
+
+// Not derived, which takes ten times as much flash.
+impl PartialEq for Params {
+    fn eq(&self, other: &Self) -> bool {
+        self.to_array() == other.to_array()
+    }
 }
 
 impl Default for Params {

@@ -36,10 +36,7 @@ pub const CLOCKS: Clocks = Clocks {
 };
 
 impl Config {
-    /// Configuration of this array on this board.
-    ///
-    /// # Errors
-    /// See [`crate::config::Shaped::new`].
+    /// Configuration of this array on this board; see [`crate::config::Shaped::new`].
     pub fn shipped(params: &Params) -> Result<Self, ConfigError> {
         Self::new(params, &CLOCKS)
     }

@@ -18,102 +18,94 @@
 //! from a fault that is cleared in the same frame. A fault (stop) is latched until it is cleared; a limit (a present
 //! restriction of the loop) sets and clears by itself. The numbers are stable: hosts may store them.
 
-/// Activity of the controller.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Mode {
-    /// The bridge is off.
-    #[default]
-    Off = 0,
-    /// The zero of every taxel is being measured; the bridge is off.
-    Tare = 1,
-    /// Towards the object at the set speed.
-    Approach = 2,
-    /// Holding the goal force.
-    Force = 3,
-    /// Releasing the object, then holding clear of it.
-    Release = 4,
-    /// Stopped by a fault.
-    Fault = 5,
-    /// Pressing into a plate, to measure tip and array.
-    Press = 6,
-    /// Moving a little in the air, to measure the drive.
-    Strokes = 7,
+/// Defines an enumeration with stable numbers, and the list of its values.
+macro_rules! numbered {
+    ($(#[$attribute:meta])* pub enum $name:ident { $($(#[$value_attribute:meta])* $value:ident = $number:literal,)* }) => {
+        $(#[$attribute])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[repr(u8)]
+        pub enum $name { $($(#[$value_attribute])* $value = $number,)* }
+
+        impl $name {
+            /// All values, in the order of their numbers.
+            pub const ALL: [Self; [$($number),*].len()] = [$(Self::$value),*];
+
+            /// Returns the value with this number; none for an unknown number.
+            pub fn of(number: u8) -> Option<Self> {
+                Self::ALL.into_iter().find(|value| *value as u8 == number)
+            }
+        }
+    };
+}
+pub(crate) use numbered;
+
+numbered! {
+    /// Activity of the controller.
+    #[derive(Default)]
+    pub enum Mode {
+        /// The bridge is off.
+        #[default]
+        Off = 0,
+        /// The zero of every taxel is being measured; the bridge is off.
+        Tare = 1,
+        /// Towards the object at the set speed.
+        Approach = 2,
+        /// Holding the goal force.
+        Force = 3,
+        /// Releasing the object, then holding clear of it.
+        Release = 4,
+        /// Stopped by a fault.
+        Fault = 5,
+        /// Pressing into a plate, to measure tip and array.
+        Press = 6,
+        /// Moving a little in the air, to measure the drive.
+        Strokes = 7,
+    }
 }
 
-impl Mode {
-    /// All modes; the first has the number 0.
-    pub const ALL: [Self; 8] =
-        [Self::Off, Self::Tare, Self::Approach, Self::Force, Self::Release, Self::Fault, Self::Press, Self::Strokes];
-}
-
-/// Reason why the motor was stopped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-#[non_exhaustive]
-pub enum Fault {
-    /// No frame came within 1.75 frame times of the last one: the scan has stopped.
-    LostFrames = 1,
-    /// More taxels are dead or saturated than allowed, or all together read far less than at the tare.
-    ArrayBroken = 2,
-    /// A column shows current with no row driven: a row is stuck on.
-    RowStuck = 3,
-    /// The array does not follow the motion that the encoder reports.
-    ArrayFrozen = 4,
-    /// The encoder does not follow the motor's voltage: the encoder is stuck, or the motor is blocked.
-    EncoderFrozen = 5,
-    /// The contact force passed its limit.
-    OverForce = 6,
-    /// No valid packet within the bus watchdog's time.
-    BusSilent = 7,
-    /// The stored parameters are damaged or out of range.
-    BrokenParameters = 8,
-    /// The supply is below its limit.
-    SupplyLow = 9,
-    /// The supply is above its limit.
-    SupplyHigh = 10,
-    /// The bridge's driver reported a fault.
-    Bridge = 11,
-    /// The control step came later than its deadline.
-    MissedDeadline = 12,
-    /// The firmware was reset by its watchdog, a panic or a hard fault; see the crash record.
-    Crash = 13,
-    /// The tip left its envelope: an end of the travel, a retreat without end, or speed where nothing is touched.
-    Runaway = 14,
-    /// The encoder counts against the motor's voltage: its channels or the motor's leads are swapped.
-    Reversed = 15,
-    /// The motor presses on something that the array does not see.
-    Unseen = 16,
-    /// The external clock was missing at the start, so times are known to a few percent only. The fault remains until
-    /// the next start.
-    NoClock = 17,
-    /// The microcontroller would not be reset before its supply is too low for its speed: the option bytes have
-    /// another brown-out level than 3. The fault remains until they are programmed.
-    BrownOutLevel = 18,
-}
-
-impl Fault {
-    /// All faults; the first has the number 1.
-    pub const ALL: [Self; 18] = [
-        Self::LostFrames,
-        Self::ArrayBroken,
-        Self::RowStuck,
-        Self::ArrayFrozen,
-        Self::EncoderFrozen,
-        Self::OverForce,
-        Self::BusSilent,
-        Self::BrokenParameters,
-        Self::SupplyLow,
-        Self::SupplyHigh,
-        Self::Bridge,
-        Self::MissedDeadline,
-        Self::Crash,
-        Self::Runaway,
-        Self::Reversed,
-        Self::Unseen,
-        Self::NoClock,
-        Self::BrownOutLevel,
-    ];
+numbered! {
+    /// Reason why the motor was stopped.
+    #[non_exhaustive]
+    pub enum Fault {
+        /// No frame came within 1.75 frame times of the last one: the scan has stopped.
+        LostFrames = 1,
+        /// More taxels are dead or saturated than allowed, or all together read far less than at the tare.
+        ArrayBroken = 2,
+        /// A column shows current with no row driven: a row is stuck on.
+        RowStuck = 3,
+        /// The array does not follow the motion that the encoder reports.
+        ArrayFrozen = 4,
+        /// The encoder does not follow the motor's voltage: the encoder is stuck, or the motor is blocked.
+        EncoderFrozen = 5,
+        /// The contact force passed its limit.
+        OverForce = 6,
+        /// No valid packet within the bus watchdog's time.
+        BusSilent = 7,
+        /// The stored parameters are damaged or out of range.
+        BrokenParameters = 8,
+        /// The supply is below its limit.
+        SupplyLow = 9,
+        /// The supply is above its limit.
+        SupplyHigh = 10,
+        /// The bridge's driver reported a fault.
+        Bridge = 11,
+        /// The control step came later than its deadline.
+        MissedDeadline = 12,
+        /// The firmware was reset by its watchdog, a panic or a hard fault; see the crash record.
+        Crash = 13,
+        /// The tip left its envelope: an end of the travel, a retreat without end, or speed where nothing is touched.
+        Runaway = 14,
+        /// The encoder counts against the motor's voltage: its channels or the motor's leads are swapped.
+        Reversed = 15,
+        /// The motor presses on something that the array does not see.
+        Unseen = 16,
+        /// The external clock was missing at the start, so times are known to a few percent only. The fault remains until
+        /// the next start.
+        NoClock = 17,
+        /// The microcontroller would not be reset before its supply is too low for its speed: the option bytes have
+        /// another brown-out level than 3. The fault remains until they are programmed.
+        BrownOutLevel = 18,
+    }
 }
 
 /// Present restrictions of the loop: a set of flags, stable by bit.

@@ -123,6 +123,11 @@ const fn numbers() -> [u32; COUNT] {
     while place < COUNT {
         let name = if place < HEAD_COUNT { HEAD[place].0 } else { Params::RANGES[place - HEAD_COUNT].0 };
         numbers[place] = number(name);
+        let mut other = 0;
+        while other < place {
+            assert!(numbers[other] != numbers[place], "two names have the same number: rename one");
+            other += 1;
+        }
         place += 1;
     }
     numbers
@@ -152,22 +157,10 @@ const fn gains_stand_apart(rows: usize, columns: usize) -> bool {
     true
 }
 
-const _: () = {
-    let numbers = numbers();
-    let mut one = 0;
-    while one < COUNT {
-        let mut other = 0;
-        while other < one {
-            assert!(numbers[one] != numbers[other], "two names have the same number: rename one");
-            other += 1;
-        }
-        one += 1;
-    }
-};
-
-/// Name, least and largest value, in order.
-fn ranges() -> impl Iterator<Item = (&'static str, i32, i32)> {
-    HEAD.into_iter().chain(Params::RANGES.iter().map(|(name, _, min, max)| (*name, *min, *max)))
+/// Returns name, least and largest value of the value in a place.
+fn range(place: usize) -> (&'static str, i32, i32) {
+    let param = || Params::RANGES.get(place - HEAD_COUNT).map(|&(name, _, min, max)| (name, min, max));
+    HEAD.get(place).copied().or_else(param).unwrap_or_default()
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Record<ROWS, COLUMNS> {
@@ -228,34 +221,38 @@ fn take<const ROWS: usize, const COLUMNS: usize>(
     mut tell: impl FnMut(Remark),
 ) -> (Record<ROWS, COLUMNS>, bool) {
     let mut values = Record::<ROWS, COLUMNS>::DEFAULT.values();
+    let mut missing = [true; COUNT];
     let mut sound = true;
-    let (mut gains, mut taken) = (Gains::ONE, 0);
+    let (mut gains, mut words, mut taken) = (Gains::ONE, 0, 0);
     let first = const { gains_number(ROWS, COLUMNS) };
     for (number, value) in found.values() {
         let word = number.wrapping_sub(first) as usize;
         if word < Gains::<ROWS, COLUMNS>::WORDS {
+            words += 1;
             taken += usize::from(gains.set_word(word, value.cast_unsigned()));
             continue;
         }
-        let mut known = values.iter_mut().zip(ranges()).zip(&NUMBERS);
-        match known.find(|(_, own)| **own == number) {
-            None => tell(Remark::Unknown { number, value }),
-            Some(((place, (_, min, max)), _)) if (min..=max).contains(&value) => *place = value,
-            Some(((_, (name, min, max)), _)) => {
-                sound = false;
-                tell(Remark::Refused(ParamError { name, value, min, max }));
-            }
+        let places = values.iter_mut().zip(&mut missing).zip(&NUMBERS).enumerate();
+        let Some((place, ((slot, missing), _))) = places.into_iter().find(|(_, (_, own))| **own == number) else {
+            tell(Remark::Unknown { number, value });
+            continue;
+        };
+        *missing = false;
+        let (name, min, max) = range(place);
+        if (min..=max).contains(&value) {
+            *slot = value;
+        } else {
+            sound = false;
+            tell(Remark::Refused(ParamError { name, value, min, max }));
         }
     }
-    for ((name, ..), own) in ranges().zip(&NUMBERS) {
-        if !found.values().any(|(number, _)| number == *own) {
-            tell(Remark::New(name));
-        }
+    for (place, _) in missing.iter().enumerate().filter(|(_, missing)| **missing) {
+        tell(Remark::New(range(place).0));
     }
     let mut record = Record::from_values(&values);
     if taken == Gains::<ROWS, COLUMNS>::WORDS {
         record.gains = gains;
-    } else if found.values().any(|(number, _)| (number.wrapping_sub(first) as usize) < Gains::<ROWS, COLUMNS>::WORDS) {
+    } else if words > 0 {
         sound = false;
         let [min, max] = [Gains::<ROWS, COLUMNS>::MIN, Gains::<ROWS, COLUMNS>::MAX].map(i32::from);
         tell(Remark::Refused(ParamError { name: "gains", value: taken as i32, min, max }));
@@ -346,14 +343,32 @@ pub fn words<const ROWS: usize, const COLUMNS: usize>(
     sequence: u32,
 ) -> impl Iterator<Item = u32> {
     let (gains, length) = (record.stored_gains(), record.slot_bytes() / 4);
-    let header = [u32::from_le_bytes(MAGIC), sequence, (COUNT + gains) as u32];
-    let values = NUMBERS.iter().zip(record.values()).flat_map(|(number, value)| [*number, value as u32]);
+    let (count, values) = (COUNT + gains, record.values());
     let first = const { gains_number(ROWS, COLUMNS) };
-    let gains = (0..gains).flat_map(move |word| [first.wrapping_add(word as u32), record.gains.word(word)]);
-    let body = header.into_iter().chain(values).chain(gains);
-    let mut check = CRC.digest();
-    body.clone().for_each(|word| check.update(&word.to_le_bytes()));
-    body.chain([check.finalize()]).chain(core::iter::repeat(u32::from_le_bytes([BLANK; 4]))).take(length)
+    let word = move |place: usize| match place {
+        0 => u32::from_le_bytes(MAGIC),
+        1 => sequence,
+        2 => count as u32,
+        _ => {
+            let (entry, is_value) = ((place - 3) / 2, place.is_multiple_of(2));
+            let gains = entry.wrapping_sub(COUNT);
+            match (NUMBERS.get(entry), values.get(entry)) {
+                (Some(_), Some(value)) if is_value => value.cast_unsigned(),
+                (Some(number), _) => *number,
+                _ if is_value => record.gains.word(gains),
+                _ => first.wrapping_add(gains as u32),
+            }
+        }
+    };
+    let body = 3 + 2 * count;
+    let mut digest = CRC.digest();
+    (0..body).for_each(|place| digest.update(&word(place).to_le_bytes()));
+    let check = digest.finalize();
+    (0..length).map(move |place| match place {
+        _ if place < body => word(place),
+        _ if place == body => check,
+        _ => u32::from_le_bytes([BLANK; 4]),
+    })
 }
 
 /// A whole record in flash.
@@ -388,13 +403,4 @@ fn read_record(bytes: &[u8]) -> Option<Found<'_>> {
     let whole = check.first_chunk() == Some(&CRC.checksum(body).to_le_bytes());
     let values = values.as_chunks().0;
     whole.then_some(Found { sequence: u32::from_le_bytes(sequence), bytes: slot_bytes(count), values })
-}
-
-/// Returns the end of the used part of a sector: all behind it is blank.
-fn end_of_records(sector: &[u8]) -> usize {
-    let used = sector.chunks_exact(GRID).rposition(|chunk| {
-        let (words, _) = chunk.as_chunks::<4>();
-        words.iter().any(|word| *word != [BLANK; 4])
-    });
-    used.map_or(0, |place| (place + 1) * GRID)
 }

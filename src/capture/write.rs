@@ -32,12 +32,6 @@ pub struct Capture<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> 
     bytes: [u8; BYTES],
 }
 
-impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Default for Capture<ROWS, COLUMNS, BYTES> {
-    fn default() -> Self {
-        Self::NEW
-    }
-}
-
 impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, COLUMNS, BYTES> {
     /// Capture before any request. All its bytes are zero.
     pub const NEW: Self = Self {
@@ -66,9 +60,12 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
     /// being kept.
     pub fn arm(&mut self) {
         if self.standing.state != CaptureState::Recording {
-            self.standing =
-                CaptureStatus { state: CaptureState::Armed, count: self.standing.count, ..CaptureStatus::default() };
+            self.restart(CaptureState::Armed, self.standing.count);
         }
+    }
+
+    fn restart(&mut self, state: CaptureState, count: u8) {
+        self.standing = CaptureStatus { state, count, ..CaptureStatus::default() };
     }
 
     /// Returns true if the capture should begin: it is armed, and the next step would acknowledge a tare.
@@ -82,9 +79,8 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
     /// has no gains that cannot be stored: with such gains the capture is cancelled.
     pub fn begin(&mut self, pipeline: &mut Pipeline<ROWS, COLUMNS>) {
         let mut gains = Gains::<ROWS, COLUMNS>::ONE;
-        let mut places = (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column)));
         let array = pipeline.array();
-        let known = places.all(|(row, column)| gains.set(row * COLUMNS + column, array.gain(row, column)));
+        let known = (0..ROWS * COLUMNS).all(|place| gains.set(place, array.gain(place / COLUMNS, place % COLUMNS)));
         if !known || BYTES < Head::<ROWS, COLUMNS>::BYTES {
             self.standing.state = CaptureState::None;
             return;
@@ -109,8 +105,7 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
         pipeline.renew(taken, missed_frames, winding);
         self.place = Place::START;
         self.last = Last { digest: head.seed(), ..Last::NONE };
-        let count = self.standing.count.wrapping_add(1);
-        self.standing = CaptureStatus { state: CaptureState::Recording, count, ..CaptureStatus::default() };
+        self.restart(CaptureState::Recording, self.standing.count.wrapping_add(1));
     }
 
     /// Keeps the inputs and the results of a step.
@@ -129,10 +124,10 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
         let duty = status.duty.0;
         out.signed(i32::from(duty) - i32::from(last.duty), width::DUTY);
         let (mode, fault) = (status.mode as u8, status.fault.map_or(0, |fault| fault as u8));
-        let changed = (mode, fault) != (last.mode, last.fault);
-        out.put(changed.into(), 1);
-        if changed {
-            out.put(u32::from(mode) | u32::from(fault) << 8, 16);
+        if (mode, fault) == (last.mode, last.fault) {
+            out.put(0, 1);
+        } else {
+            out.put(1 | u32::from(mode) << 1 | u32::from(fault) << 9, 17);
         }
         let digest = digest_step(last.digest, Duty(duty), status);
         out.put(short_digest(digest).into(), 16);
@@ -154,23 +149,19 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
         let motion = pipeline.status().measure;
         let runs = motion.state == measure::MeasureState::Running;
         let ran = core::mem::replace(&mut self.ran, runs);
-        let begins = runs && !ran;
-        if begins && motion.task != Task::Jog && self.standing.state != CaptureState::Recording {
+        if runs && !ran && motion.task != Task::Jog && self.standing.state != CaptureState::Recording {
             let press = motion.task == Task::Press;
             self.series = Series {
                 kind: if press { 1 } else { 2 },
                 shape: [ROWS as u8, COLUMNS as u8],
-                ended: measure::Ended::Complete,
-                rows: 0,
                 check: CHECK,
                 frame_ns: pipeline.config().timing.frame_ns,
                 origin: pipeline.measured_from(),
                 delay_ns: if press { 0 } else { measure::strokes::DELAY_NS },
-                value: 0,
+                ..Series::NONE
             };
             self.length = HEAD;
-            let count = self.standing.count.wrapping_add(1);
-            self.standing = CaptureStatus { state: CaptureState::Recording, count, ..CaptureStatus::default() };
+            self.restart(CaptureState::Recording, self.standing.count.wrapping_add(1));
         }
         let Self { series: head, length, bytes, row: begun, .. } = self;
         if head.kind == 0 {
@@ -240,21 +231,15 @@ fn put_sense(out: &mut Writer<'_>, sense: &Sense, last: &Sense) {
 }
 
 fn put_command(out: &mut Writer<'_>, command: &Command, last: &Command) {
-    let changed = command != last;
-    out.put(changed.into(), 1);
-    if !changed {
-        return;
+    if command == last {
+        return out.put(0, 1);
     }
     let Command { torque, goal, bus_watchdog_ms, fit_level, tare_forced, .. } = *command;
     let Command { tare_request, clear_request, measure_request, .. } = *command;
-    out.put(torque.into(), 1);
-    out.put(tare_forced.into(), 1);
+    out.put(1 | u32::from(torque) << 1 | u32::from(tare_forced) << 2, 3);
     out.put(goal.to_bits().cast_unsigned(), 32);
-    out.put(bus_watchdog_ms.into(), 16);
-    out.put(fit_level as u32, 8);
-    for request in [tare_request, clear_request, measure_request] {
-        out.put(request.into(), 8);
-    }
+    out.put(u32::from(bus_watchdog_ms) | (fit_level as u32) << 16 | u32::from(tare_request) << 24, 32);
+    out.put(u16::from_le_bytes([clear_request, measure_request]).into(), 16);
 }
 
 /// Number of ones after which a number follows with all its bits.
@@ -298,8 +283,13 @@ impl<'a> Writer<'a> {
     }
 
     /// Writes the low bits of a number, at most 32; those above must be 0.
-    #[inline(always)]
+    #[inline(never)]
     pub fn put(&mut self, value: u32, count: u32) {
+        self.put_inlined(value, count);
+    }
+
+    #[inline(always)]
+    fn put_inlined(&mut self, value: u32, count: u32) {
         self.place.held |= value << self.place.count;
         self.place.count += count;
         if self.place.count >= 32 {
@@ -325,7 +315,7 @@ impl<'a> Writer<'a> {
     /// Writes codes as their folded differences to those before, each of 16 bits at most. Returns the sum of the
     /// differences.
     ///
-    /// [`Writer::folded`] for each, with the word under way in registers: a frame has a hundred of them.
+    /// As [`Writer::signed`] for each, with the word under way in registers: a frame has a hundred of them.
     #[inline(never)]
     pub fn codes(&mut self, codes: &[u16], before: &[u16], width: u32) -> u32 {
         let width = width & 31;
@@ -337,7 +327,8 @@ impl<'a> Writer<'a> {
             let ones = value >> width;
             if ones >= ESCAPE {
                 (self.place.held, self.place.count) = (held, filled);
-                self.escaped(value);
+                self.put((1 << ESCAPE) - 1, ESCAPE);
+                self.put(value, 16);
                 (held, filled) = (self.place.held, self.place.count);
                 continue;
             }
@@ -356,13 +347,6 @@ impl<'a> Writer<'a> {
         sum
     }
 
-    #[cold]
-    #[inline(never)]
-    fn escaped(&mut self, value: u32) {
-        self.put((1 << ESCAPE) - 1, ESCAPE);
-        self.put(value, 16);
-    }
-
     /// Writes the last bits, and returns the check sum of all.
     pub fn finish(self) -> u32 {
         let place = self.place;
@@ -372,22 +356,18 @@ impl<'a> Writer<'a> {
         mix(place.check, place.held)
     }
 
-    /// Writes a folded number of at most `all` bits.
-    #[inline(always)]
-    fn folded(&mut self, value: u32, width: u32, all: u32) {
-        let ones = value >> width;
-        if ones < ESCAPE {
-            let low = value & ((1 << width) - 1);
-            self.put(low << (ones + 1) | ((1 << ones) - 1), ones + 1 + width);
-        } else {
-            self.put((1 << ESCAPE) - 1, ESCAPE);
-            self.put(value, all);
-        }
-    }
-
     /// Writes a difference of 32 bits.
     pub fn signed(&mut self, value: i32, width: u32) {
-        self.folded((value << 1 ^ value >> 31).cast_unsigned(), width, 32);
+        let value = (value << 1 ^ value >> 31).cast_unsigned();
+        let ones = value >> width;
+        let (bits, count) = if ones < ESCAPE {
+            let low = value & ((1 << width) - 1);
+            (low << (ones + 1) | ((1 << ones) - 1), ones + 1 + width)
+        } else {
+            self.put((1 << ESCAPE) - 1, ESCAPE);
+            (value, 32)
+        };
+        self.put_inlined(bits, count);
     }
 }
 

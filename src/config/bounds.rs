@@ -51,24 +51,26 @@ pub struct Bounds {
     pub change_unsure: i32,
 }
 
-/// Constants of frame, encoder and motor from the configuration.
-pub(crate) struct Drives {
+/// Constants of frame, encoder and motor.
+pub(super) struct Drive {
     pub frame_s: f32,
     pub mm_per_count: f32,
-    /// The motor's inertia at the tip, kg.
-    pub mass: f32,
-    /// g V_max, mm/s^2.
-    pub driven: f32,
+    /// The motor's inertia at the tip.
+    pub mass_kg: f32,
+    /// c.
+    pub damping_per_s: f32,
+    /// g V_max.
+    pub voltage_max_mm_per_s2: f32,
 }
 
 impl Bounds {
-    pub(crate) fn new(p: &Params, tip: &Tip, drives: &Drives) -> Self {
-        let Drives { frame_s, mm_per_count, mass, driven } = *drives;
+    pub(super) fn new(p: &Params, tip: &Tip, drive: &Drive) -> Self {
+        let Drive { frame_s, mm_per_count, mass_kg, voltage_max_mm_per_s2, .. } = *drive;
         let tau_s = (TAU_S * (mm_per_count / COUNT_MM).max(1.0).min(LONGER)).max(TAU_FRAMES * frame_s);
         let friction_n = 1e-6 * p.friction_unm as f32 * p.reduction_mrad_per_mm as f32;
-        let change_per_n = 1e3 / mass * tau_s;
+        let change_per_n = 1e3 / mass_kg * tau_s;
         let (count, rubbed) = (mm_per_count / tau_s, friction_n * change_per_n);
-        let change_least = (0.25 * driven * tau_s).min(CHANGE).max(RUBBED * rubbed) + COUNTS * count;
+        let change_least = (0.25 * voltage_max_mm_per_s2 * tau_s).min(CHANGE).max(RUBBED * rubbed) + COUNTS * count;
         let change_free = VARIES * rubbed + 0.25 * COUNTS * count + OFF;
         let deepest = tip.indentation(newtons(p.force_max_mn));
         Self {
@@ -77,7 +79,7 @@ impl Bounds {
             speed_any: speed(p.speed_max_um_per_s + p.speed_max_um_per_s / 2),
             frames_per_s: (1.0 / frame_s) as i32,
             leak: narrow(frame_s / tau_s * exp2(16)),
-            acceleration_per_n: narrow(1e3 / mass * exp2(8)),
+            acceleration_per_n: narrow(1e3 / mass_kg * exp2(8)),
             change_per_n: narrow(change_per_n * exp2(16)),
             change_least: narrow(change_least * exp2(16)),
             change_free: narrow(change_free * exp2(16)),
@@ -86,50 +88,20 @@ impl Bounds {
     }
 }
 
-/// Distance to each side within which pulses feel the friction, mm.
-const FELT_MM: f32 = 0.8;
-/// Distance to each side at which strokes rest, mm.
-const STROKE_MM: f32 = 0.7;
-/// Distance beyond which any motion is shorted, mm.
-const FARTHEST_MM: f32 = 1.2;
-/// Rise of the voltage of a quick pulse, as the force that it makes at the tip, N/s.
-const JOG_N_PER_S: f32 = 50.0;
-/// Time in which the voltage of a slow pulse rises to the back-EMF of the fastest stroke, s.
-const RISE_S: f32 = 0.36;
-/// Distance after which a pulse ends, mm.
-const PULSE_MM: f32 = 0.04;
-/// Time of motion after which a pulse ends, s.
-const PULSE_S: f32 = 0.05;
-/// Force by which a pulse, or the start of a stroke, may exceed the easiest pulse, N.
-const FEEL_N: f32 = 0.17;
-/// Least voltage of a stroke beyond that at which pulses moved, as a force at the tip, N.
-const START_N: f32 = 0.05;
-/// Upper limit of that voltage, as a share of the back-EMF of the fastest stroke.
-const START_PART: f32 = 0.1;
 /// Speed of the fastest stroke, mm/s, at most that of an approach.
 const SPEED_MM_PER_S: f32 = 28.0;
 /// Distance that the fastest stroke may roll on when shorted, mm.
 const ROLL_MM: f32 = 0.25;
 /// Distance that a shorted motor rolls on, in time constants of the parameters.
 const ROLL: f32 = 1.4;
-/// Longest time of a stroke, s.
-const STROKE_S: f32 = 0.5;
 /// Force that ends a stroke, mN: the speed falls over the span as by this force.
 const PUSH_MN: i32 = 300;
 /// Span over which the speed is compared, s.
 const SPAN_S: f32 = 0.016;
 /// Number of parts of a span: the count is kept at the end of each.
 pub const SPAN_PARTS: usize = 16;
-/// Time without a count after which the tip is at rest, s.
-const STILL_S: f32 = 0.012;
-/// Longest time to wait for rest, s.
-const REST_S: f32 = 0.5;
-/// Force of the array that counts as a touch, mN; the force of a contact if that is less.
-const TOUCH_MN: i32 = 40;
-/// Largest motion against the direction of a stroke, counts.
-const BACK: i32 = 4;
-/// Largest motion against the direction of a stroke, mm, if that is farther.
-const BACK_MM: f32 = 0.03;
+/// Largest number of frames of a part of a motion.
+const FRAMES_MAX: f32 = 2e9;
 /// Largest number of counts in the motions' arithmetic.
 const COUNTS_MAX: f32 = 1_048_576.0;
 /// Largest voltage in the motions' arithmetic, uV.
@@ -139,25 +111,26 @@ const UV_MAX: f32 = 50_000_000.0;
 /// frames, voltages in uV.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Motions {
-    /// Distance to each side within which pulses feel the friction.
+    /// Distance to each side within which pulses feel the friction: 0.8 mm.
     pub felt: i32,
-    /// Distance to each side at which strokes rest.
+    /// Distance to each side at which strokes rest: 0.7 mm.
     pub stroke: i32,
-    /// Distance beyond which everything is shorted.
+    /// Distance beyond which everything is shorted: 1.2 mm.
     pub farthest: i32,
-    /// Largest motion against the direction.
+    /// Largest motion against the direction: 0.03 mm, at least 4 counts.
     pub back: i32,
-    /// Distance after which a pulse ends.
+    /// Distance after which a pulse ends: 0.04 mm.
     pub pulse: i32,
-    /// Time of motion after which a pulse ends.
+    /// Time of motion after which a pulse ends: 0.05 s.
     pub pulse_frames: u32,
-    /// Rise of the voltage of a quick pulse in a frame.
+    /// Rise of the voltage of a quick pulse in a frame: by 50 N/s at the tip.
     pub jog_rise_uv: i32,
-    /// Rise of the voltage of other pulses and of strokes in a frame.
+    /// Rise of the voltage of other pulses and of strokes in a frame: to the back-EMF of the fastest stroke in 0.36 s.
     pub rise_uv: i32,
-    /// Voltage by which a pulse may exceed the easiest one.
+    /// Voltage by which a pulse, or the start of a stroke, may exceed the easiest pulse: 0.17 N at the tip.
     pub feel_uv: i32,
-    /// Least voltage of a stroke beyond that at which pulses moved.
+    /// Least voltage of a stroke beyond that at which pulses moved: 0.05 N at the tip, at most a tenth of the back-EMF
+    /// of the fastest stroke.
     pub start_uv: i32,
     /// Back-EMF of the fastest stroke.
     pub fastest_uv: i32,
@@ -173,63 +146,60 @@ pub struct Motions {
     pub push_mn: i32,
     /// Distance that a shorted motor rolls on, for the counts of a quarter of a span, Q8.
     pub roll_q8: i32,
-    /// Time without a count after which the tip is at rest.
+    /// Time without a count after which the tip is at rest: 12 ms.
     pub still: u32,
-    /// Longest time to wait for rest.
+    /// Longest time to wait for rest: 0.5 s.
     pub rest: u32,
-    /// Longest time of a stroke.
+    /// Longest time of a stroke: 0.5 s.
     pub longest: u32,
-    /// Force that counts as a touch.
+    /// Force of the array that counts as a touch: 40 mN, or that of a contact if it is less.
     pub touch: Newtons,
     /// Length of a count, Q16 um.
     um_per_count_q16: i64,
 }
 
-/// Constants of frame, encoder and motor from the configuration.
-pub(crate) struct Driven {
-    pub frame_s: f32,
-    pub mm_per_count: f32,
-    /// c, 1/s.
-    pub damping: f32,
+#[inline(never)]
+fn limited(value: f32, min: f32, max: f32) -> i32 {
+    value.clamp(min, max) as i32
 }
 
 impl Motions {
-    pub(crate) fn new(p: &Params, driven: &Driven) -> Self {
-        let Driven { frame_s, mm_per_count, damping } = *driven;
-        let counts = |mm: f32| (mm / mm_per_count).clamp(4.0, COUNTS_MAX) as i32;
-        let frames = |s: f32| (s / frame_s).max(2.0) as u32;
-        let microvolts = |uv: f32| uv.clamp(1.0, UV_MAX) as i32;
+    pub(super) fn new(p: &Params, drive: &Drive) -> Self {
+        let Drive { frame_s, mm_per_count, damping_per_s, .. } = *drive;
+        let counts = |mm: f32| limited(mm / mm_per_count, 4.0, COUNTS_MAX);
+        let frames = |s: f32| limited(s / frame_s, 2.0, FRAMES_MAX).cast_unsigned();
+        let microvolts = |uv: f32| limited(uv, 1.0, UV_MAX);
         // Back-EMF for a speed of the tip, uV s/mm, and voltage for a force, uV/N.
         let (k, rad_per_mm) = (p.torque_constant_unm_per_a as f32, p.reduction_mrad_per_mm as f32 * 1e-3);
         let uv_s_per_mm = k * rad_per_mm;
         let uv_per_newton = p.resistance_mohm as f32 * 1e6 / uv_s_per_mm;
         let approach = p.approach_um_per_s as f32 * 1e-3;
-        let fastest_uv = uv_s_per_mm * SPEED_MM_PER_S.min(ROLL_MM * damping).min(approach);
+        let fastest_uv = uv_s_per_mm * SPEED_MM_PER_S.min(ROLL_MM * damping_per_s).min(approach);
         let span_part = frames(SPAN_S / SPAN_PARTS as f32).max(1);
         let span_s = span_part as f32 * SPAN_PARTS as f32 * frame_s;
         let push_mm_per_s = PUSH_MN as f32 * 1e-3 * uv_per_newton / uv_s_per_mm;
         Self {
-            felt: counts(FELT_MM),
-            stroke: counts(STROKE_MM),
-            farthest: counts(FARTHEST_MM),
-            back: BACK.max(counts(BACK_MM)),
-            pulse: counts(PULSE_MM),
-            pulse_frames: frames(PULSE_S),
-            jog_rise_uv: microvolts(JOG_N_PER_S * uv_per_newton * frame_s),
-            rise_uv: microvolts(fastest_uv / RISE_S * frame_s),
-            feel_uv: microvolts(FEEL_N * uv_per_newton),
-            start_uv: microvolts((START_N * uv_per_newton).min(START_PART * fastest_uv)),
+            felt: counts(0.8),
+            stroke: counts(0.7),
+            farthest: counts(1.2),
+            back: counts(0.03),
+            pulse: counts(0.04),
+            pulse_frames: frames(0.05),
+            jog_rise_uv: microvolts(50.0 * uv_per_newton * frame_s),
+            rise_uv: microvolts(fastest_uv / 0.36 * frame_s),
+            feel_uv: microvolts(0.17 * uv_per_newton),
+            start_uv: microvolts((0.05 * uv_per_newton).min(0.1 * fastest_uv)),
             fastest_uv: microvolts(fastest_uv),
             uv_per_count_q8: narrow(uv_s_per_mm * mm_per_count / span_s * 256.0),
             uv_per_newton: microvolts(uv_per_newton),
             span_part,
             push: counts(push_mm_per_s * span_s),
             push_mn: PUSH_MN,
-            roll_q8: narrow(ROLL / damping / (span_s / 4.0) * 256.0),
-            still: frames(STILL_S),
-            rest: frames(REST_S),
-            longest: frames(STROKE_S),
-            touch: newtons(p.contact_on_mn.min(TOUCH_MN)),
+            roll_q8: narrow(ROLL / damping_per_s / (span_s / 4.0) * 256.0),
+            still: frames(0.012),
+            rest: frames(0.5),
+            longest: frames(0.5),
+            touch: newtons(p.contact_on_mn.min(40)),
             um_per_count_q16: wide(mm_per_count * 1e3 * 65_536.0),
         }
     }

@@ -2,7 +2,7 @@
 
 use super::motor::{GAIN_SETS, POSITION_TO_SPEED};
 use super::{Config, SEEN_LEAST, newtons};
-use crate::params::ParamError;
+use crate::params::{ParamError, Params};
 use crate::scan::ScanError;
 
 /// Reason to refuse parameters.
@@ -20,7 +20,7 @@ pub enum ConfigError {
     Supply(i32, i32),
     /// The converter saturates at too small a force.
     Seen {
-        /// [`Params::codes_per_kpa_milli`](crate::params::Params::codes_per_kpa_milli).
+        /// [`Params::codes_per_kpa_milli`].
         codes_per_kpa_milli: i32,
         /// Largest force without saturation of the converter, mN, rounded down.
         seen_mn: i32,
@@ -57,7 +57,7 @@ impl core::error::Error for ConfigError {}
 const PART: i32 = 8;
 /// Radius of such a contact over the pitch, in pitches. Where taxels read their mean pressure, a dead one costs 2 % of
 /// the force at most from 1.65 on, and up to 30 % below 1.5. The rest is for taxels that are smaller than the pitch.
-const PITCHES: i64 = 2;
+const PITCHES: i32 = 2;
 /// The slowest frames for which the gains follow the frame time, ns: 5 frames of them take 1/60 s.
 const FRAME_NS: u32 = 3_333_333;
 /// Lag of the observer's disturbance, times the speed gain: 3 / 2.5, because its three poles are at 2.5 times that gain.
@@ -74,7 +74,7 @@ const COUNT_UM: i32 = 100;
 pub enum Warning {
     /// The taxels are too far apart for this tip.
     CoarsePitch {
-        /// [`Params::pitch_um`](crate::params::Params::pitch_um).
+        /// [`Params::pitch_um`].
         pitch_um: i32,
         /// An eighth of the largest force, mN.
         force_mn: i32,
@@ -83,7 +83,7 @@ pub enum Warning {
     },
     /// The converter saturates before the largest goal is reached.
     ForceUnseen {
-        /// [`Params::force_max_mn`](crate::params::Params::force_max_mn).
+        /// [`Params::force_max_mn`].
         force_max_mn: i32,
         /// The largest force that the converter sees whole, mN.
         seen_mn: i32,
@@ -109,7 +109,7 @@ pub enum Warning {
     },
     /// The motor at its largest current or voltage presses less than the largest goal.
     WeakDrive {
-        /// [`Params::force_max_mn`](crate::params::Params::force_max_mn).
+        /// [`Params::force_max_mn`].
         force_max_mn: i32,
         /// Largest force of the motor at rest, without friction, mN.
         stall_mn: i32,
@@ -158,10 +158,11 @@ impl Config {
     /// Returns the warnings about this configuration, for a host to show.
     pub fn warnings(&self) -> impl Iterator<Item = Warning> {
         let p = &self.params;
-        let force_mn = p.force_max_mn / PART;
+        let Params { pitch_um, force_max_mn, .. } = *p;
+        let force_mn = force_max_mn / PART;
         let depth = self.tip.indentation(newtons(force_mn));
         let radius = self.tip.contact_radius(depth);
-        let radius_um = (i64::from(radius.to_bits()) * 1_000) >> 24;
+        let radius_um = ((i64::from(radius.to_bits()) * 1_000) >> 24) as i32;
         let seen_mn = ((i64::from(self.force_seen.to_bits()) * 1_000) >> 16) as i32;
         let count_um = ((i64::from(self.count.to_bits()) * 1_000) >> 24) as i32;
         let frame_ns = self.timing.frame_ns;
@@ -172,25 +173,22 @@ impl Config {
         let stiffness = 2.0 * core::f32::consts::PI * p.modulus_pa as f32 * depth_m / mass_kg;
         let slope = self.gain_sets[GAIN_SETS - 1].slope_per_s.max(1) as f32;
         let speed_gain = POSITION_TO_SPEED * slope;
-        let settle_ms = 1e3 * (1.0 + CONTACT_SLOWS * stiffness / (speed_gain * speed_gain)) / slope;
+        let mass_g = (1e3 * mass_kg) as i32;
+        let settling_ms = 1e3 * (1.0 + CONTACT_SLOWS * stiffness / (speed_gain * speed_gain)) / slope;
         let volts_mv = p.voltage_max_mv.min(p.supply_max_mv) as f32;
         let amperes = (p.current_max_ma as f32 * 1e-3).min(volts_mv / p.resistance_mohm.max(1) as f32);
         let stall_mn = (amperes * p.torque_constant_unm_per_a as f32 * 1e-3 * rad_per_m) as i32;
         [
-            (radius_um < PITCHES * i64::from(p.pitch_um)).then_some(Warning::CoarsePitch {
-                pitch_um: p.pitch_um,
-                force_mn,
-                radius_um: radius_um as i32,
-            }),
-            (seen_mn < p.force_max_mn).then_some(Warning::ForceUnseen { force_max_mn: p.force_max_mn, seen_mn }),
+            (radius_um < PITCHES * pitch_um).then_some(Warning::CoarsePitch { pitch_um, force_mn, radius_um }),
+            (seen_mn < force_max_mn).then_some(Warning::ForceUnseen { force_max_mn, seen_mn }),
             (frame_ns > FRAME_NS).then_some(Warning::SlowFrames { frame_ns }),
             (count_um >= COUNT_UM).then_some(Warning::CoarseEncoder { count_um }),
-            (settle_ms > SETTLE_MS).then_some(Warning::LightDrive {
-                mass_g: (1e3 * mass_kg) as i32,
+            (settling_ms > SETTLE_MS).then_some(Warning::LightDrive {
+                mass_g,
                 force_mn,
-                settle_ms: settle_ms as i32,
+                settle_ms: settling_ms as i32,
             }),
-            (stall_mn < p.force_max_mn).then_some(Warning::WeakDrive { force_max_mn: p.force_max_mn, stall_mn }),
+            (stall_mn < force_max_mn).then_some(Warning::WeakDrive { force_max_mn, stall_mn }),
         ]
         .into_iter()
         .flatten()

@@ -125,59 +125,38 @@ pub enum Event {
     Framing,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Expect {
-    Header,
-    Id,
-    LengthLow,
-    LengthHigh,
-    Instruction,
-    Params,
-    CrcLow,
-    CrcHigh,
-}
-
 /// Finds packets in a stream of bytes.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Receiver {
     /// The last four bytes as they came.
     window: u32,
-    expect: Expect,
+    /// Number of bytes after the header of the packet under way; none outside of a packet.
+    place: Option<u16>,
+    /// Number of bytes after the header of the whole packet, once its length is known.
+    end: u16,
     /// Number of bytes since the last packet that belong to none.
     stray: u8,
     /// Number of bytes that still belong to a packet of which this device has sent a part.
     shared: u16,
-    id: u8,
-    instruction: u8,
-    /// Number of bytes before the CRC.
-    left: u16,
+    /// ID, length and instruction.
+    head: [u8; 4],
     crc: u16,
     crc_low: u8,
     params: Vec<u8, PARAMS_MAX>,
-    complete: bool,
+    /// True if parameters did not fit.
+    cut: bool,
 }
 
 impl Receiver {
     /// Creates a receiver.
-    pub const fn new() -> Self {
-        Self {
-            window: 0,
-            expect: Expect::Header,
-            stray: 0,
-            shared: 0,
-            id: 0,
-            instruction: 0,
-            left: 0,
-            crc: CRC_START,
-            crc_low: 0,
-            params: Vec::new(),
-            complete: true,
-        }
+    pub fn new() -> Self {
+        Self::default()
     }
 
     /// Packet of the last event; valid until the next byte.
     pub fn packet(&self) -> Packet<'_> {
-        Packet { id: self.id, instruction: self.instruction, params: &self.params, complete: self.complete }
+        let [id, _, _, instruction] = self.head;
+        Packet { id, instruction, params: &self.params, complete: !self.cut }
     }
 
     /// Takes one byte.
@@ -185,50 +164,36 @@ impl Receiver {
         let stuffing = byte == STUFFING && self.window & 0x00FF_FFFF == u32::from_be_bytes(HEADER) >> 8;
         self.window = self.window << 8 | u32::from(byte);
         let header = self.window == u32::from_be_bytes(HEADER);
-        if header && self.expect != Expect::CrcHigh {
-            let clean = self.expect == Expect::Header && usize::from(self.stray) < HEADER.len();
+        let last = self.place.is_some_and(|place| place + 1 == self.end);
+        if header && !last {
+            let clean = self.place.is_none() && usize::from(self.stray) < HEADER.len();
             self.begin();
             return (!clean).then_some(Event::Framing);
         }
-        if !matches!(self.expect, Expect::Header | Expect::CrcLow | Expect::CrcHigh) {
-            self.crc = update_crc(self.crc, &[byte]);
+        let Some(place) = self.place else {
+            if self.shared > 0 {
+                self.shared -= 1;
+            } else {
+                self.stray = self.stray.saturating_add(1);
+            }
+            return None;
+        };
+        if last {
+            return Some(self.finish(byte, header));
         }
-        match self.expect {
-            Expect::Header if self.shared > 0 => self.shared -= 1,
-            Expect::Header => self.stray = self.stray.saturating_add(1),
-            Expect::Id if byte <= ID_MAX || byte == BROADCAST => {
-                self.id = byte;
-                self.expect = Expect::LengthLow;
+        self.place = Some(place + 1);
+        if place + 2 == self.end {
+            self.crc_low = byte;
+            return None;
+        }
+        self.crc = update_crc(self.crc, &[byte]);
+        match self.head.get_mut(usize::from(place)) {
+            Some(slot) => {
+                *slot = byte;
+                self.check_head(place);
             }
-            Expect::Id => self.lose(),
-            Expect::LengthLow => {
-                self.left = u16::from(byte);
-                self.expect = Expect::LengthHigh;
-            }
-            Expect::LengthHigh => {
-                let length = u16::from_le_bytes([self.left.to_le_bytes()[0], byte]);
-                if (LENGTH_MIN..=LENGTH_MAX).contains(&length) {
-                    self.left = length - 2;
-                    self.expect = Expect::Instruction;
-                } else {
-                    self.lose();
-                }
-            }
-            Expect::Instruction => {
-                self.instruction = byte;
-                self.count_down();
-            }
-            Expect::Params => {
-                if !stuffing && self.params.push(byte).is_err() {
-                    self.complete = false;
-                }
-                self.count_down();
-            }
-            Expect::CrcLow => {
-                self.crc_low = byte;
-                self.expect = Expect::CrcHigh;
-            }
-            Expect::CrcHigh => return Some(self.end(byte, header)),
+            None if !stuffing => self.cut |= self.params.push(byte).is_err(),
+            None => {}
         }
         None
     }
@@ -239,31 +204,32 @@ impl Receiver {
         self.window = 0;
         self.stray = 0;
         self.shared = behind;
-        self.expect = Expect::Header;
+        self.place = None;
     }
 
     fn begin(&mut self) {
         self.shared = 0;
         self.crc = update_crc(CRC_START, &HEADER);
         self.params.clear();
-        self.complete = true;
-        self.expect = Expect::Id;
+        self.cut = false;
+        (self.place, self.end) = (Some(0), u16::MAX);
     }
 
-    fn count_down(&mut self) {
-        self.left = self.left.saturating_sub(1);
-        self.expect = if self.left == 0 { Expect::CrcLow } else { Expect::Params };
+    /// Drops a header that was no packet, as its ID or its length shows.
+    fn check_head(&mut self, place: u16) {
+        let [id, low, high, _] = self.head;
+        let length = u16::from_le_bytes([low, high]);
+        match place {
+            0 if id <= ID_MAX || id == BROADCAST => {}
+            2 if (LENGTH_MIN..=LENGTH_MAX).contains(&length) => self.end = length + 3,
+            0 | 2 => (self.stray, self.place) = (u8::MAX, None),
+            _ => {}
+        }
     }
 
-    /// Drops a header that was no packet.
-    fn lose(&mut self) {
-        self.stray = u8::MAX;
-        self.expect = Expect::Header;
-    }
-
-    fn end(&mut self, crc_high: u8, header: bool) -> Event {
+    fn finish(&mut self, crc_high: u8, header: bool) -> Event {
         self.stray = 0;
-        self.expect = Expect::Header;
+        self.place = None;
         if u16::from_le_bytes([self.crc_low, crc_high]) == self.crc {
             self.window = 0;
             return Event::Packet;
@@ -274,12 +240,6 @@ impl Receiver {
             return Event::Framing;
         }
         Event::BadCrc
-    }
-}
-
-impl Default for Receiver {
-    fn default() -> Self {
-        Self::new()
     }
 }
 
@@ -330,10 +290,8 @@ impl<'r> Sender<'r> {
     /// Ends the packet with its length and CRC.
     pub fn finish(mut self) {
         let length = (self.reply.len() + 2).saturating_sub(STUFFED_FROM) as u16;
-        for (place, byte) in (LENGTH_PLACE..).zip(length.to_le_bytes()) {
-            if let Some(slot) = self.reply.get_mut(place) {
-                *slot = byte;
-            }
+        if let Some(place) = self.reply.get_mut(LENGTH_PLACE..).and_then(|rest| rest.first_chunk_mut()) {
+            *place = length.to_le_bytes();
         }
         for byte in update_crc(CRC_START, self.reply).to_le_bytes() {
             self.raw(byte);

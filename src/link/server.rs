@@ -3,18 +3,17 @@
 mod answer;
 mod execute;
 
-use heapless::Vec;
-
 use crate::command::Command;
+use crate::pipeline::Status;
 use crate::scan::Clocks;
+use crate::state::Fault;
 use crate::store::Record;
 use crate::units::Newtons;
+use heapless::Vec;
 
 use super::packet::{Event, Receiver, Reply, StatusError};
-
 use super::settings::{Actions, Saved, Settings};
 use super::snapshot::Snapshot;
-use super::stand::Stand;
 use answer::Turn;
 
 /// The longest Reg Write: all gains of 10 x 10 taxels at once.
@@ -45,29 +44,31 @@ impl Counters {
     }
 }
 
-/// A write that waits for its Action.
-#[derive(Clone, Debug)]
-struct Registered {
-    address: u16,
-    data: Vec<u8, REG_WRITE_MAX>,
-}
-
 /// State of the device.
 #[derive(Clone, Debug)]
 pub(super) struct Device<const ROWS: usize, const COLUMNS: usize> {
     pub settings: Settings<ROWS, COLUMNS>,
     pub counters: Counters,
-    registered: Option<Registered>,
-    actions: Actions,
+    /// Address and data of a write that waits for its Action.
+    pub registered: Option<(u16, Vec<u8, REG_WRITE_MAX>)>,
+    /// Actions that wait for the firmware.
+    pub actions: Actions,
     turn: Turn,
     /// Number of bytes behind this device's part of a shared packet, once it has sent the part.
     behind: Option<u16>,
     /// Time of the last byte that its turn may depend on, ms.
     heard_ms: u32,
-    /// State of the loop at the last snapshot.
-    stand: Stand,
+    /// True if the last snapshot showed the fault of the bus watchdog.
+    bus_silent: bool,
     reply_delay_us: u32,
     clocks: &'static Clocks,
+}
+
+/// The device while it takes bytes: its state, the snapshot of the loop, and the reply.
+struct Exchange<'a, const ROWS: usize, const COLUMNS: usize> {
+    state: &'a mut Device<ROWS, COLUMNS>,
+    snapshot: &'a Snapshot<'a, ROWS, COLUMNS>,
+    reply: &'a mut Reply,
 }
 
 /// The device on the bus.
@@ -111,7 +112,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Server<ROWS, COLUMNS> {
             turn: Turn::None,
             behind: None,
             heard_ms: 0,
-            stand: Stand::default(),
+            bus_silent: false,
             reply_delay_us: 0,
             clocks,
         };
@@ -124,19 +125,22 @@ impl<const ROWS: usize, const COLUMNS: usize> Server<ROWS, COLUMNS> {
     /// the rest. Do not feed what this device itself sends.
     pub fn feed(&mut self, bytes: &[u8], snapshot: &Snapshot<'_, ROWS, COLUMNS>, reply: &mut Reply) -> usize {
         reply.clear();
-        self.observe(Stand::of(snapshot));
+        let Self { receiver, state } = self;
+        state.observe(&snapshot.status);
+        let mut exchange = Exchange { state, snapshot, reply };
         for (place, &byte) in bytes.iter().enumerate() {
-            self.state.listen(byte, snapshot, reply);
-            match self.receiver.push(byte) {
-                Some(Event::Packet) => self.state.packet(self.receiver.packet(), snapshot, reply),
-                Some(Event::BadCrc) => self.state.damaged(self.receiver.packet(), reply),
-                Some(Event::Framing) => self.state.counters.framing = self.state.counters.framing.saturating_add(1),
+            exchange.listen(byte);
+            let counters = &mut exchange.state.counters;
+            match receiver.push(byte) {
+                Some(Event::Packet) => exchange.packet(receiver.packet()),
+                Some(Event::BadCrc) => exchange.damaged(receiver.packet()),
+                Some(Event::Framing) => counters.framing = counters.framing.saturating_add(1),
                 None => {}
             }
-            if let Some(behind) = self.state.behind.take() {
-                self.receiver.take_part(behind);
+            if let Some(behind) = exchange.state.behind.take() {
+                receiver.take_part(behind);
             }
-            if !reply.is_empty() {
+            if !exchange.reply.is_empty() {
                 return place + 1;
             }
         }
@@ -177,31 +181,22 @@ impl<const ROWS: usize, const COLUMNS: usize> Server<ROWS, COLUMNS> {
     pub fn note_saved(&mut self, succeeded: bool) {
         self.state.settings.saved = if succeeded { Saved::Same } else { Saved::Failed };
     }
-
-    /// Updates the state of the loop. A fault turns torque off and sets the goal to 0; a silent bus also trips the
-    /// watchdog's register.
-    fn observe(&mut self, stand: Stand) {
-        let settings = &mut self.state.settings;
-        if stand.faulted {
-            settings.command.torque = false;
-            settings.command.goal = Newtons::ZERO;
-        }
-        if stand.bus_silent && !self.state.stand.bus_silent {
-            settings.watchdog_tripped = true;
-            settings.command.bus_watchdog_ms = 0;
-        }
-        self.state.stand = stand;
-    }
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Device<ROWS, COLUMNS> {
-    /// Returns true while a Reg Write waits.
-    pub fn registered(&self) -> bool {
-        self.registered.is_some()
-    }
-
-    /// Actions that wait for the firmware.
-    pub fn actions(&self) -> Actions {
-        self.actions
+    /// Updates the settings. A fault turns torque off and sets the goal to 0; a silent bus also trips the watchdog's
+    /// register.
+    fn observe(&mut self, status: &Status) {
+        let command = &mut self.settings.command;
+        if status.fault.is_some() {
+            command.torque = false;
+            command.goal = Newtons::ZERO;
+        }
+        let bus_silent = status.fault == Some(Fault::BusSilent);
+        if bus_silent && !self.bus_silent {
+            command.bus_watchdog_ms = 0;
+            self.settings.watchdog_tripped = true;
+        }
+        self.bus_silent = bus_silent;
     }
 }

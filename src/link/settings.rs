@@ -1,13 +1,8 @@
 //! Settings that the host may change, and actions that it may request of the firmware.
 
-use crate::command::Command;
-use crate::config::{ConfigError, Shaped};
-use crate::scan::Clocks;
-use crate::store::{BAUD_RATES, Record};
-use crate::units::Newtons;
-
-use super::packet::StatusError;
 use super::table::indirect;
+use crate::command::Command;
+use crate::store::{BAUD_RATES, Record};
 
 /// Settings that a write can change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,26 +75,4 @@ impl<const ROWS: usize, const COLUMNS: usize> Settings<ROWS, COLUMNS> {
     pub fn return_delay_us(&self) -> u32 {
         u32::from(self.record.return_delay_2us) * 2
     }
-
-    /// Refuses values that no register's own range can refuse.
-    ///
-    /// # Errors
-    /// A parameter out of its range, parameters that contradict each other, or a goal beyond the largest force.
-    pub(super) fn check(&self, params_changed: bool, clocks: &Clocks) -> Result<(), StatusError> {
-        if params_changed {
-            Shaped::<ROWS, COLUMNS>::new(&self.record.params, clocks).map_err(|error| match error {
-                ConfigError::Param(_) => StatusError::Range,
-                _ => StatusError::Limit,
-            })?;
-        }
-        if goal_mn(self.command.goal) > self.record.params.force_max_mn {
-            return Err(StatusError::Limit);
-        }
-        Ok(())
-    }
-}
-
-/// Converts a force to mN, rounded.
-pub(super) fn goal_mn(force: Newtons) -> i32 {
-    super::table::thousandths(force.to_bits(), 16)
 }

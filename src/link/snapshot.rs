@@ -3,7 +3,6 @@
 use crate::capture;
 use crate::frame::Frame;
 use crate::pipeline::Status;
-use crate::pressure::TARE_BITS;
 use crate::state::Fault;
 
 /// Snapshot of the controller at one moment.
@@ -35,7 +34,7 @@ pub struct Snapshot<'a, const ROWS: usize, const COLUMNS: usize> {
     pub taxels: &'a [[i32; COLUMNS]; ROWS],
     /// Pressure of such a sixteenth, Pa in Q32.
     pub pascals_per_sum_q32: i64,
-    /// Readings of the taxels without contact, corrected codes with [`TARE_BITS`] fractional bits.
+    /// Readings of the taxels without contact, corrected codes with [`TARE_BITS`](crate::pressure::TARE_BITS) fractional bits.
     pub tare: &'a [[i32; COLUMNS]; ROWS],
     /// The capture.
     pub capture: Captured<'a>,
@@ -48,27 +47,6 @@ pub struct Captured<'a> {
     pub standing: capture::CaptureStatus,
     /// Bytes of the capture; none before it is done.
     pub data: &'a [u8],
-}
-
-impl<const ROWS: usize, const COLUMNS: usize> Snapshot<'_, ROWS, COLUMNS> {
-    /// Pressure on a taxel, row by row, in units of 10 Pa.
-    pub fn pressure_10pa(&self, place: usize) -> u16 {
-        let pascals = i64::from(of(self.taxels, place)).saturating_mul(self.pascals_per_sum_q32) >> 32;
-        saturate(((pascals + 5) / 10) as i32)
-    }
-
-    /// The zero of a taxel, row by row, in converter codes.
-    pub fn tare_codes(&self, place: usize) -> u16 {
-        saturate(of(self.tare, place).saturating_add(1 << (TARE_BITS - 1)) >> TARE_BITS)
-    }
-}
-
-fn of<const COLUMNS: usize>(taxels: &[[i32; COLUMNS]], place: usize) -> i32 {
-    taxels.as_flattened().get(place).copied().unwrap_or(0)
-}
-
-fn saturate(value: i32) -> u16 {
-    value.max(0).min(i32::from(u16::MAX)) as u16
 }
 
 /// Health of the board since the last reset. Counts saturate.
@@ -152,48 +130,7 @@ pub fn hardware_error(fault: Option<Fault>) -> u8 {
         Some(Fault::Bridge) => 1 << 4,
         Some(Fault::OverForce) => 1 << 5,
         Some(Fault::ArrayBroken | Fault::RowStuck | Fault::ArrayFrozen | Fault::Unseen) => 1 << 6,
-        Some(
-            Fault::LostFrames
-            | Fault::BusSilent
-            | Fault::BrokenParameters
-            | Fault::MissedDeadline
-            | Fault::Crash
-            | Fault::Runaway
-            | Fault::NoClock
-            | Fault::BrownOutLevel,
-        ) => 1 << 7,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn taxels_are_rounded_and_stay_within_their_registers() {
-        let (mut taxels, mut tare) = ([[0; 10]; 10], [[0; 10]; 10]);
-        // 8 Pa for a sixteenth of a code.
-        (taxels[0][1], taxels[0][2], taxels[9][9]) = (-3, 1, i32::MAX);
-        (tare[0][1], tare[0][2], tare[9][9]) = (-1 << TARE_BITS, (7 << TARE_BITS) + (1 << 15), i32::MAX);
-        let snapshot = Snapshot {
-            status: Status::default(),
-            supply_mv: 0,
-            tick_ms: 0,
-            frame_time_us: 0,
-            frame_ns: 0,
-            loop_time_us: 0,
-            loop_time_max_us: 0,
-            reset_cause: ResetCause::Unknown,
-            crash: Crash::default(),
-            health: Health::default(),
-            frame: &Frame::EMPTY,
-            taxels: &taxels,
-            pascals_per_sum_q32: 8 << 32,
-            tare: &tare,
-            capture: Captured::default(),
-        };
-        let at = |place| (snapshot.pressure_10pa(place), snapshot.tare_codes(place));
-        assert_eq!([0, 1, 2, 100].map(at), [(0, 0), (0, 0), (1, 8), (0, 0)]);
-        assert_eq!(at(99), (u16::MAX, 32_767));
+        // Controller and bus.
+        Some(_) => 1 << 7,
     }
 }

@@ -161,9 +161,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Step<ROWS, COLUMNS> {
 
     /// Takes a frame; a fresh one begins the step.
     fn take(&mut self, view: &PressInputs<ROWS, COLUMNS>, fresh: bool, back: bool) {
+        (self.frames[1], self.counts[1], self.chip) = (view.sequence, view.encoder, view.chip);
         if fresh {
             (self.frames[0], self.counts[0]) = (view.sequence, view.encoder);
-            (self.frames[1], self.counts[1], self.chip) = (view.sequence, view.encoder, view.chip);
             (self.taken, self.voltage_mv, self.back) = (1, view.applied_mv, back);
             (self.first, self.bad) = (view.picture.taxels, view.picture.bad);
             // The first frame is copied, not added: no frame both clears a step and adds to it.
@@ -171,7 +171,6 @@ impl<const ROWS: usize, const COLUMNS: usize> Step<ROWS, COLUMNS> {
             self.squares = [[0; COLUMNS]; ROWS];
             return;
         }
-        (self.frames[1], self.counts[1], self.chip) = (view.sequence, view.encoder, view.chip);
         if self.taken >= FRAMES_MAX {
             return;
         }

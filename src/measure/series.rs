@@ -158,24 +158,27 @@ impl<'a> Out<'a> {
                 self.means(sums.get(..half).unwrap_or_default(), taken);
             }
             1 => self.means(sums.get(half..).unwrap_or_default(), taken),
-            2 => self.variances(step.squares.as_flattened().iter().zip(sums.iter().zip(first)).take(half), taken),
             _ => {
-                self.variances(step.squares.as_flattened().iter().zip(sums.iter().zip(first)).skip(half), taken);
-                self.bits(step);
+                let taxels = step.squares.as_flattened().iter().zip(sums.iter().zip(first));
+                let (from, count) = if part == 2 { (0, half) } else { (half, ROWS * COLUMNS) };
+                self.variances(taxels.skip(from).take(count), taken);
+                if part > 2 {
+                    self.bits(step);
+                }
             }
         }
     }
 
     fn numbers<const ROWS: usize, const COLUMNS: usize>(&mut self, step: &Step<ROWS, COLUMNS>, taken: i32) {
-        step.frames.into_iter().for_each(|frame| self.put(frame.to_le_bytes()));
-        step.counts.into_iter().for_each(|count| self.put(count.to_le_bytes()));
-        self.put(step.taken.to_le_bytes());
-        self.put([step.back.into(), 0]);
-        let voltage = (step.voltage_mv / taken).max(i16::MIN.into()).min(i16::MAX.into()) as i16;
-        self.put(voltage.to_le_bytes());
-        // Degrees Celsius with 16 fractional bits.
+        let voltage_mv = (step.voltage_mv / taken).max(i16::MIN.into()).min(i16::MAX.into()) as u16;
+        // Tenths of a kelvin, from degrees Celsius with 16 fractional bits.
         let kelvin = step.chip.map_or(0, |chip| ((i64::from(chip.to_bits()) * 10) >> 16) + 2_731);
-        self.put((kelvin.max(0).min(u16::MAX.into()) as u16).to_le_bytes());
+        let kelvin = kelvin.max(0).min(u16::MAX.into()) as u16;
+        let ([first, last], [from, to]) = (step.frames, step.counts.map(i32::cast_unsigned));
+        let taken = u32::from(step.taken) | u32::from(step.back) << 16;
+        for word in [first, last, from, to, taken, u32::from(voltage_mv) | u32::from(kelvin) << 16] {
+            self.put(word.to_le_bytes());
+        }
     }
 
     fn means(&mut self, sums: &[i32], taken: i32) {

@@ -235,15 +235,13 @@ impl Strokes {
 
     /// Returns the reason that ends any motion.
     fn danger(&self, view: &StrokeInputs, plan: &Motions) -> Option<(Ended, i32)> {
-        let place = self.place(view.encoder);
+        let (place, gone) = (self.place(view.encoder), self.gone(view.encoder));
         if view.force >= plan.touch {
             Some((Ended::Touched, super::millinewtons(view.force)))
         } else if place.saturating_abs() > plan.farthest {
             Some((Ended::Astray, plan.um(place)))
-        } else if self.gone(view.encoder) < -plan.back {
-            Some((Ended::Reversed, self.gone(view.encoder).saturating_neg()))
         } else {
-            None
+            (gone < -plan.back).then(|| (Ended::Reversed, gone.saturating_neg()))
         }
     }
 
@@ -256,10 +254,8 @@ impl Strokes {
 
     fn rest(&mut self, ended: Option<(Ended, i32)>, view: &StrokeInputs, standing: &mut MeasureStatus, plan: &Motions) {
         self.frames = self.frames.saturating_add(1);
-        let ended = match ended {
-            None if view.force >= plan.touch => Some((Ended::Touched, super::millinewtons(view.force))),
-            ended => ended,
-        };
+        let touched = view.force >= plan.touch;
+        let ended = ended.or(touched.then(|| (Ended::Touched, super::millinewtons(view.force))));
         self.phase = Phase::Rest(ended);
         if view.encoder != self.stood.0 {
             self.stood = (view.encoder, self.frames);
@@ -329,7 +325,7 @@ impl Strokes {
             Part::Stroke(stroke) => {
                 (self.sampled, self.sum, self.row) = (0, 0, Some(Kept::Stroke));
                 let speed = SPEEDS.get(usize::from(stroke / 4)).copied().unwrap_or(0);
-                let wanted = self.friction(self.side()) + plan.fastest_uv / 4 * i32::from(speed);
+                let wanted = self.friction_uv[self.side()] + plan.fastest_uv / 4 * i32::from(speed);
                 wanted.max(self.least(plan))
             }
         }
@@ -341,11 +337,7 @@ impl Strokes {
     }
 
     fn easiest(&self) -> i32 {
-        self.moved_uv.get(self.side()).copied().unwrap_or(UNKNOWN)
-    }
-
-    fn friction(&self, side: usize) -> i32 {
-        self.friction_uv.get(side).copied().unwrap_or(0)
+        self.moved_uv[self.side()]
     }
 
     /// Voltage with which a stroke surely starts.
@@ -358,9 +350,7 @@ impl Strokes {
         let (gone, easiest) = (self.gone(view.encoder), self.easiest());
         let limit = easiest.saturating_add(plan.feel_uv).min(of_supply(view, PULSE_SUPPLY));
         if gone >= MOVED {
-            if let Some(moved) = self.moved_uv.get_mut(usize::from(self.sign < 0)) {
-                *moved = self.voltage_uv.max(1).min(*moved);
-            }
+            self.moved_uv[self.side()] = self.voltage_uv.max(1).min(easiest);
             self.moving += 1;
             if gone >= plan.pulse || self.moving > plan.pulse_frames {
                 self.short(view.encoder, None);
@@ -399,9 +389,7 @@ impl Strokes {
             if let Part::Stroke(0 | 1) = self.part {
                 let back_emf = (i64::from(span) * i64::from(plan.uv_per_count_q8)) >> 8;
                 let friction = i64::from(self.voltage_uv + self.more_uv) - back_emf;
-                if let Some(place) = self.friction_uv.get_mut(usize::from(self.sign < 0)) {
-                    *place = friction.max(0) as i32;
-                }
+                self.friction_uv[self.side()] = friction.max(0) as i32;
             }
             self.short(view.encoder, None);
         } else if self.fastest - span > plan.push {

@@ -7,7 +7,7 @@
 //!   sector if the newest one's is full. Each start reports them until the next save, which is written behind them.
 //!   An erase that was cut short at such a time looks the same, and is reported too.
 
-use super::{BLANK, Found, GRID, Record, Remark, end_of_records, read_record, take, words};
+use super::{BLANK, Found, GRID, Record, Remark, read_record, take, words};
 
 /// One of the two sectors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,16 +36,10 @@ pub trait Flash {
     /// The bytes of a sector, a multiple of 16.
     fn bytes(&self, sector: Sector) -> &[u8];
 
-    /// Programs a blank word.
-    ///
-    /// # Errors
-    /// The flash refuses.
+    /// Programs a blank word, unless the flash refuses.
     fn program(&mut self, sector: Sector, offset: usize, word: u32) -> Result<(), Self::Error>;
 
-    /// Erases a sector.
-    ///
-    /// # Errors
-    /// The flash refuses.
+    /// Erases a sector, unless the flash refuses.
     fn erase(&mut self, sector: Sector) -> Result<(), Self::Error>;
 }
 
@@ -74,7 +68,6 @@ pub struct Loaded<const ROWS: usize, const COLUMNS: usize> {
 pub struct Journal {
     /// Current sector for saves: that of the newest whole record.
     current: Sector,
-    sequence: u32,
     /// Positions in the current sector, and in the other one.
     sectors: [SectorContent; 2],
 }
@@ -88,8 +81,7 @@ impl Journal {
             (a, b) => a.is_none() && b.is_some(),
         };
         let (current, sectors) = if b_is_newer { (Sector::B, [b, a]) } else { (Sector::A, [a, b]) };
-        let sequence = sectors[0].newest.map_or(0, |newest| newest.sequence);
-        Self { current, sequence, sectors }
+        Self { current, sectors }
     }
 
     /// Loads the newest whole record, as far as this firmware can take it. `tell` is called with every remark.
@@ -121,10 +113,8 @@ impl Journal {
     }
 
     /// Erases the sector without the newest whole record if both are nearly full, or have no room for a record of
-    /// `slot_max` bytes. Returns true if it did. For the start: the core may halt for seconds.
-    ///
-    /// # Errors
-    /// The flash refuses, or is not blank afterwards.
+    /// `slot_max` bytes. Returns true if it did. For the start: the core may halt for seconds. Fails if the flash
+    /// refuses, or is not blank afterwards.
     pub fn make_room<F: Flash>(&mut self, flash: &mut F, slot_max: usize) -> Result<bool, SaveError<F::Error>> {
         let [own, other] = self.sectors;
         let low = |sector, content: SectorContent| {
@@ -141,10 +131,8 @@ impl Journal {
         if content.end == 0 { Ok(true) } else { Err(SaveError::Verify) }
     }
 
-    /// Appends a record, a word at a time; `between` is called before each, to feed a watchdog for example.
-    ///
-    /// # Errors
-    /// The sectors are full, or the flash does not hold the record afterwards.
+    /// Appends a record, a word at a time; `between` is called before each, to feed a watchdog for example. Fails if
+    /// the sectors are full, or the flash does not hold the record afterwards.
     #[inline(never)]
     pub fn save<const ROWS: usize, const COLUMNS: usize, F: Flash>(
         &mut self,
@@ -153,7 +141,7 @@ impl Journal {
         between: impl FnMut(),
     ) -> Result<(), SaveError<F::Error>> {
         let [own, other] = self.sectors;
-        let length = record.slot_bytes();
+        let (length, sequence) = (record.slot_bytes(), own.newest.map_or(0, |newest| newest.sequence).wrapping_add(1));
         let room = |sector, content: SectorContent| flash.bytes(sector).len().saturating_sub(content.end) >= length;
         if !room(self.current, own) {
             if other.newest.is_some() || !room(self.current.other(), other) {
@@ -163,11 +151,9 @@ impl Journal {
             self.sectors = [other, own];
         }
         let start = self.sectors[0].end;
-        let sequence = self.sequence.wrapping_add(1);
         let written = write(flash, self.current, start, || words(record, sequence), between);
         if written.is_ok() {
             let end = start + length;
-            self.sequence = sequence;
             self.sectors[0] = SectorContent { end, newest: Some(Whole { start, end, sequence }) };
         } else {
             // Whatever the result, the next record goes behind it.
@@ -214,7 +200,8 @@ struct Whole {
 
 impl SectorContent {
     fn of(sector: &[u8]) -> Self {
-        let end = end_of_records(sector);
+        let used = sector.as_chunks::<GRID>().0.iter().rposition(|chunk| *chunk != [BLANK; GRID]);
+        let end = used.map_or(0, |place| (place + 1) * GRID);
         let newest = (0..end / GRID).rev().map(|place| place * GRID).find_map(|start| {
             let Found { sequence, bytes, .. } = read_record(sector.get(start..)?)?;
             Some(Whole { start, end: start + bytes, sequence })

@@ -3,12 +3,11 @@
 //!
 //! The devices answer in the order of the list. Each waits for the one before it by listening to the bus.
 
-use super::Device;
+use super::Exchange;
 use crate::link::packet::{
-    BROADCAST, CRC_START, HEADER, Packet, REPLY_MAX, Reply, Sender, StatusError, error_byte, instruction, update_crc,
+    BROADCAST, CRC_START, HEADER, Packet, REPLY_MAX, Sender, StatusError, error_byte, instruction, update_crc,
 };
-use crate::link::snapshot::Snapshot;
-use crate::link::table::{self, READ_MAX, TableView};
+use crate::link::table::{READ_MAX, TableView, check_read};
 
 /// Longest pause in a packet that the devices share, ms, at the slowest speed too: after a longer one the bytes
 /// belong to another packet.
@@ -17,73 +16,68 @@ const SILENCE_MS: u32 = 5;
 // The largest part of a shared packet, its beginning included, fits into a reply.
 const _: () = assert!(8 + 2 + READ_MAX as usize + 2 <= REPLY_MAX);
 
-impl<const ROWS: usize, const COLUMNS: usize> Device<ROWS, COLUMNS> {
+impl<const ROWS: usize, const COLUMNS: usize> Exchange<'_, ROWS, COLUMNS> {
     /// Answers an instruction that returns no data, under the ID and the status return level that it found: it may have
     /// changed them.
-    pub(super) fn answer(&mut self, id: u8, level: u8, result: Result<(), StatusError>, reply: &mut Reply) {
+    pub(super) fn answer(&mut self, id: u8, level: u8, result: Result<(), StatusError>) {
         if level >= 2 {
-            self.reply_delay_us = self.settings.return_delay_us();
-            Sender::status(reply, id, result.err(), self.stand.faulted).finish();
+            self.state.reply_delay_us = self.state.settings.return_delay_us();
+            Sender::status(self.reply, id, result.err(), self.snapshot.faulted()).finish();
         }
     }
 
     /// Answers a read.
-    pub(super) fn answer_read(
-        &mut self,
-        request: Result<Request, StatusError>,
-        snapshot: &Snapshot<'_, ROWS, COLUMNS>,
-        reply: &mut Reply,
-    ) {
-        let request = self.counted(request.and_then(checked::<ROWS, COLUMNS>));
-        if self.settings.status_return_level == 0 {
+    pub(super) fn answer_read(&mut self, request: Result<Request, StatusError>) {
+        let checked = request.and_then(|request| check_read::<ROWS, COLUMNS>(request.address, request.length));
+        let error = self.counted(checked).err();
+        if self.state.settings.status_return_level == 0 {
             return;
         }
-        self.reply_delay_us = self.settings.return_delay_us();
-        let mut sender = Sender::status(reply, self.settings.record.id, request.err(), self.stand.faulted);
-        if let Ok(Request { address, length }) = request {
-            table::read(TableView { state: self, snapshot }, address, length, |byte| sender.push(byte));
+        self.state.reply_delay_us = self.state.settings.return_delay_us();
+        let mut sender = Sender::status(self.reply, self.state.settings.record.id, error, self.snapshot.faulted());
+        if let (Ok(Request { address, length }), None) = (request, error) {
+            let view = TableView { state: self.state, snapshot: self.snapshot };
+            view.read(address, length, &mut |byte| sender.push(byte));
         }
         sender.finish();
     }
 
     /// Sends this device's part of a shared packet; zeros in place of data that cannot be read.
-    pub(super) fn answer_shared(
-        &mut self,
-        shared: Shared,
-        request: Request,
-        snapshot: &Snapshot<'_, ROWS, COLUMNS>,
-        reply: &mut Reply,
-    ) {
-        let readable = self.counted(checked::<ROWS, COLUMNS>(request));
-        if self.settings.status_return_level == 0 || request.length > READ_MAX {
+    pub(super) fn answer_shared(&mut self, shared: Shared, Request { address, length }: Request) {
+        let error = self.counted(check_read::<ROWS, COLUMNS>(address, length)).err();
+        if self.state.settings.status_return_level == 0 || length > READ_MAX {
             return;
         }
-        self.reply_delay_us = if shared.first() { self.settings.return_delay_us() } else { 0 };
-        self.behind = Some(shared.behind(request.length));
-        reply.clear();
+        self.state.reply_delay_us = if shared.first() { self.state.settings.return_delay_us() } else { 0 };
+        self.state.behind = Some(shared.behind(length));
+        self.reply.clear();
         let mut put = |byte| {
-            reply.push(byte).ok();
+            self.reply.push(byte).ok();
         };
-        shared.opening().for_each(&mut put);
-        put(error_byte(readable.err(), self.stand.faulted));
-        put(self.settings.record.id);
-        match readable {
-            Ok(_) => table::read(TableView { state: self, snapshot }, request.address, request.length, &mut put),
-            Err(_) => (0..request.length).for_each(|_| put(0)),
+        if shared.first() {
+            shared.head().into_iter().for_each(&mut put);
         }
-        for byte in update_crc(shared.crc, reply).to_le_bytes() {
-            reply.push(byte).ok();
+        put(error_byte(error, self.snapshot.faulted()));
+        put(self.state.settings.record.id);
+        if error.is_none() {
+            TableView { state: self.state, snapshot: self.snapshot }.read(address, length, &mut put);
+        } else {
+            (0..length).for_each(|_| put(0));
+        }
+        for byte in update_crc(shared.crc, self.reply).to_le_bytes() {
+            self.reply.push(byte).ok();
         }
     }
 
     /// Follows a packet that the devices share, and adds this one's part when all before it was heard.
-    pub(super) fn listen(&mut self, byte: u8, snapshot: &Snapshot<'_, ROWS, COLUMNS>, reply: &mut Reply) {
-        let Turn::Shared(mut shared, request) = self.turn else { return };
-        let silent_ms = snapshot.tick_ms.wrapping_sub(core::mem::replace(&mut self.heard_ms, snapshot.tick_ms));
-        self.turn = if silent_ms > SILENCE_MS || !shared.hear(byte) {
+    pub(super) fn listen(&mut self, byte: u8) {
+        let Turn::Shared(mut shared, request) = self.state.turn else { return };
+        let tick_ms = self.snapshot.tick_ms;
+        let silent_ms = tick_ms.wrapping_sub(core::mem::replace(&mut self.state.heard_ms, tick_ms));
+        self.state.turn = if silent_ms > SILENCE_MS || !shared.hear(byte) {
             Turn::None
         } else if shared.due() {
-            self.answer_shared(shared, request, snapshot, reply);
+            self.answer_shared(shared, request);
             Turn::None
         } else {
             Turn::Shared(shared, request)
@@ -91,31 +85,27 @@ impl<const ROWS: usize, const COLUMNS: usize> Device<ROWS, COLUMNS> {
     }
 
     /// Hears another device's status packet, which may be the one that this device waits for.
-    pub(super) fn hear_status(&mut self, id: u8, snapshot: &Snapshot<'_, ROWS, COLUMNS>, reply: &mut Reply) {
-        if let Turn::After(before, request) = self.turn
+    pub(super) fn hear_status(&mut self, id: u8) {
+        if let Turn::After(before, request) = self.state.turn
             && before == id
         {
-            self.turn = Turn::None;
-            self.answer_read(Ok(request), snapshot, reply);
+            self.state.turn = Turn::None;
+            self.answer_read(Ok(request));
         }
     }
 
     /// A whole packet with a bad CRC: answered where it seems to be an instruction for this device.
-    pub(super) fn damaged(&mut self, packet: Packet<'_>, reply: &mut Reply) {
+    pub(super) fn damaged(&mut self, packet: Packet<'_>) {
         let error = self.counted(Err(StatusError::Crc));
-        if packet.id == self.settings.record.id && packet.instruction != instruction::STATUS {
-            self.answer(packet.id, self.settings.status_return_level, error, reply);
+        if packet.id == self.state.settings.record.id && packet.instruction != instruction::STATUS {
+            self.answer(packet.id, self.state.settings.status_return_level, error);
         }
     }
 
     /// Passes a result on, and counts it where it is an error.
     pub(super) fn counted<T>(&mut self, result: Result<T, StatusError>) -> Result<T, StatusError> {
-        result.inspect_err(|&error| self.counters.count(error))
+        result.inspect_err(|&error| self.state.counters.count(error))
     }
-}
-
-fn checked<const ROWS: usize, const COLUMNS: usize>(request: Request) -> Result<Request, StatusError> {
-    table::check_read::<ROWS, COLUMNS>(request.address, request.length).map(|()| request)
 }
 
 /// Bytes of the reply to a fast read before the first device's part.
@@ -178,11 +168,6 @@ impl Shared {
     /// Returns true if this device begins the packet.
     pub fn first(&self) -> bool {
         self.ahead == 0
-    }
-
-    /// Returns the bytes that this device sends before its part: the packet's beginning, if it is the first.
-    pub fn opening(&self) -> impl Iterator<Item = u8> {
-        self.head().into_iter().take(if self.first() { FAST_HEAD } else { 0 })
     }
 
     /// Takes a byte of the bus. Returns false if it does not belong to the packet.

@@ -2,31 +2,13 @@
 //!
 //! From a definition the macro makes addresses, documentation, reading and writing.
 
-use super::registers::{FIXED, address};
+use super::registers::{FIXED, Source, address};
 use super::{indirect, mirrors, pictures};
 use crate::params::Params;
 
-macro_rules! count {
-    () => {
-        1
-    };
-    ($count:expr) => {
-        $count as u16
-    };
-}
-
-macro_rules! optional {
-    () => {
-        None
-    };
-    ($value:expr) => {
-        Some($value as i64)
-    };
-}
-
 macro_rules! control_table {
-    ($($(#[doc = $doc:literal])+ $address:literal $name:ident: $kind:ident $([$count:expr])? $access:ident,
-       $unit:literal * $scale:literal, $min:literal to $max:literal $(= $default:expr)?,
+    ($($(#[doc = $doc:literal])+ $address:literal $name:ident: $kind:ident $([$count:expr])? $access:ident
+       $($unit:literal $(* $scale:literal)?)? $(in $min:literal..=$max:literal)? $(= $default:expr)?,
        $get:expr $(, $set:expr)?;)*) => {
         /// Address of each register.
         pub mod address {
@@ -35,35 +17,32 @@ macro_rules! control_table {
             pub const PARAMS: u16 = 512;
         }
 
-        pub(super) const FIXED: &[Register] = &[$(Register {
-            name: stringify!($name),
-            address: $address,
-            kind: Kind::$kind,
-            count: count!($($count)?),
-            access: Access::$access,
-            unit: $unit,
-            scale: $scale,
-            min: $min,
-            max: $max,
-            default: optional!($($default)?),
-            doc: concat!($($doc),+),
-        }),*];
+        /// Value that a register reads and writes.
+        #[expect(non_camel_case_types, clippy::upper_case_acronyms, reason = "the registers' names")]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub(in crate::link) enum Source {
+            $($name,)*
+            Params,
+            /// Addresses of the indirect data from this place on.
+            Addresses(u8),
+            /// Indirect data from this place on.
+            Data(u8),
+            Pressures,
+            RawCodes,
+            TareCodes,
+            Gains,
+        }
 
-        pub(super) static CELLS: [Cell; FIXED.len()] = [
-            $(Cell {
-                address: $address,
-                of: $address,
-                kind: Kind::$kind,
-                count: count!($($count)?),
-                access: Access::$access,
-            }),*
-        ];
-
-        /// End of the registers.
-        pub(super) const END: u16 = {
-            let last = &FIXED[FIXED.len() - 1];
-            last.address + last.kind.width() * last.count
-        };
+        pub(super) const FIXED: &[Register] = &[$(
+            Register::new(
+                (stringify!($name), Source::$name),
+                $address,
+                Kind::$kind,
+                Access::$access,
+                concat!($($doc),+),
+            )
+            $(.count($count))? $(.unit($unit) $(.scale($scale))?)? $(.range($min, $max))? $(.default($default as i64))?
+        ),*];
 
         /// The register that begins at an address.
         pub(super) const fn fixed(address: u16) -> Register {
@@ -74,36 +53,33 @@ macro_rules! control_table {
             FIXED[place]
         }
 
-        /// The value of an element, as its low bytes; 0 where there is no such register.
-        pub(super) fn get<const ROWS: usize, const COLUMNS: usize>(
-            view: TableView<'_, ROWS, COLUMNS>,
-            address: u16,
-            element: usize,
-        ) -> u32 {
-            match address {
-                $($address => {
-                    let get: fn(TableView<'_, ROWS, COLUMNS>, usize) -> u32 = $get;
-                    get(view, element)
-                })*
-                _ => super::pictures::get(view, address, element),
+        impl<const ROWS: usize, const COLUMNS: usize> TableView<'_, ROWS, COLUMNS> {
+            /// Returns the low bytes of an element of a register.
+            pub(super) fn register(&self, source: Source, element: usize) -> u32 {
+                match source {
+                    $(Source::$name => {
+                        let get: fn(&Self, usize) -> u32 = $get;
+                        get(self, element)
+                    })*
+                    _ => self.picture(source, element),
+                }
             }
         }
 
-        /// Sets a register that can be written.
-        pub(super) fn set<const ROWS: usize, const COLUMNS: usize>(
-            staged: &mut Staged<ROWS, COLUMNS>,
-            address: u16,
-            value: i64,
-        ) -> Result<(), StatusError> {
-            match address {
-                $($($address => {
-                    if !($min..=$max).contains(&value) {
-                        return Err(StatusError::Range);
-                    }
-                    let set: fn(&mut Staged<ROWS, COLUMNS>, i64) -> Result<(), StatusError> = $set;
-                    set(staged, value)
-                })?)*
-                _ => Err(StatusError::Access),
+        impl<const ROWS: usize, const COLUMNS: usize> Staged<'_, ROWS, COLUMNS> {
+            /// Sets a register that can be written.
+            pub(super) fn set_register(&mut self, source: Source, value: i64) -> Result<(), StatusError> {
+                match source {
+                    $($(Source::$name => {
+                        let Register { min, max, .. } = const { fixed($address) };
+                        if !(min..=max).contains(&value) {
+                            return Err(StatusError::Range);
+                        }
+                        let set: fn(&mut Self, i64) -> Result<(), StatusError> = $set;
+                        set(self, value)
+                    })?)*
+                    _ => Err(StatusError::Access),
+                }
             }
         }
     };
@@ -151,16 +127,21 @@ impl Kind {
         }
     }
 
+    /// Least and largest number.
+    const fn range(self) -> (i64, i64) {
+        let numbers = 1 << (8 * self.width());
+        match self {
+            Self::U8 | Self::U16 | Self::U32 => (0, numbers - 1),
+            Self::I8 | Self::I16 | Self::I32 => (-numbers / 2, numbers / 2 - 1),
+        }
+    }
+
     /// The number that `bytes` make, or none where there are not enough of them.
     pub(super) fn decode(self, bytes: &[u8]) -> Option<i64> {
-        Some(match self {
-            Self::U8 => i64::from(u8::from_le_bytes(*bytes.first_chunk()?)),
-            Self::I8 => i64::from(i8::from_le_bytes(*bytes.first_chunk()?)),
-            Self::U16 => i64::from(u16::from_le_bytes(*bytes.first_chunk()?)),
-            Self::I16 => i64::from(i16::from_le_bytes(*bytes.first_chunk()?)),
-            Self::U32 => i64::from(u32::from_le_bytes(*bytes.first_chunk()?)),
-            Self::I32 => i64::from(i32::from_le_bytes(*bytes.first_chunk()?)),
-        })
+        let bytes = bytes.get(..usize::from(self.width()))?;
+        let number = bytes.iter().rev().fold(0, |number, byte| number << 8 | i64::from(*byte));
+        let (min, max) = self.range();
+        Some(if number > max { number - max - 1 + min } else { number })
     }
 }
 
@@ -189,9 +170,42 @@ pub struct Register {
     pub default: Option<i64>,
     /// Meaning of the register.
     pub doc: &'static str,
+    pub(in crate::link) source: Source,
 }
 
 impl Register {
+    /// A register of one element, a plain number without limits or default.
+    pub(super) const fn new(
+        (name, source): (&'static str, Source),
+        address: u16,
+        kind: Kind,
+        access: Access,
+        doc: &'static str,
+    ) -> Self {
+        let (min, max) = kind.range();
+        Self { name, address, kind, count: 1, access, unit: "", scale: 1, min, max, default: None, doc, source }
+    }
+
+    pub(super) const fn count(self, count: usize) -> Self {
+        Self { count: count as u16, ..self }
+    }
+
+    pub(super) const fn unit(self, unit: &'static str) -> Self {
+        Self { unit, ..self }
+    }
+
+    pub(super) const fn scale(self, scale: u16) -> Self {
+        Self { scale, ..self }
+    }
+
+    pub(super) const fn range(self, min: i64, max: i64) -> Self {
+        Self { min, max, ..self }
+    }
+
+    pub(super) const fn default(self, default: i64) -> Self {
+        Self { default: Some(default), ..self }
+    }
+
     /// Bytes on the bus.
     pub const fn bytes(&self) -> u16 {
         self.kind.width() * self.count
@@ -205,12 +219,13 @@ pub const COUNT: usize =
 /// Every register of an array of this shape, in the order of the addresses.
 pub const fn registers<const ROWS: usize, const COLUMNS: usize>() -> [Register; COUNT] {
     let mut all = [FIXED[0]; COUNT];
-    let mut count = 0;
-    count = add(&mut all, count, FIXED);
+    let mut count = add(&mut all, 0, FIXED);
     count = add(&mut all, count, mirrors::REGISTERS);
     count = add(&mut all, count, &indirect::REGISTERS);
-    count = add(&mut all, count, &params());
-    add(&mut all, count, &pictures::registers::<ROWS, COLUMNS>());
+    count = add(&mut all, count, &pictures::registers::<ROWS, COLUMNS>());
+    while count < COUNT {
+        count = add(&mut all, count, &[param(count + Params::COUNT - COUNT)]);
+    }
     all
 }
 
@@ -230,27 +245,12 @@ const fn add(all: &mut [Register], count: usize, more: &[Register]) -> usize {
     count + more.len()
 }
 
-const fn params() -> [Register; Params::COUNT] {
-    let mut all = [FIXED[0]; Params::COUNT];
-    let mut place = 0;
-    while place < all.len() {
-        let (name, default, min, max) = Params::RANGES[place];
-        all[place] = Register {
-            name,
-            address: address::PARAMS + 4 * place as u16,
-            kind: Kind::I32,
-            count: 1,
-            access: Access::Stored,
-            unit: "",
-            scale: 1,
-            min: min as i64,
-            max: max as i64,
-            default: Some(default as i64),
-            doc: Params::DOCS[place],
-        };
-        place += 1;
-    }
-    all
+const fn param(place: usize) -> Register {
+    let (name, default, min, max) = Params::RANGES[place];
+    let at = address::PARAMS + 4 * place as u16;
+    Register::new((name, Source::Params), at, Kind::I32, Access::Stored, Params::DOCS[place])
+        .range(min as i64, max as i64)
+        .default(default as i64)
 }
 
 // The parameters end where the state before the pressures begins, and that ends where these do.

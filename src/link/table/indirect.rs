@@ -4,16 +4,15 @@
 //! two blocks of 28, at the addresses of the X-series servos' first one and at addresses of our own: one for what a
 //! driver writes, and one for what it reads. They live in RAM, and none of them leads to another.
 
-use crate::link::packet::StatusError;
-
-use super::{Access, Cell, Kind, Register};
+use super::registers::Source;
+use super::{Access, Kind, Register};
 
 /// Number of bytes of a block.
 pub const BLOCK: usize = 28;
 /// Number of bytes of both blocks.
 pub const COUNT: usize = 2 * BLOCK;
 /// The least address that they lead to: what lies below is stored, and identifies the device.
-const TARGET_MIN: u16 = 64;
+pub(super) const TARGET_MIN: u16 = 64;
 
 /// Addresses of the blocks.
 pub(super) mod address {
@@ -34,60 +33,25 @@ const ADDRESS_DOC: &str = " Address of the byte of the same number in the indire
 const DATA_DOC: &str = " The bytes that the indirect addresses lead to; 0 for those that lead nowhere. A write obeys \
     the rules of the registers that it reaches, and covers whole ones.";
 
-/// Kind of an indirect cell.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Part {
-    /// The address in this place.
-    Address(usize),
-    /// The byte in this place.
-    Data(usize),
-}
-
-/// Returns the kind of the block that begins here.
-pub(super) const fn part(cell: u16) -> Option<Part> {
-    match cell {
-        INDIRECT_ADDRESS_1 => Some(Part::Address(0)),
-        INDIRECT_ADDRESS_29 => Some(Part::Address(BLOCK)),
-        INDIRECT_DATA_1 => Some(Part::Data(0)),
-        INDIRECT_DATA_29 => Some(Part::Data(BLOCK)),
-        _ => None,
-    }
-}
-
 /// Returns true if a block begins here.
 pub const fn begins(address: u16) -> bool {
-    part(address).is_some()
+    matches!(address, INDIRECT_ADDRESS_1 | INDIRECT_DATA_1 | INDIRECT_ADDRESS_29 | INDIRECT_DATA_29)
 }
-
-const fn addresses(address: u16) -> Cell {
-    Cell { address, of: address, count: BLOCK as u16, kind: Kind::U16, access: Access::ReadWrite }
-}
-
-const fn data(address: u16) -> Cell {
-    Cell { address, of: address, count: BLOCK as u16, kind: Kind::U8, access: Access::ReadWrite }
-}
-
-pub(super) static CELLS: [Cell; 4] =
-    [addresses(INDIRECT_ADDRESS_1), data(INDIRECT_DATA_1), addresses(INDIRECT_ADDRESS_29), data(INDIRECT_DATA_29)];
 
 /// The indirect registers, as documented.
 pub(super) const REGISTERS: [Register; 4] = [
-    register("INDIRECT_ADDRESS_1", addresses(INDIRECT_ADDRESS_1), 0xFFFF, Some(0), ADDRESS_DOC),
-    register("INDIRECT_DATA_1", data(INDIRECT_DATA_1), 0xFF, None, DATA_DOC),
-    register("INDIRECT_ADDRESS_29", addresses(INDIRECT_ADDRESS_29), 0xFFFF, Some(0), ADDRESS_DOC),
-    register("INDIRECT_DATA_29", data(INDIRECT_DATA_29), 0xFF, None, DATA_DOC),
+    addresses("INDIRECT_ADDRESS_1", INDIRECT_ADDRESS_1, 0),
+    data("INDIRECT_DATA_1", INDIRECT_DATA_1, 0),
+    addresses("INDIRECT_ADDRESS_29", INDIRECT_ADDRESS_29, BLOCK),
+    data("INDIRECT_DATA_29", INDIRECT_DATA_29, BLOCK),
 ];
 
-const fn register(name: &'static str, cell: Cell, max: i64, default: Option<i64>, doc: &'static str) -> Register {
-    let Cell { address, count, kind, access, .. } = cell;
-    Register { name, address, kind, count, access, unit: "", scale: 1, min: 0, max, default, doc }
+const fn addresses(name: &'static str, address: u16, first: usize) -> Register {
+    let source = Source::Addresses(first as u8);
+    Register::new((name, source), address, Kind::U16, Access::ReadWrite, ADDRESS_DOC).count(BLOCK).default(0)
 }
 
-/// Refuses an address that they must not lead to.
-pub(super) fn check<const ROWS: usize, const COLUMNS: usize>(target: u16) -> Result<(), StatusError> {
-    if target == 0 {
-        return Ok(());
-    }
-    let cell = Cell::at::<ROWS, COLUMNS>(target).filter(|cell| target >= TARGET_MIN && part(cell.of).is_none());
-    if cell.is_some() { Ok(()) } else { Err(StatusError::Range) }
+const fn data(name: &'static str, address: u16, first: usize) -> Register {
+    let source = Source::Data(first as u8);
+    Register::new((name, source), address, Kind::U8, Access::ReadWrite, DATA_DOC).count(BLOCK)
 }

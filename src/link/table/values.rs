@@ -1,127 +1,158 @@
 //! Registers whose values take more than a line to read or to write.
 
+use super::{Staged, TableView};
+use crate::capture::CaptureState;
 use crate::config::newtons;
+use crate::link::checks::Hindrance;
 use crate::link::packet::StatusError;
 use crate::link::settings::Settings;
-use crate::link::stand::Hindrance;
-use crate::measure::Task;
+use crate::measure::{MeasureState, Task};
+use crate::pipeline::{Status, Taring};
+use crate::state::Limits;
 use crate::units::{Duty, Newtons};
-
-use super::Staged;
+use fixed::types::{I8F24, I16F16};
 
 /// The bus watchdog's unit.
 const WATCHDOG_MS: u16 = 20;
 
-/// Sets torque enable. On is refused in a fault, after a tripped watchdog, with an unconfirmed motor direction, before
-/// a tare, and after a tare during which something touched the tip. Off sets the goal to 0.
-pub(super) fn set_torque<const ROWS: usize, const COLUMNS: usize>(
-    staged: &mut Staged<ROWS, COLUMNS>,
-    value: i64,
-) -> Result<(), StatusError> {
-    let on = value != 0;
-    let unconfirmed = staged.settings.record.params.direction_confirmed == 0;
-    let zeroed = staged.stand.zeroed(&staged.settings.command);
-    if on && (staged.settings.watchdog_tripped || staged.stand.faulted || unconfirmed || !zeroed) {
-        return Err(StatusError::Result);
-    }
-    let strokes = staged.stand.strokes(&staged.settings.command);
-    let command = &mut staged.settings.command;
-    command.torque = on;
-    if !on {
-        command.goal = Newtons::ZERO;
-        if strokes {
-            command.measure_request = Task::Stop.after(command.measure_request);
+impl<const ROWS: usize, const COLUMNS: usize> Staged<'_, ROWS, COLUMNS> {
+    /// Sets torque enable. On is refused in a fault, after a tripped watchdog, with an unconfirmed motor direction,
+    /// before a tare, and after a tare during which something touched the tip. Off sets the goal to 0.
+    pub(super) fn set_torque(&mut self, value: i64) -> Result<(), StatusError> {
+        let on = value != 0;
+        let unconfirmed = self.settings.record.params.direction_confirmed == 0;
+        if on && (self.settings.watchdog_tripped || self.snapshot.faulted() || unconfirmed || !self.zeroed()) {
+            return Err(StatusError::Result);
         }
+        let strokes = self.strokes();
+        let command = &mut self.settings.command;
+        command.torque = on;
+        if !on {
+            command.goal = Newtons::ZERO;
+            if strokes {
+                command.measure_request = Task::Stop.after(command.measure_request);
+            }
+        }
+        Ok(())
     }
-    Ok(())
+
+    /// Requests a tare: 2 forces torque to be allowed after it.
+    pub(super) fn set_tare(&mut self, value: i64) -> Result<(), StatusError> {
+        let command = &mut self.settings.command;
+        bump(&mut command.tare_request, value);
+        command.tare_forced = value == 2 || value == 0 && command.tare_forced;
+        Ok(())
+    }
+
+    /// Requests a task of a measurement.
+    pub(super) fn set_measure(&mut self, value: i64) -> Result<(), StatusError> {
+        let task = Task::of(value as u8);
+        let command = &mut self.settings.command;
+        command.measure_request = task.after(command.measure_request);
+        // Its record needs the memory of a capture.
+        let kept = matches!(task, Task::Strokes | Task::Press) && self.snapshot.records();
+        if kept { Err(StatusError::Result) } else { Ok(()) }
+    }
+
+    /// Sets the goal force: refused until a tripped watchdog is reset.
+    pub(super) fn set_goal(&mut self, value: i64) -> Result<(), StatusError> {
+        if self.settings.watchdog_tripped {
+            return Err(StatusError::Range);
+        }
+        self.settings.command.goal = newtons(value as i32);
+        Ok(())
+    }
+
+    /// Sets the bus watchdog: 0 resets a tripped one.
+    pub(super) fn set_watchdog(&mut self, value: i64) -> Result<(), StatusError> {
+        if self.settings.watchdog_tripped && value != 0 {
+            return Err(StatusError::Range);
+        }
+        self.settings.watchdog_tripped = false;
+        self.settings.command.bus_watchdog_ms = value as u16 * WATCHDOG_MS;
+        Ok(())
+    }
+
+    /// Recovers: a tripped watchdog, torque, goal and fault in one.
+    pub(super) fn set_recover(&mut self, value: i64) -> Result<(), StatusError> {
+        if value == 0 || !self.snapshot.faulted() && !self.settings.watchdog_tripped {
+            return Ok(());
+        }
+        if self.snapshot.hindrance(&self.settings.record.params, self.actions) != Hindrance::None {
+            return Err(StatusError::Result);
+        }
+        if self.settings.watchdog_tripped {
+            self.set_watchdog(0)?;
+        }
+        self.set_torque(0)?;
+        bump(&mut self.settings.command.clear_request, 1);
+        Ok(())
+    }
+
+    /// Arms the capture, or ends it.
+    pub(super) fn set_capture(&mut self, value: i64) -> Result<(), StatusError> {
+        let arm = value != 0;
+        if arm && self.settings.command.torque {
+            return Err(StatusError::Access);
+        }
+        if arm && self.snapshot.records() {
+            return Err(StatusError::Result);
+        }
+        self.actions.capture = Some(arm);
+        Ok(())
+    }
 }
 
-/// Tare: 2 forces torque to be allowed after it.
-pub(super) fn set_tare<const ROWS: usize, const COLUMNS: usize>(
-    staged: &mut Staged<ROWS, COLUMNS>,
-    value: i64,
-) -> Result<(), StatusError> {
-    bump(&mut staged.settings.command.tare_request, value);
-    staged.settings.command.tare_forced = value == 2 || value == 0 && staged.settings.command.tare_forced;
-    Ok(())
-}
+impl<'a, const ROWS: usize, const COLUMNS: usize> TableView<'a, ROWS, COLUMNS> {
+    pub(super) fn settings(&self) -> &'a Settings<ROWS, COLUMNS> {
+        &self.state.settings
+    }
 
-/// Measure: a task.
-pub(super) fn set_measure<const ROWS: usize, const COLUMNS: usize>(
-    staged: &mut Staged<ROWS, COLUMNS>,
-    value: i64,
-) -> Result<(), StatusError> {
-    let task = Task::of(value as u8);
-    let command = &mut staged.settings.command;
-    command.measure_request = task.after(command.measure_request);
-    // Its record needs the memory of a capture.
-    let kept = matches!(task, Task::Strokes | Task::Press) && staged.stand.captures;
-    if kept { Err(StatusError::Result) } else { Ok(()) }
-}
+    pub(super) fn status(&self) -> &'a Status {
+        &self.snapshot.status
+    }
 
-/// Goal force: refused until a tripped watchdog is reset.
-pub(super) fn set_goal<const ROWS: usize, const COLUMNS: usize>(
-    staged: &mut Staged<ROWS, COLUMNS>,
-    value: i64,
-) -> Result<(), StatusError> {
-    if staged.settings.watchdog_tripped {
-        return Err(StatusError::Range);
+    pub(super) fn tared(&self) -> bool {
+        !self.status().limits.has(Limits::NOT_TARED)
     }
-    staged.settings.command.goal = newtons(value as i32);
-    Ok(())
-}
 
-/// Bus watchdog: 0 resets a tripped one.
-pub(super) fn set_watchdog<const ROWS: usize, const COLUMNS: usize>(
-    staged: &mut Staged<ROWS, COLUMNS>,
-    value: i64,
-) -> Result<(), StatusError> {
-    if staged.settings.watchdog_tripped && value != 0 {
-        return Err(StatusError::Range);
+    pub(super) fn hindrance(&self) -> u32 {
+        self.snapshot.hindrance(&self.settings().record.params, self.state.actions) as u32
     }
-    staged.settings.watchdog_tripped = false;
-    staged.settings.command.bus_watchdog_ms = value as u16 * WATCHDOG_MS;
-    Ok(())
-}
 
-/// Recover: a tripped watchdog, torque, goal and fault in one.
-pub(super) fn set_recover<const ROWS: usize, const COLUMNS: usize>(
-    staged: &mut Staged<ROWS, COLUMNS>,
-    value: i64,
-) -> Result<(), StatusError> {
-    if value == 0 || !staged.stand.faulted && !staged.settings.watchdog_tripped {
-        return Ok(());
+    pub(super) fn watchdog(&self) -> u32 {
+        let settings = self.settings();
+        if settings.watchdog_tripped { u32::MAX } else { u32::from(settings.command.bus_watchdog_ms / WATCHDOG_MS) }
     }
-    if staged.stand.hindrance(&staged.settings.record.params, staged.actions) != Hindrance::None {
-        return Err(StatusError::Result);
-    }
-    if staged.settings.watchdog_tripped {
-        set_watchdog(staged, 0)?;
-    }
-    set_torque(staged, 0)?;
-    bump(&mut staged.settings.command.clear_request, 1);
-    Ok(())
-}
 
-/// Capture: to arm it, or to end it.
-pub(super) fn set_capture<const ROWS: usize, const COLUMNS: usize>(
-    staged: &mut Staged<ROWS, COLUMNS>,
-    value: i64,
-) -> Result<(), StatusError> {
-    let arm = value != 0;
-    if arm && staged.settings.command.torque {
-        return Err(StatusError::Access);
+    /// Returns the state of the tare. A request that the loop has not acknowledged counts as running: the status
+    /// still describes the tare before.
+    pub(super) fn tare_state(&self) -> u32 {
+        let waits = self.settings().command.tare_request != self.status().taken.tare;
+        if waits { Taring::Running as u32 } else { self.status().tare as u32 }
     }
-    if arm && staged.stand.captures {
-        return Err(StatusError::Result);
-    }
-    staged.actions.capture = Some(arm);
-    Ok(())
-}
 
-/// The bus watchdog as it reads.
-pub(super) fn watchdog<const ROWS: usize, const COLUMNS: usize>(settings: &Settings<ROWS, COLUMNS>) -> i32 {
-    if settings.watchdog_tripped { -1 } else { i32::from(settings.command.bus_watchdog_ms / WATCHDOG_MS) }
+    /// Returns the state of the measurement, with the same rule as the tare's.
+    pub(super) fn measure_state(&self) -> u32 {
+        let waits = self.settings().command.measure_request != self.status().taken.measure;
+        if waits { MeasureState::Running as u32 } else { self.status().measure.state as u32 }
+    }
+
+    /// Returns the state of the capture, where a new request counts already.
+    pub(super) fn capture_state(&self) -> u32 {
+        let armed = self.state.actions.capture == Some(true);
+        if armed { CaptureState::Armed as u32 } else { self.snapshot.capture.standing.state as u32 }
+    }
+
+    /// Returns a byte of the capture.
+    pub(super) fn captured(&self, element: usize) -> u8 {
+        let place = (self.settings().capture_offset as usize).checked_add(element);
+        place.and_then(|place| self.snapshot.capture.data.get(place)).copied().unwrap_or(0)
+    }
+
+    pub(super) fn refused(&self, error: StatusError) -> u32 {
+        self.state.counters.refused(error).into()
+    }
 }
 
 /// Makes a request: a change of the number.
@@ -129,12 +160,28 @@ pub(super) fn bump(request: &mut u8, value: i64) {
     *request = request.wrapping_add(u8::from(value != 0));
 }
 
-/// The low bytes of a number of 16 bits, held at its ends.
-pub(super) fn short(value: i32) -> u32 {
-    value.max(i16::MIN.into()).min(i16::MAX.into()) as u32
+/// Returns thousandths of a number, rounded.
+pub(in crate::link) fn milli(value: I16F16) -> u32 {
+    thousandths(value.to_bits(), 16)
 }
 
-/// Thousandths of the whole supply, rounded.
+/// Returns micrometres of a length in mm, rounded.
+pub(super) fn micro(value: I8F24) -> u32 {
+    thousandths(value.to_bits(), 24)
+}
+
+#[inline(never)]
+fn thousandths(value: i32, fraction_bits: u32) -> u32 {
+    let scaled = i64::from(value) * 1000;
+    ((scaled + (1 << (fraction_bits - 1))) >> fraction_bits) as u32
+}
+
+/// Returns the low bytes of a number of 16 bits, held at its ends.
+pub(super) fn short(value: u32) -> u32 {
+    value.cast_signed().max(i16::MIN.into()).min(i16::MAX.into()) as u32
+}
+
+/// Returns thousandths of the whole supply, rounded.
 pub(super) fn permille(duty: Duty) -> i32 {
     let full = i32::from(Duty::FULL);
     let duty = i32::from(duty.0);

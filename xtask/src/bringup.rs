@@ -71,7 +71,7 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
             command
         }
         Some(port) => {
-            let mut command = Program { package: NAME, name: "bringup-host", whole: true }.build(console)?;
+            let mut command = Program { package: NAME, name: "bringup-host", with: host::SHARED }.build(console)?;
             if !args.flashed {
                 flash::put(&image, args.probe.as_deref(), console)?;
             }

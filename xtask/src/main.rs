@@ -178,7 +178,7 @@ fn setup(choice: Choice, console: &mut Console) -> anyhow::Result<()> {
     python::script("fit.py", console)?;
     cluster::ensure(console)?;
     apt::browser(console)?;
-    docs::DENY.ensure(console)?;
+    docs::deny(console)?;
     console.run(console::cargo("fetch").arg("--locked"))?;
     console.say(
         "All set up: demo, sim, sweep, population, cluster, sensor, test, build, qemu, timing, size, lint and docs work offline now.",

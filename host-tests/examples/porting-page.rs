@@ -49,6 +49,6 @@ fn main() -> Result<(), Box<dyn Error>> {
             figure("instructions_max")?,
         )?;
     }
-    print!("{}", PAGE.renewed(&table)?.1);
+    print!("{}", PAGE.renewed(&table)?);
     Ok(())
 }

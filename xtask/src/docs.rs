@@ -4,7 +4,7 @@ use crate::console::{self, Console};
 use crate::host::{self, Program};
 use crate::python::{self, Environment};
 use crate::toolchain::Choice;
-use crate::{cores, image, model, paths};
+use crate::{cores, image, paths};
 use anyhow::{Context, Result, bail};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -24,7 +24,7 @@ const BUDGET: (&str, &str) = ("docs/budget.md", "24");
 /// The demonstration's figures, as the README shows them.
 const FIGURES: &str = "docs/demo.json";
 /// Pictures of the demonstration and of the paper.
-pub const PICTURES: &str = "docs/pictures";
+const PICTURES: &str = "docs/pictures";
 /// The paper's figures among the pictures.
 const PAPER: [&str; 3] = ["docs/pictures/figure-7.svg", "docs/pictures/figure-10.svg", "docs/pictures/figure-11.svg"];
 const README: (&str, &str) = ("README.md", "readme");
@@ -48,7 +48,7 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     renew(BUDGET.0, &console::output(budget.args(["--fingers", BUDGET.1]))?, args.check, &mut stale, console)?;
     renew(cores::PAGE.0, &cores::page(choice, console)?, args.check, &mut stale, console)?;
     let drawn = paths::target().join("docs").join("figures");
-    model::draw(&drawn, console)?;
+    draw(&drawn, console)?;
     for path in PAPER {
         let file = drawn.join(Path::new(path).file_name().unwrap_or_default());
         let text = fs::read_to_string(&file).with_context(|| format!("cannot read {}", paths::shown(&file)))?;
@@ -95,6 +95,29 @@ pub fn renew(path: &str, text: &str, check: bool, stale: &mut Vec<String>, conso
         console.print(&format!("written  {path}"));
     }
     Ok(())
+}
+
+// The paper's figures.
+
+/// Flags of `cargo xtask figures`.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:\n  cargo xtask figures\n  cargo xtask figures --out /tmp/figures")]
+pub struct FiguresArgs {
+    /// Folder to draw them into
+    #[arg(long, value_name = "DIR", default_value = PICTURES)]
+    out: PathBuf,
+}
+
+/// Draws the figures.
+pub fn figures(args: &FiguresArgs, console: &mut Console) -> Result<()> {
+    let default = args.out == Path::new(PICTURES);
+    draw(&if default { paths::root().join(PICTURES) } else { args.out.clone() }, console)
+}
+
+/// Draws the figures into a folder.
+fn draw(folder: &Path, console: &mut Console) -> Result<()> {
+    let mut command = Program::tool("figures").build(console)?;
+    console.run(command.arg(folder))
 }
 
 // The published packages: built, and tested from a project outside of this workspace.

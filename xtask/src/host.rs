@@ -61,6 +61,12 @@ impl Program {
     }
 }
 
+/// Builds one of the tools of `host-tests` and runs it.
+pub fn run_tool(name: &'static str, words: &[&str], console: &mut Console) -> Result<()> {
+    let mut command = Program::tool(name).build(console)?;
+    console.run(command.args(words))
+}
+
 fn slow(package: &str) -> Slow {
     if package == BOARD.package { EMULATOR } else { HOST }
 }

@@ -1,7 +1,6 @@
 //! Tests and checks, one stage each.
 
 use crate::console::{self, Console, clear_line, cpu_s};
-use crate::model::{self, FitArgs, ProveArgs};
 use crate::size::{self, Sizes};
 use crate::toolchain::{self, Choice, TARGET, Toolchain};
 use crate::{apt, bringup, cores, docs, host, image, python, timing};
@@ -53,7 +52,7 @@ pub fn run(args: &Args, choice: Choice) -> Result<()> {
     stages.stage("virtual board", |console| {
         let python = python::ensure(console)?;
         let mut command = on_a_board(&["--lib", "--test", "board"]);
-        let checking = bringup::build(toolchain::ensure(choice, console)?, console)?;
+        let checking = image::checking(toolchain::ensure(choice, console)?, bringup::NAME, console)?;
         command.env("FINGERTIP_IMAGE", &image()?.elf).env("FINGERTIP_PYTHON", &python);
         command.env("FINGERTIP_BRINGUP", &checking.elf);
         host::test(&mut command, console)
@@ -80,8 +79,8 @@ fn long(mut stages: Stages) -> Result<()> {
     stages.stage("long core and host tests", |console| {
         host::test(console::cargo("test").args(["--no-fail-fast", "--", "--ignored", "long_"]), console)
     });
-    stages.stage("proofs of the model's error bounds", |console| model::prove(&ProveArgs::CHECK, console));
-    stages.stage("fit of thousands of tactile images", |console| model::fit(&FitArgs::CHECK, console));
+    stages.stage("proofs of the model's error bounds", |console| host::run_tool("prove", &["--check"], console));
+    stages.stage("fit of thousands of tactile images", |console| host::run_tool("fit", &["--check"], console));
     stages.finish("test --long")
 }
 

@@ -7,9 +7,9 @@ use host_tests::{analogue, control_table, model_file, page};
 fn main() -> Result<(), String> {
     let name = std::env::args().nth(1).unwrap_or_default();
     let text = match name.as_str() {
-        "docs/board.md" => analogue::PAGE.renewed(&analogue::markdown())?.1,
+        "docs/board.md" => analogue::PAGE.renewed(&analogue::markdown())?,
         "docs/control-table.md" => control_table::markdown(),
-        "docs/firmware.md" => page::PAGE.renewed(&page::table())?.1,
+        "docs/firmware.md" => page::PAGE.renewed(&page::table())?,
         "examples/dynamixel/fingertip.model" => model_file::text(false),
         "examples/dynamixel/fingertip_direct.model" => model_file::text(true),
         "python/fingertip/registers.py" => registers(),

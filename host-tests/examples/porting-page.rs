@@ -54,7 +54,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             figure("instructions_max")?,
         )?;
     }
-    print!("{}", PAGE.renewed(&table)?.1);
+    print!("{}", PAGE.renewed(&table)?);
     Ok(())
 }
 

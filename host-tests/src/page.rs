@@ -5,6 +5,30 @@ use fingertip::store::words;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+fn path(name: &str) -> PathBuf {
+    Path::new(env!("FINGERTIP_ROOT")).join(name)
+}
+
+/// Writes a file that is not fresh, or only checks it; false if a check found it stale.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn renew(name: &str, text: &str, check: bool) -> Result<bool, String> {
+    let fresh = fs::read_to_string(path(name)).is_ok_and(|present| present == text);
+    if !(fresh || check) {
+        fs::write(path(name), text).map_err(|error| format!("{name}: {error}"))?;
+    }
+    let state = if fresh {
+        "fresh"
+    } else if check {
+        "stale"
+    } else {
+        "written"
+    };
+    println!("{state:<9}{name}");
+    Ok(fresh || !check)
+}
+
 /// A page with generated tables between two marker lines.
 pub struct Page {
     /// Path of the page from the repository's root.
@@ -16,37 +40,24 @@ pub struct Page {
 }
 
 impl Page {
-    /// The page as it is, and with its tables replaced.
+    /// The page with its tables replaced.
     ///
     /// # Errors
     /// The page cannot be read, or lacks the marker lines.
-    pub fn renewed(&self, tables: &str) -> Result<(String, String), String> {
-        let old = fs::read_to_string(self.path()).map_err(|error| format!("{}: {error}", self.name))?;
-        let new = self.replaced(&old, tables);
-        let new = new.ok_or_else(|| format!("{} lacks the markers of its tables", self.name))?;
-        Ok((old, new))
+    pub fn renewed(&self, tables: &str) -> Result<String, String> {
+        let old = fs::read_to_string(path(self.name)).map_err(|error| format!("{}: {error}", self.name))?;
+        self.replaced(&old, tables).ok_or_else(|| format!("{} lacks the markers of its tables", self.name))
     }
 
-    /// Writes the tables.
-    pub fn write(&self, tables: &str) -> Result<(), String> {
-        let (_, new) = self.renewed(tables)?;
-        fs::write(self.path(), new).map_err(|error| format!("{}: {error}", self.name))?;
-        println!("written  {}", self.name);
-        Ok(())
-    }
-
-    /// Checks that these are its tables.
-    pub fn check(&self, tables: &str) -> Result<(), String> {
-        let (old, new) = self.renewed(tables)?;
-        if old != new {
-            return Err(format!("{} is stale: renew it with `{}`", self.name, self.command));
+    /// Checks that these are its tables, or writes them.
+    ///
+    /// # Errors
+    /// A check found other tables, or the page cannot be written.
+    pub fn renew(&self, tables: &str, check: bool) -> Result<(), String> {
+        if renew(self.name, &self.renewed(tables)?, check)? {
+            return Ok(());
         }
-        println!("fresh    {}", self.name);
-        Ok(())
-    }
-
-    fn path(&self) -> PathBuf {
-        Path::new(env!("FINGERTIP_ROOT")).join(self.name)
+        Err(format!("{} is stale: renew it with `{}`", self.name, self.command))
     }
 
     /// A page's text with its tables replaced; `None` if it lacks the lines around them.

@@ -111,11 +111,12 @@ fn the_rim_of_a_deep_contact_by_its_angle() {
         for d in [deepest, deepest - 1, deepest - deepest / 100] {
             let rim = paper::touching_angle_max(&tip, mm(d)).to_bits();
             for theta in [1, rim / 2, rim - rim / 100, rim - 1, rim] {
-                let (angle, [t, exact_d]) = (Radians::from_bits(theta), [theta, d].map(|bits| real(bits, 24)));
+                let (angle, exact_angle, exact_d) = (Radians::from_bits(theta), real(theta, 24), real(d, 24));
+                let [distance, slope, area] = reference.at_angle(&exact_angle, &exact_d);
                 let results = [
-                    (paper::distance_at(&tip, angle, mm(d)).to_bits(), 24, reference.distance_at(&t, &exact_d)),
-                    (paper::distance_slope(&tip, angle, mm(d)).to_bits(), 16, reference.distance_slope(&t, &exact_d)),
-                    (paper::area_density(&tip, angle, mm(d)).to_bits(), 16, reference.area_density(&t, &exact_d)),
+                    (paper::distance_at(&tip, angle, mm(d)).to_bits(), 24, distance),
+                    (paper::distance_slope(&tip, angle, mm(d)).to_bits(), 16, slope),
+                    (paper::area_density(&tip, angle, mm(d)).to_bits(), 16, area),
                 ];
                 for (place, (bits, fraction_bits, exact)) in results.into_iter().enumerate() {
                     let error = error_ulp(bits, fraction_bits, &exact);

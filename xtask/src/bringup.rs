@@ -2,7 +2,7 @@
 
 use crate::console::Console;
 use crate::host::{self, Program};
-use crate::image::{self, Image};
+use crate::image;
 use crate::toolchain::{self, Choice, Toolchain};
 use crate::{flash, paths, sim, timing};
 use anyhow::{Context, Result, bail};
@@ -11,7 +11,8 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const NAME: &str = "bringup";
+/// Name of the image and its package.
+pub const NAME: &str = "bringup";
 /// Folder in which Linux names the ST-LINK's port.
 const BY_ID: &str = "/dev/serial/by-id";
 const ST_LINK: &str = "STLINK";
@@ -71,7 +72,7 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
             command
         }
         Some(port) => {
-            let mut command = Program { package: NAME, name: "bringup-host", whole: true }.build(console)?;
+            let mut command = Program { package: NAME, name: "bringup-host", with: host::SHARED }.build(console)?;
             if !args.flashed {
                 flash::put(&image, args.probe.as_deref(), console)?;
             }
@@ -88,11 +89,6 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
         }
     }
     sim::start(&mut command)
-}
-
-/// Builds the image.
-pub fn build(toolchain: Toolchain, console: &mut Console) -> Result<Image> {
-    image::checking(toolchain, NAME, console)
 }
 
 /// The kernels' estimated cycles, with the flash's wait states, of the inputs that the image has: a file with a line

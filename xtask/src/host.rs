@@ -8,49 +8,63 @@ use std::process::Command;
 /// Profile of all programs that run here; see `Cargo.toml`.
 pub const PROFILE: &str = "host";
 
+/// Selects what the tests around an image or a served finger are built of. Programs select it too: cargo gives the crates
+/// that all of them share one set of features, and compiles them once.
+pub const SHARED: &[&str] = &[
+    "--package=virtual-board",
+    "--package=serve",
+    "--package=browser",
+    "--package=fingertip-cli",
+    "--features=fingertip-cli/foxglove",
+];
+/// Selects what the demonstration's two programs need, and no more.
+const LEAST: &[&str] = &["--package=sim", "--package=virtual-board", "--no-default-features"];
+
 /// A program of the workspace.
 pub struct Program {
     /// Package of the program.
     pub package: &'static str,
     /// Name of the program.
     pub name: &'static str,
-    /// True if it is built with its package's default features.
-    pub whole: bool,
+    /// Packages and features that are selected with it.
+    pub with: &'static [&'static str],
 }
 
 /// The demonstration on the native board, with nothing that it does not need.
-pub const NATIVE_DEMO: Program = Program { package: "sim", name: "demo", whole: false };
+pub const NATIVE_DEMO: Program = Program { package: "sim", name: "demo", with: LEAST };
 /// The native core behind a port.
-pub const SERVE: Program = Program { package: "serve", name: "serve", whole: true };
+pub const SERVE: Program = Program { package: "serve", name: "serve", with: SHARED };
 /// The emulated board without scenes and without the text of the log.
-pub const BOARD: Program = Program { package: "virtual-board", name: "virtual-board", whole: false };
+pub const BOARD: Program = Program { package: "virtual-board", name: "virtual-board", with: LEAST };
 /// The emulated board with all that it can.
-pub const SCENE_BOARD: Program = Program { package: "virtual-board", name: "virtual-board", whole: true };
-/// `fingertip`, the host's program.
-pub const TOOL: Program = Program { package: "fingertip-cli", name: "fingertip", whole: true };
+pub const SCENE_BOARD: Program = Program { with: SHARED, ..BOARD };
+/// `fingertip`, the host's program. It does not stream, so it is built without the runtime for that.
+pub const TOOL: Program = Program { package: "fingertip-cli", name: "fingertip", with: &[] };
 
 impl Program {
     /// One of the tools of `host-tests`.
     pub const fn tool(name: &'static str) -> Self {
-        Self { package: "host-tests", name, whole: true }
+        Self { package: "host-tests", name, with: SHARED }
     }
 
     /// One of the programs of `sim`.
     pub const fn sim(name: &'static str) -> Self {
-        Self { package: "sim", name, whole: true }
+        Self { package: "sim", name, with: SHARED }
     }
 
     /// Builds it, and returns the command that starts it.
     pub fn build(&self, console: &mut Console) -> Result<Command> {
         let mut command = cargo("build", self.package);
-        command.args(["--bin", self.name]);
-        if !self.whole {
-            // With the features of both in view, what the demonstration's two programs share is compiled once.
-            command.args(["--no-default-features", "--package", BOARD.package]);
-        }
+        command.args(["--bin", self.name]).args(self.with);
         console.build(&mut command, self.name, slow(self.package))?;
         Ok(Command::new(paths::target().join(PROFILE).join(self.name)))
     }
+}
+
+/// Builds one of the tools of `host-tests` and runs it.
+pub fn run_tool(name: &'static str, words: &[&str], console: &mut Console) -> Result<()> {
+    let mut command = Program::tool(name).build(console)?;
+    console.run(command.args(words))
 }
 
 fn slow(package: &str) -> Slow {

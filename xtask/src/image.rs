@@ -105,17 +105,24 @@ fn lay_out(segments: &[(u32, &[u8])]) -> Result<(u32, Vec<u8>)> {
 /// No compiler, or the firmware does not compile.
 pub fn firmware(choice: Choice, console: &mut Console) -> Result<Image> {
     let toolchain = toolchain::ensure(choice, console)?;
-    let image = Image::read(&built(flashed(toolchain, "build").arg("--release"), toolchain, "firmware", console)?)?;
-    fs::write(&image.bin, &image.bytes).with_context(|| format!("cannot write {}", paths::shown(&image.bin)))?;
-    Ok(image)
+    let mut command = toolchain.cargo("build");
+    command.args(["--package", "fingertip", "--bin", "firmware", "--features", "firmware"]);
+    with_bytes(&mut command, toolchain, "firmware", console)
 }
 
-/// Builds an image that checks a board, with the flashable bytes beside it.
+/// Builds an image that checks a board.
 ///
 /// # Errors
 /// The image does not compile or link.
 pub fn checking(toolchain: Toolchain, name: &str, console: &mut Console) -> Result<Image> {
-    let image = Image::read(&built(checked(toolchain, "build", name).arg("--release"), toolchain, name, console)?)?;
+    let mut command = toolchain.cargo("build");
+    command.args(["--package", name, "--bin", name, "--no-default-features", "--features", "image"]);
+    with_bytes(&mut command, toolchain, name, console)
+}
+
+/// Builds an image, with the flashable bytes beside it.
+fn with_bytes(command: &mut Command, toolchain: Toolchain, name: &str, console: &mut Console) -> Result<Image> {
+    let image = Image::read(&built(command.arg("--release"), toolchain, name, console)?)?;
     fs::write(&image.bin, &image.bytes).with_context(|| format!("cannot write {}", paths::shown(&image.bin)))?;
     Ok(image)
 }
@@ -125,7 +132,7 @@ pub fn checking(toolchain: Toolchain, name: &str, console: &mut Console) -> Resu
 /// # Errors
 /// The image does not compile or link.
 pub fn build(toolchain: Toolchain, name: &str, feature: &str, console: &mut Console) -> Result<PathBuf> {
-    built(emulated(toolchain, "build", name, feature).arg("--release"), toolchain, name, console)
+    built(emulated(toolchain, name, feature).arg("--release"), toolchain, name, console)
 }
 
 fn built(command: &mut Command, toolchain: Toolchain, name: &str, console: &mut Console) -> Result<PathBuf> {
@@ -133,23 +140,9 @@ fn built(command: &mut Command, toolchain: Toolchain, name: &str, console: &mut 
     Ok(toolchain.images().join(name))
 }
 
-/// `cargo <subcommand>` of the flash image.
-pub fn flashed(toolchain: Toolchain, subcommand: &str) -> Command {
-    let mut command = toolchain.cargo(subcommand);
-    command.args(["--package", "fingertip", "--bin", "firmware", "--features", "firmware"]);
-    command
-}
-
-/// `cargo <subcommand>` of an image that checks a board.
-pub fn checked(toolchain: Toolchain, subcommand: &str, name: &str) -> Command {
-    let mut command = toolchain.cargo(subcommand);
-    command.args(["--package", name, "--bin", name, "--no-default-features", "--features", "image"]);
-    command
-}
-
-/// `cargo <subcommand>` of an image for the emulated core.
-pub fn emulated(toolchain: Toolchain, subcommand: &str, name: &str, feature: &str) -> Command {
-    let mut command = toolchain.cargo(subcommand);
+/// `cargo build` of an image for the emulated core.
+pub fn emulated(toolchain: Toolchain, name: &str, feature: &str) -> Command {
+    let mut command = toolchain.cargo("build");
     command.args(["--package", "images", "--bin", name, "--features", feature]);
     command
 }

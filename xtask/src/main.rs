@@ -9,7 +9,6 @@ mod docs;
 mod flash;
 mod host;
 mod image;
-mod model;
 mod option_bytes;
 mod paths;
 mod python;
@@ -100,12 +99,20 @@ enum Command {
     /// Answer rows of CSV (a_mm, Y_kPa, d_mm, r_mm) on standard input by the contact model, in the core's fixed point
     #[command(after_help = "Examples:\n  printf 'a_mm,Y_kPa,d_mm,r_mm\\n10,250,1,0\\n' | cargo xtask model")]
     Model,
-    /// Prove the contact model's error bounds over whole input ranges
-    Prove(model::ProveArgs),
+    /// Prove the contact model's error bounds over whole input ranges: some minutes on two cores
+    #[command(
+        disable_help_flag = true,
+        after_help = "Examples:\n  cargo xtask prove --quick\n  cargo xtask prove --check\n  cargo xtask prove --help    (all that it takes)"
+    )]
+    Prove(sim::Args),
     /// Judge the contact's fit on thousands of pictures, and renew the tables of docs/contact.md
-    Fit(model::FitArgs),
+    #[command(
+        disable_help_flag = true,
+        after_help = "Examples:\n  cargo xtask fit --quick\n  cargo xtask fit --check\n  cargo xtask fit --help    (all that it takes)"
+    )]
+    Fit(sim::Args),
     /// Draw the paper's figures 7, 10 and 11 from the contact model, in the core's fixed point
-    Figures(model::FiguresArgs),
+    Figures(docs::FiguresArgs),
     /// Prove the control step free of panics and of floating-point calls
     #[command(after_help = "Examples:\n  cargo xtask panic-free")]
     PanicFree,
@@ -140,10 +147,10 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
     let toolchain = cli.toolchain;
     match &cli.command {
         Command::Demo(args) => sim::demo(args, toolchain, console),
-        Command::Sim(args) => sim::sim(args, toolchain, console),
-        Command::Sweep(args) => sim::sweep(args, console),
-        Command::Population(args) => sim::population(args, toolchain, console),
-        Command::Budget(args) => sim::budget(args, console),
+        Command::Sim(args) => sim::on_board("sim", args, toolchain, console),
+        Command::Sweep(args) => sim::native("sweep", args, console),
+        Command::Population(args) => sim::on_board("population", args, toolchain, console),
+        Command::Budget(args) => sim::native("budget", args, console),
         Command::Sensor(args) => python::sensor(args, console),
         Command::Serve(args) => sim::serve(args, toolchain, console),
         Command::Replay(args) => sim::replay(args, console),
@@ -156,10 +163,10 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Timing(args) => timing::run(args, toolchain, console),
         Command::Study(args) => timing::study(args, toolchain, console),
         Command::Size => size::run(toolchain, console),
-        Command::Model => model::answer(console),
-        Command::Prove(args) => model::prove(args, console),
-        Command::Fit(args) => model::fit(args, console),
-        Command::Figures(args) => model::figures(args, console),
+        Command::Model => host::run_tool("model", &[], console),
+        Command::Prove(args) => host::run_tool("prove", &args.words(), console),
+        Command::Fit(args) => host::run_tool("fit", &args.words(), console),
+        Command::Figures(args) => docs::figures(args, console),
         Command::PanicFree => size::prove_panic_free(toolchain, console),
         Command::Lint => test::lint(toolchain),
         Command::Docs(args) => docs::run(args, toolchain, console),
@@ -178,7 +185,7 @@ fn setup(choice: Choice, console: &mut Console) -> anyhow::Result<()> {
     python::script("fit.py", console)?;
     cluster::ensure(console)?;
     apt::browser(console)?;
-    docs::DENY.ensure(console)?;
+    docs::deny(console)?;
     console.run(console::cargo("fetch").arg("--locked"))?;
     console.say(
         "All set up: demo, sim, sweep, population, cluster, sensor, test, build, qemu, timing, size, lint and docs work offline now.",

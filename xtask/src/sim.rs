@@ -15,30 +15,22 @@ pub struct Args {
     pub arguments: Vec<String>,
 }
 
-/// Runs a scene on the requested board.
-pub fn sim(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
-    on_board("sim", args, choice, console)
+impl Args {
+    /// The same, borrowed.
+    pub fn words(&self) -> Vec<&str> {
+        self.arguments.iter().map(String::as_str).collect()
+    }
 }
 
-/// Runs a sweep, on the native board.
-pub fn sweep(args: &Args, console: &mut Console) -> Result<()> {
-    start(host::Program::sim("sweep").build(console)?.args(&args.arguments))
-}
-
-/// Runs a population of drawn fingers on the requested board.
-pub fn population(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
-    on_board("population", args, choice, console)
-}
-
-/// Says what makes the force wrong.
-pub fn budget(args: &Args, console: &mut Console) -> Result<()> {
-    start(host::Program::sim("budget").build(console)?.args(&args.arguments))
+/// Runs a program on the native board.
+pub fn native(program: &'static str, args: &Args, console: &mut Console) -> Result<()> {
+    start(host::Program::sim(program).build(console)?.args(&args.arguments))
 }
 
 /// Runs a program on this machine, or the same command of the board that runs the flash image.
-fn on_board(program: &'static str, args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
+pub fn on_board(program: &'static str, args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     if !wants_image(&args.arguments) {
-        return start(host::Program::sim(program).build(console)?.args(&args.arguments));
+        return native(program, args, console);
     }
     let image = image::firmware(choice, console)?;
     let mut command = host::SCENE_BOARD.build(console)?;
@@ -81,7 +73,7 @@ pub struct DemoArgs {
 
 /// Shows the demonstration on the native core, which is built soon, then on the flash image.
 pub fn demo(args: &DemoArgs, choice: Choice, console: &mut Console) -> Result<()> {
-    native(args, console)?;
+    native_demo(args, console)?;
     let image = image::firmware(choice, console)?;
     console.say(&image.summary());
     let mut command = host::BOARD.build(console)?;
@@ -96,7 +88,7 @@ pub fn demo(args: &DemoArgs, choice: Choice, console: &mut Console) -> Result<()
 }
 
 /// The same script on the core compiled for this machine: something to look at while the emulator compiles.
-fn native(args: &DemoArgs, console: &mut Console) -> Result<()> {
+fn native_demo(args: &DemoArgs, console: &mut Console) -> Result<()> {
     let mut command = host::NATIVE_DEMO.build(console)?;
     console.say("First on the native core: the same script and plant, no microcontroller in between.");
     // As it is to be read: programs are started in the root.

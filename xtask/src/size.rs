@@ -158,8 +158,7 @@ fn link(toolchain: Toolchain, console: &mut Console) -> Result<std::path::PathBu
 
 /// Shows that the proof can fail.
 fn controls(toolchain: Toolchain, console: &mut Console) -> Result<()> {
-    let output =
-        console.run_to_failure(image::emulated(toolchain, "build", NAME, "proof-control-panic").arg("--release"))?;
+    let output = console.run_to_failure(image::emulated(toolchain, NAME, "proof-control-panic").arg("--release"))?;
     if !output.contains(UNDEFINED) {
         bail!("the control that panics fails for another reason:\n{output}");
     }
@@ -228,11 +227,6 @@ mod tests {
         );
         assert!(sizes(0, RAM_MAX_BYTES + 1).check().unwrap_err().to_string().contains("static RAM"));
     }
-}
-
-#[cfg(test)]
-mod proof_tests {
-    use super::*;
 
     #[test]
     fn floating_point_routines_are_told_from_the_rest() {

@@ -1,7 +1,6 @@
 //! Tests and checks, one stage each.
 
 use crate::console::{self, Console, clear_line, cpu_s};
-use crate::model::{self, FitArgs, ProveArgs};
 use crate::size::{self, Sizes};
 use crate::toolchain::{self, Choice, TARGET, Toolchain};
 use crate::{apt, bringup, cores, docs, host, image, python, timing};
@@ -53,7 +52,7 @@ pub fn run(args: &Args, choice: Choice) -> Result<()> {
     stages.stage("virtual board", |console| {
         let python = python::ensure(console)?;
         let mut command = on_a_board(&["--lib", "--test", "board"]);
-        let checking = bringup::build(toolchain::ensure(choice, console)?, console)?;
+        let checking = image::checking(toolchain::ensure(choice, console)?, bringup::NAME, console)?;
         command.env("FINGERTIP_IMAGE", &image()?.elf).env("FINGERTIP_PYTHON", &python);
         command.env("FINGERTIP_BRINGUP", &checking.elf);
         host::test(&mut command, console)
@@ -80,25 +79,34 @@ fn long(mut stages: Stages) -> Result<()> {
     stages.stage("long core and host tests", |console| {
         host::test(console::cargo("test").args(["--no-fail-fast", "--", "--ignored", "long_"]), console)
     });
-    stages.stage("proofs of the model's error bounds", |console| model::prove(&ProveArgs::CHECK, console));
-    stages.stage("fit of thousands of tactile images", |console| model::fit(&FitArgs::CHECK, console));
+    stages.stage("proofs of the model's error bounds", |console| host::run_tool("prove", &["--check"], console));
+    stages.stage("fit of thousands of tactile images", |console| host::run_tool("fit", &["--check"], console));
     stages.finish("test --long")
 }
 
-/// Tests of the packages that stand around an image or a served finger. All of them are selected each time, so that they
-/// agree on the features of what they share, and it is compiled once.
+/// Tests of the packages that stand around an image or a served finger.
 fn on_a_board(targets: &[&str]) -> Command {
-    let mut command = host::cargo("test", "virtual-board");
-    command.args(["--package", "serve", "--package", "browser", "--package", "fingertip-cli"]);
-    command.args(["--features", "fingertip-cli/foxglove"]).args(targets);
+    let mut command = host::cargo("test", host::BOARD.package);
+    command.args(host::SHARED).args(targets);
     command
 }
 
 // Format, lints, documentation and licences.
 
-/// Every image that is emulated or linked as a proof, and its feature.
-const IMAGES: [(&str, &str); 5] =
-    [("qemu", "qemu"), ("panic-free", "proof"), ("timing", "timing"), ("timing-check", "timing"), ("study", "study")];
+/// Every package, with the features that are off by default.
+const ALL: [&str; 2] = ["--workspace", "--features=m4-timing/plugin,fingertip-cli/foxglove"];
+/// Programs whose default features somebody leaves out.
+const LEAST: [&str; 6] =
+    ["--package=sim", "--package=virtual-board", "--package=fingertip-cli", "--no-default-features", "--lib", "--bins"];
+/// Every image for the microcontroller: flashed, emulated, or linked as a proof. In one view, what they share is checked once.
+const IMAGES: [&str; 6] = [
+    "--package=fingertip",
+    "--package=images",
+    "--package=bringup",
+    "--bins",
+    "--no-default-features",
+    "--features=fingertip/firmware,fingertip/measure,images/qemu,images/proof,images/study,bringup/image",
+];
 
 /// Programs of other boards, each a workspace of its own.
 const APART: [&str; 2] = [cores::EXAMPLE, cores::LOOP];
@@ -114,54 +122,35 @@ pub fn lint(choice: Choice) -> Result<()> {
         }
         Ok(())
     });
-    stages.stage("lints, host", |console| console.run(&mut clippy(&["--workspace", "--all-targets"])));
-    stages.stage("lints, what the demonstration is built of", |console| {
-        for package in ["sim", "virtual-board"] {
-            console.run(&mut clippy(&["--package", package, "--no-default-features", "--lib", "--bins"]))?;
-        }
-        Ok(())
-    });
-    stages.stage("lints, what is built where it is asked for", |console| {
-        console.run(&mut clippy(&["--package", "m4-timing", "--features", "plugin", "--all-targets"]))?;
-        console.run(&mut clippy(&["--package", "fingertip-cli", "--features", "foxglove", "--all-targets"]))
-    });
+    stages.stage("lints, host", |console| console.run(clippy(console::cargo("clippy").args(ALL).arg("--all-targets"))));
+    stages.stage("lints, least features", |console| console.run(clippy(console::cargo("clippy").args(LEAST))));
     stages.stage("lints, microcontroller", |console| {
         let toolchain = toolchain::ensure(choice, console)?;
         ensure!(toolchain == Toolchain::Native, "Debian's Rust has no clippy for {TARGET}: rustup's target is needed");
-        console.run(&mut denying_warnings(image::flashed(toolchain, "clippy")))?;
-        for (name, feature) in IMAGES {
-            console.run(&mut denying_warnings(image::emulated(toolchain, "clippy", name, feature)))?;
-        }
-        console.run(&mut denying_warnings(image::checked(toolchain, "clippy", "bringup")))?;
+        console.run(clippy(toolchain.cargo("clippy").args(IMAGES)))?;
         let target = cores::TARGET_OF_EXAMPLE;
         let toolchain =
             toolchain::ensure_for(choice, &[target], "programs of other boards are checked for it", console)?;
         for folder in APART {
-            console.run(&mut denying_warnings(image::apart(toolchain, "clippy", folder, target, &[])))?;
+            console.run(clippy(&mut image::apart(toolchain, "clippy", folder, target, &[])))?;
         }
         Ok(())
     });
     stages.stage("documentation", |console| {
         let mut command = console::cargo("doc");
-        command.args(["--workspace", "--no-deps", "--document-private-items", "--ignore-rust-version"]);
+        command.args(ALL).args(["--no-deps", "--document-private-items", "--ignore-rust-version"]);
         console.run(command.env("RUSTDOCFLAGS", "-D warnings"))
     });
     stages.stage("licences and sources of the dependencies", |console| {
-        let program = docs::DENY.ensure(console)?;
+        let program = docs::deny(console)?;
         console.run(Command::new(program).args(["check", "bans", "licenses", "sources"]))
     });
     stages.finish("lint")
 }
 
-fn denying_warnings(mut clippy: Command) -> Command {
-    clippy.args(["--ignore-rust-version", "--", "-D", "warnings"]);
-    clippy
-}
-
-fn clippy(arguments: &[&str]) -> Command {
-    let mut command = console::cargo("clippy");
-    command.args(arguments);
-    denying_warnings(command)
+/// Ends a command of clippy's.
+fn clippy(command: &mut Command) -> &mut Command {
+    command.args(["--ignore-rust-version", "--", "-D", "warnings"])
 }
 
 /// A sequence of checks, each a line with its cost; what failed is shown in full.

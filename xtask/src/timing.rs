@@ -251,7 +251,7 @@ pub fn study(args: &StudyArgs, choice: Choice, console: &mut Console) -> Result<
 
 /// The image as quick as the compiler makes it, without what keeps the firmware's small.
 fn build_quick(toolchain: Toolchain, console: &mut Console) -> Result<PathBuf> {
-    let mut command = image::emulated(toolchain, "build", STUDY, STUDY);
+    let mut command = image::emulated(toolchain, STUDY, STUDY);
     command.args(["--profile", STUDY_PROFILE]);
     // Instead of the flags that `.cargo/config.toml` has for the target.
     let flags = ["-C", "opt-level=3"].map(String::from).into_iter().chain(toolchain::short_paths());

@@ -1,51 +1,51 @@
 //! Judges the fit of the contact on many pictures, and writes the tables of `docs/contact.md`.
 
+use clap::Parser;
 use fingertip::contact::FitLevel;
 use host_tests::fit_statistics::{CASES, PAGE, markdown};
 use host_tests::program::{Progress, ended};
 use std::process::ExitCode;
 
-const USAGE: &str = "fit [--cases N] [--quick] [--fit-level N] [--write | --check]";
+/// Judges the contact's fit on thousands of pictures.
+#[derive(Parser)]
+#[command(name = "fit", after_help = "Examples:\n  fit --quick\n  fit --check\n  fit --write")]
+struct Args {
+    /// Cases a series
+    #[arg(long, value_name = "N", default_value_t = CASES as u32, value_parser = clap::value_parser!(u32).range(1..))]
+    cases: u32,
+    /// Take a twentieth of the cases
+    #[arg(long, conflicts_with = "cases")]
+    quick: bool,
+    /// The loop's fit level
+    #[arg(long, value_name = "0 TO 5", value_parser = fit_level)]
+    fit_level: Option<FitLevel>,
+    /// Write the tables into docs/contact.md instead of printing them
+    #[arg(long, conflicts_with_all = ["quick", "cases"])]
+    write: bool,
+    /// Fail where the tables in docs/contact.md are stale
+    #[arg(long, conflicts_with_all = ["quick", "cases", "write"])]
+    check: bool,
+}
 
-enum Page {
-    Print,
-    Write,
-    Check,
+fn fit_level(word: &str) -> Result<FitLevel, String> {
+    let level = word.parse().ok().and_then(|number: usize| FitLevel::ALL.get(number).copied());
+    level.ok_or_else(|| "takes a number from 0 to 5".into())
 }
 
 fn main() -> ExitCode {
-    ended(run())
+    ended(run(&Args::parse()))
 }
 
-fn run() -> Result<(), String> {
-    let (mut cases, mut fit_level, mut page) = (CASES, FitLevel::default(), Page::Print);
-    let mut arguments = std::env::args().skip(1);
-    while let Some(argument) = arguments.next() {
-        match argument.as_str() {
-            "--cases" => {
-                let number = arguments.next().and_then(|number| number.parse().ok()).filter(|number| *number > 0);
-                cases = number.ok_or("--cases takes a number above 0")?;
-            }
-            "--fit-level" => {
-                let number = arguments.next().and_then(|number| number.parse::<usize>().ok());
-                let found = number.and_then(|number| FitLevel::ALL.get(number));
-                fit_level = *found.ok_or("--fit-level takes a number from 0 to 5")?;
-            }
-            "--quick" => cases = CASES / 20,
-            "--write" => page = Page::Write,
-            "--check" => page = Page::Check,
-            other => return Err(format!("unknown argument {other}: {USAGE}")),
-        }
-    }
+fn run(args: &Args) -> Result<(), String> {
+    let cases = if args.quick { CASES / 20 } else { args.cases as usize };
     let progress = Progress::begin();
-    let tables = markdown(cases, fit_level, &|name, done| {
+    let tables = markdown(cases, args.fit_level.unwrap_or_default(), &|name, done| {
         progress.show(format_args!("{name}: {done} of {cases}          "));
     });
     progress.end(format_args!("\r{:60}\r", ""));
-    match page {
-        Page::Print => print!("{tables}"),
-        Page::Write => PAGE.write(&tables)?,
-        Page::Check => PAGE.check(&tables)?,
+    if args.write || args.check {
+        return PAGE.renew(&tables, args.check);
     }
+    print!("{tables}");
     Ok(())
 }

@@ -3,6 +3,7 @@
 //! Prints, for each function, how many inputs were judged and the worst case; fails where a bound does not hold.
 //! `--write` puts these figures into `docs/model.md`, `--check` fails where they are stale there.
 
+use clap::Parser;
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -11,27 +12,23 @@ use host_tests::prove::random::reference_tip;
 use host_tests::prove::tally::Tally;
 use host_tests::prove::{beyond, exhaustive, random, reference, tally};
 
-const USAGE: &str = "prove [--quick | --write | --check]";
-
-/// Handling of the tables of `docs/model.md`.
-enum Page {
-    Leave,
-    Write,
-    Check,
+/// Proves the contact model's error bounds over whole input ranges.
+#[derive(Parser)]
+#[command(name = "prove", after_help = "Examples:\n  prove --quick\n  prove --check")]
+struct Args {
+    /// Take a thousandth of the inputs
+    #[arg(long)]
+    quick: bool,
+    /// Write the figures into docs/model.md
+    #[arg(long, conflicts_with = "quick")]
+    write: bool,
+    /// Fail where the figures in docs/model.md are stale
+    #[arg(long, conflicts_with_all = ["quick", "write"])]
+    check: bool,
 }
 
 fn main() -> ExitCode {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let (quick, page) = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
-        [] => (false, Page::Leave),
-        ["--quick"] => (true, Page::Leave),
-        ["--write"] => (false, Page::Write),
-        ["--check"] => (false, Page::Check),
-        _ => {
-            eprintln!("usage: {USAGE}");
-            return ExitCode::from(2);
-        }
-    };
+    let Args { quick, write, check } = Args::parse();
     let share = if quick { 1_000 } else { 1 };
     let mut report = Report { started: Instant::now(), inputs: 0, broken: 0, sections: Vec::new() };
     let tip = reference_tip();
@@ -78,7 +75,7 @@ fn main() -> ExitCode {
             report.broken += 1;
         }
     }
-    report.end(page)
+    report.end((write || check).then_some(check))
 }
 
 struct Report {
@@ -102,17 +99,13 @@ impl Report {
         self.sections.push((title.to_owned(), tallies));
     }
 
-    fn end(&self, page: Page) -> ExitCode {
+    /// Ends the program; writes or checks the tables of `docs/model.md` if wanted.
+    fn end(&self, check: Option<bool>) -> ExitCode {
         let seconds = self.started.elapsed().as_secs();
         println!("{} results judged in {seconds} s; {} bounds broken", self.inputs, self.broken);
         if self.broken > 0 {
             return ExitCode::FAILURE;
         }
-        let text = tally::markdown(&self.sections);
-        ended(match page {
-            Page::Leave => Ok(()),
-            Page::Write => tally::PAGE.check(&text).or_else(|_| tally::PAGE.write(&text)),
-            Page::Check => tally::PAGE.check(&text),
-        })
+        ended(check.map_or(Ok(()), |check| tally::PAGE.renew(&tally::markdown(&self.sections), check)))
     }
 }

@@ -6,6 +6,7 @@
 //! is and built for speed, and the lines of `budget --whole-loop`: it renews or checks `docs/study.md`, the README's table
 //! and the pictures.
 
+use host_tests::page::renew;
 use host_tests::program::ended;
 use host_tests::study::inputs::Inputs;
 use host_tests::study::kernels::KERNELS;
@@ -57,12 +58,11 @@ fn report(runs: [&str; 2], whole: &str, flags: &[&str]) -> Result<(), String> {
     if let Some(file) = json {
         fs::write(&file, page::json_lines(&studied)).map_err(|error| format!("{}: {error}", file.display()))?;
     }
-    let root = Path::new(env!("FINGERTIP_ROOT"));
     let mut files = Vec::new();
     let whole = WholeLoop::read(&fs::read_to_string(whole).map_err(|error| format!("{whole}: {error}"))?)?;
     let tables = page::markdown(&studied, whole.markdown(&studied)?);
     for (page, tables) in [(page::PAGE, tables), (page::README, whole.levels_table(&studied)?)] {
-        files.push((page.name.to_owned(), page.renewed(&tables)?.1));
+        files.push((page.name.to_owned(), page.renewed(&tables)?));
     }
     files.push((whole_loop::PICTURE.to_owned(), whole.draw(&studied)?));
     for (kernel, points) in studied.iter().filter(|(kernel, _)| kernel.has_error()) {
@@ -74,7 +74,7 @@ fn report(runs: [&str; 2], whole: &str, flags: &[&str]) -> Result<(), String> {
     if let Some(folder) = out {
         return write_all(&folder, &files);
     }
-    renew(root, &files, check)
+    renew_all(&files, check)
 }
 
 fn verdicts(studied: &[Studied]) {
@@ -117,18 +117,11 @@ fn write_all(folder: &Path, files: &[(String, String)]) -> Result<(), String> {
     Ok(())
 }
 
-fn renew(root: &Path, files: &[(String, String)], check: bool) -> Result<(), String> {
+fn renew_all(files: &[(String, String)], check: bool) -> Result<(), String> {
     let mut stale = Vec::new();
     for (name, text) in files {
-        let file = root.join(name);
-        if fs::read_to_string(&file).is_ok_and(|present| present == *text) {
-            println!("fresh    {name}");
-        } else if check {
-            println!("stale    {name}");
+        if !renew(name, text, check)? {
             stale.push(name.as_str());
-        } else {
-            fs::write(&file, text).map_err(|error| format!("{name}: {error}"))?;
-            println!("written  {name}");
         }
     }
     if stale.is_empty() {

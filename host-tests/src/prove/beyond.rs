@@ -25,48 +25,19 @@ pub fn geometry(range: Range<u64>, progress: Progress<'_>) -> [Tally; 6] {
         let mut rng = Rng::with_seed(SEED ^ range.start);
         for _ in range {
             let Point { tip, d, r, .. } = Point::random(&mut rng);
-            let reference = Reference::new(&tip);
-            let exact_d = real(d, 24);
+            let (reference, exact_d) = (Reference::new(&tip), real(d, 24));
             let inside = r.min(tip.contact_radius(mm(d)).to_bits());
-            judge(
-                angle,
-                paper::touching_angle(&tip, mm(inside), mm(d)).to_bits(),
-                24,
-                &reference.touching_angle(&real(inside, 24), &exact_d),
-                at(&tip, d, inside),
-            );
-            judge(
-                strain,
-                tip.strain(mm(r), mm(d)).to_bits(),
-                30,
-                &reference.strain(&real(r, 24), &exact_d),
-                at(&tip, d, r),
-            );
+            let theta_bits = paper::touching_angle(&tip, mm(inside), mm(d)).to_bits();
+            let exact = reference.touching_angle(&real(inside, 24), &exact_d);
+            judge(angle, theta_bits, 24, &exact, at(&tip, d, inside));
+            let exact = reference.strain(&real(r, 24), &exact_d);
+            judge(strain, tip.strain(mm(r), mm(d)).to_bits(), 30, &exact, at(&tip, d, r));
             let theta = rng.i32(0..=paper::touching_angle_max(&tip, mm(d)).to_bits());
-            let exact_theta = real(theta, 24);
-            let at = at(&tip, d, theta);
-            let radians = Radians::from_bits(theta);
-            judge(
-                distance,
-                paper::distance_at(&tip, radians, mm(d)).to_bits(),
-                24,
-                &reference.distance_at(&exact_theta, &exact_d),
-                at,
-            );
-            judge(
-                slope,
-                paper::distance_slope(&tip, radians, mm(d)).to_bits(),
-                16,
-                &reference.distance_slope(&exact_theta, &exact_d),
-                at,
-            );
-            judge(
-                area,
-                paper::area_density(&tip, radians, mm(d)).to_bits(),
-                16,
-                &reference.area_density(&exact_theta, &exact_d),
-                at,
-            );
+            let [exact_distance, exact_slope, exact_area] = reference.at_angle(&real(theta, 24), &exact_d);
+            let (at, theta) = (at(&tip, d, theta), Radians::from_bits(theta));
+            judge(distance, paper::distance_at(&tip, theta, mm(d)).to_bits(), 24, &exact_distance, at);
+            judge(slope, paper::distance_slope(&tip, theta, mm(d)).to_bits(), 16, &exact_slope, at);
+            judge(area, paper::area_density(&tip, theta, mm(d)).to_bits(), 16, &exact_area, at);
             let exact_length =
                 super::exact::particle_length(&tip, inside, tip.particle_length(mm(inside)).to_bits(), 1);
             length.add(Judged { within: exact_length.nearest == Some(true), ..exact_length }, at);

@@ -5,87 +5,105 @@
 //! integers over 2^100. Pass and fail are decided without any rounding; only the size of the error that is printed is a
 //! float.
 
-use ethnum::{I256, U256};
+use ethnum::I256;
 use fingertip::model::Tip;
+use std::ops::{Add, Mul, Sub};
 
 use super::tally::Judged;
 
 /// pi 2^100, rounded down: from its digits in hexadecimal.
-const PI_Q100: u128 = 0x32_43f6_a888_5a30_8d31_3198_a2e0;
+const PI_Q100: i128 = 0x32_43f6_a888_5a30_8d31_3198_a2e0;
 
-/// An exact value known between two rational numbers with one denominator.
-struct Bounds {
-    low: U256,
-    high: U256,
-    denominator: U256,
+/// An integer with room for a judge's products: 128 bits without pi, 256 with it.
+trait Integer: Copy + PartialOrd + From<i64> + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
+    fn to_f64(self) -> f64;
 }
 
-impl Bounds {
-    fn exactly(numerator: U256, denominator: U256) -> Self {
+impl Integer for i128 {
+    fn to_f64(self) -> f64 {
+        self as f64
+    }
+}
+
+impl Integer for I256 {
+    fn to_f64(self) -> f64 {
+        self.as_f64()
+    }
+}
+
+/// An exact value known between two rational numbers with one denominator.
+struct Bounds<T> {
+    low: T,
+    high: T,
+    denominator: T,
+}
+
+impl<T: Integer> Bounds<T> {
+    fn exactly(numerator: T, denominator: T) -> Self {
         Self { low: numerator, high: numerator, denominator }
     }
 
     /// The bounds are those of the value.
     fn linear(&self, result: i32, bound: u32) -> Judged {
-        let twice = I256::from(result) * 2;
-        let holds = |margin: i32| {
-            let low = (twice - I256::from(margin)) * self.denominator.as_i256();
-            let high = (twice + I256::from(margin)) * self.denominator.as_i256();
-            (self.low * 2).as_i256() >= low && (self.high * 2).as_i256() <= high
+        let rounded = T::from(result.into()) * self.denominator;
+        let (low, high) = (self.low - rounded, self.high - rounded);
+        let holds = |halves: i64| {
+            let most = T::from(halves) * self.denominator;
+            low + low + most >= T::from(0) && high + high <= most
         };
-        let error = I256::from(result) * self.denominator.as_i256() - self.low.as_i256();
-        Judged {
-            error_ulp: error.as_f64() / self.denominator.as_f64(),
-            nearest: Some(holds(1)),
-            within: holds(2 * bound as i32),
-        }
+        let nearest = holds(1);
+        let error_ulp = -low.to_f64() / self.denominator.to_f64();
+        Judged { error_ulp, nearest: Some(nearest), within: nearest || holds(2 * i64::from(bound)) }
     }
 
     /// The bounds are those of the value's square; the value is not negative.
     fn square(&self, result: i32, bound: u32) -> Judged {
-        let twice = 2 * i128::from(result);
-        let squared = |side: i128| U256::from(side.max(0).unsigned_abs().pow(2)) * self.denominator;
-        let holds = |margin: i128| {
-            let above = twice < margin || self.low * 4 >= squared(twice - margin);
-            above && self.high * 4 <= squared(twice + margin)
+        let result = i64::from(result);
+        let rounded = T::from(result * result) * self.denominator;
+        let (low, high) = (self.low - rounded, self.high - rounded);
+        let quadruple = |number: T| number + number + number + number;
+        let holds = |halves: i64| {
+            // Four times the square of the result with so many halves more or less, less the result's own.
+            let beyond = |sign: i64| T::from(halves * halves + sign * 4 * result * halves) * self.denominator;
+            let above = 2 * result < halves || quadruple(low) >= beyond(-1);
+            above && 2 * result + halves >= 0 && quadruple(high) <= beyond(1)
         };
-        let difference = (squared(twice).as_i256() - (self.low * 4).as_i256()).as_f64() / self.denominator.as_f64();
-        let value = (self.low.as_f64() / self.denominator.as_f64()).sqrt();
-        let sum = 2.0 * (f64::from(result) + value);
-        Judged {
-            error_ulp: if sum > 0.0 { difference / sum / 2.0 } else { 0.0 },
-            nearest: Some(holds(1)),
-            within: holds(2 * i128::from(bound)),
-        }
+        let denominator = self.denominator.to_f64();
+        let sum = result as f64 + (self.low.to_f64() / denominator).sqrt();
+        let error_ulp = if sum > 0.0 { -low.to_f64() / denominator / sum } else { 0.0 };
+        let nearest = holds(1);
+        Judged { error_ulp, nearest: Some(nearest), within: nearest || holds(2 * i64::from(bound)) }
     }
 }
 
-fn wide(number: i32) -> U256 {
-    U256::from(number.unsigned_abs())
+fn wide(number: i32) -> i128 {
+    number.into()
 }
 
-fn pi_times(number: U256) -> (U256, U256) {
-    (number * U256::from(PI_Q100), number * U256::from(PI_Q100 + 1))
+/// Returns the two numbers that pi times a number lies between.
+fn pi_times(number: i128) -> [I256; 2] {
+    let low = I256::from(number) * I256::from(PI_Q100);
+    [low, low + I256::from(number)]
 }
 
-fn radius(tip: &Tip) -> U256 {
+fn radius(tip: &Tip) -> i128 {
     wide(tip.radius().to_bits())
 }
 
-fn modulus(tip: &Tip) -> U256 {
+fn modulus(tip: &Tip) -> i128 {
     wide(tip.modulus().to_bits())
 }
 
 /// `F = pi Y d^2`.
 pub fn force(tip: &Tip, d: i32, result: i32, bound: u32) -> Judged {
-    let (low, high) = pi_times(modulus(tip) * wide(d) * wide(d));
-    Bounds { low, high, denominator: U256::from(1000_u32) << 148 }.linear(result, bound)
+    let [low, high] = pi_times(modulus(tip) * wide(d) * wide(d));
+    Bounds { low, high, denominator: I256::from(1000) << 148 }.linear(result, bound)
 }
 
 /// `d = sqrt(F / (pi Y))`.
 pub fn indentation(tip: &Tip, force: i32, result: i32, bound: u32) -> Judged {
-    let numerator = (wide(force) * 1000) << 148;
-    let (low, high) = pi_times(modulus(tip));
+    let numerator = I256::from(wide(force) * 1000) << 148;
+    let [low, high] = pi_times(modulus(tip));
     let by_least = Bounds::exactly(numerator, high).square(result, bound);
     let by_most = Bounds::exactly(numerator, low).square(result, bound);
     Judged {
@@ -98,7 +116,7 @@ pub fn indentation(tip: &Tip, force: i32, result: i32, bound: u32) -> Judged {
 /// True if the exact indentation at a force is at most the deepest.
 pub fn force_in_reach(tip: &Tip, force: i32) -> bool {
     let depth = wide(tip.depth_max().to_bits());
-    (wide(force) * 1000) << 148 <= pi_times(modulus(tip)).0 * depth * depth
+    I256::from(wide(force) * 1000) << 148 <= pi_times(modulus(tip) * depth * depth)[0]
 }
 
 /// True if the exact indentation at a contact radius is at most the deepest.
@@ -109,19 +127,19 @@ pub fn radius_in_reach(tip: &Tip, contact_radius: i32) -> bool {
 
 /// `r_c = sqrt(d (2a - d))`.
 pub fn contact_radius(tip: &Tip, d: i32, result: i32, bound: u32) -> Judged {
-    Bounds::exactly(wide(d) * (radius(tip) * 2 - wide(d)), U256::ONE).square(result, bound)
+    Bounds::exactly(wide(d) * (radius(tip) * 2 - wide(d)), 1).square(result, bound)
 }
 
 /// `k = 2 pi Y d`.
 pub fn stiffness(tip: &Tip, d: i32, result: i32, bound: u32) -> Judged {
-    let (low, high) = pi_times(modulus(tip) * wide(d));
-    Bounds { low, high, denominator: U256::from(500_u32) << 124 }.linear(result, bound)
+    let [low, high] = pi_times(modulus(tip) * wide(d));
+    Bounds { low, high, denominator: I256::from(500) << 124 }.linear(result, bound)
 }
 
 /// `k = 2 sqrt(pi Y F)`.
 pub fn stiffness_at_force(tip: &Tip, force: i32, result: i32, bound: u32) -> Judged {
-    let (low, high) = pi_times(modulus(tip) * wide(force) * 4);
-    Bounds { low, high, denominator: U256::from(1000_u32) << 100 }.square(result, bound)
+    let [low, high] = pi_times(modulus(tip) * wide(force) * 4);
+    Bounds { low, high, denominator: I256::from(1000) << 100 }.square(result, bound)
 }
 
 /// `p(0) = Y d / a`.
@@ -146,14 +164,14 @@ pub fn indentation_from_radius(tip: &Tip, contact_radius: i32, result: i32, boun
 
 /// `L = sqrt(a^2 - r^2)`.
 pub fn particle_length(tip: &Tip, r: i32, result: i32, bound: u32) -> Judged {
-    Bounds::exactly(radius(tip) * radius(tip) - wide(r) * wide(r), U256::ONE).square(result, bound)
+    Bounds::exactly(radius(tip) * radius(tip) - wide(r) * wide(r), 1).square(result, bound)
 }
 
 /// `p = Y (1 - (a - d)/L)` inside the contact, 0 outside.
 pub fn pressure(tip: &Tip, r: i32, d: i32, result: i32, bound: u32) -> Judged {
     let contact_square = wide(d) * (radius(tip) * 2 - wide(d));
     if wide(r) * wide(r) >= contact_square {
-        return Bounds::exactly(U256::ZERO, U256::ONE).linear(result, bound);
+        return Bounds::exactly(0, 1).linear(result, bound);
     }
     // Y - p = Y (a - d) / L, whose square is rational.
     let rest = modulus(tip) * (radius(tip) - wide(d));

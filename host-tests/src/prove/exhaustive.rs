@@ -28,19 +28,28 @@ pub fn depths(tip: &Tip, range: Range<u64>, progress: Progress<'_>) -> [Tally; 7
     // Four times half a unit of force as a squared length, in Q48, rounded up: what F(d) may have lost.
     let four_lost = round_trip_slack(tip);
     parallel(range, CHUNK, tallies, progress, |range, [force, radius, stiffness, peak, mean, step, back]| {
+        let results = |d: i32| (tip.force(mm(d)), tip.stiffness(mm(d)));
+        let mut next = results(range.start as i32);
+        let mut inverse = (next.0, tip.indentation(next.0));
         for d in range.map(|d| d as i32) {
             let at = at(tip, d, 0);
-            let f = tip.force(mm(d));
+            let (f, k) = next;
+            next = results(d + 1);
             force.add(exact::force(tip, d, f.to_bits(), 1), at);
             radius.add(exact::contact_radius(tip, d, tip.contact_radius(mm(d)).to_bits(), 1), at);
-            stiffness.add(exact::stiffness(tip, d, tip.stiffness(mm(d)).to_bits(), 1), at);
+            stiffness.add(exact::stiffness(tip, d, k.to_bits(), 1), at);
             peak.add(exact::peak_pressure(tip, d, tip.peak_pressure(mm(d)).to_bits(), 1), at);
             mean.add(exact::mean_pressure(tip, d, tip.mean_pressure(mm(d)).to_bits(), 1), at);
-            let rise = tip.force(mm(d + 1)).to_bits() - f.to_bits();
-            let within = rise >= 0 && f64::from(rise) <= 1.0 + slope_ulp(tip, d + 1);
+            let rise = next.0.to_bits() - f.to_bits();
+            // The slope at the larger depth, in units of force for a unit of depth.
+            let slope_ulp = f64::from(next.1.to_bits() + 1) / f64::from(1 << 24);
+            let within = rise >= 0 && f64::from(rise) <= 1.0 + slope_ulp;
             step.add(Judged { error_ulp: rise.into(), nearest: None, within }, at);
-            let again = i64::from(tip.indentation(f).to_bits());
-            back.add(round_trip(d.into(), again, four_lost), at);
+            // Some thirty depths have the same force.
+            if f != inverse.0 {
+                inverse = (f, tip.indentation(f));
+            }
+            back.add(round_trip(d.into(), inverse.1.to_bits().into(), four_lost), at);
         }
     })
 }
@@ -51,13 +60,17 @@ pub fn forces(tip: &Tip, range: Range<u64>, progress: Progress<'_>) -> [Tally; 3
     let first = tip.indentation(newtons(1)).to_bits();
     let tallies = [Tally::new("d(F)", 0.5), Tally::new("k(F)", 0.5), Tally::new("d(F + 1 ulp) - d(F)", first.into())];
     parallel(range, CHUNK, tallies, progress, |range, [indentation, stiffness, step]| {
-        for f in range.map(|f| f as i32).filter(|&f| in_reach(tip, f)) {
-            let at = at(tip, f, 0);
-            let d = tip.indentation(newtons(f)).to_bits();
+        let mut next = tip.indentation(newtons(range.start as i32)).to_bits();
+        for f in range.map(|f| f as i32) {
+            let (at, d) = (at(tip, f, 0), next);
+            next = tip.indentation(newtons(f + 1)).to_bits();
+            if !in_reach(tip, f) {
+                continue;
+            }
             indentation.add(exact::indentation(tip, f, d, 1), at);
             let k = tip.stiffness_at_force(newtons(f)).to_bits();
             stiffness.add(exact::stiffness_at_force(tip, f, k, 1), at);
-            let rise = tip.indentation(newtons(f + 1)).to_bits() - d;
+            let rise = next - d;
             step.add(Judged { error_ulp: rise.into(), nearest: None, within: (0..=first).contains(&rise) }, at);
         }
     })
@@ -110,11 +123,6 @@ pub fn pressures(tip: &Tip, depths: u64, distances: u64, progress: Progress<'_>)
             }
         }
     })
-}
-
-/// The slope of the force in units of force for a unit of depth.
-fn slope_ulp(tip: &Tip, d: i32) -> f64 {
-    f64::from(tip.stiffness(mm(d)).to_bits() + 1) / f64::from(1 << 24)
 }
 
 fn round_trip_slack(tip: &Tip) -> i128 {

@@ -57,20 +57,37 @@ pub struct Cost {
 }
 
 impl Cost {
+    /// Heads of the columns of [`Self::cells`].
+    pub const HEADS: &str = "instructions | max | cycles: low | estimate | high | max | with flash | max";
+
+    /// Reads the figures as the image's run has them, two for each.
+    fn read(figures: &[i64]) -> Option<Self> {
+        let mut pairs = figures.chunks_exact(2).map(|pair| Passes { median: pair[0], max: pair[1] });
+        let mut next = || pairs.next();
+        Some(Self { instructions: next()?, low: next()?, estimate: next()?, high: next()?, flash: next()? })
+    }
+
     /// Without what an empty call takes.
-    fn net(mut self, empty: &Self) -> Self {
-        let pairs = [
-            (&mut self.instructions, empty.instructions),
-            (&mut self.low, empty.low),
-            (&mut self.estimate, empty.estimate),
-            (&mut self.high, empty.high),
-            (&mut self.flash, empty.flash),
-        ];
-        for (figure, empty) in pairs {
-            figure.median -= empty.median;
-            figure.max -= empty.median;
+    fn net(self, empty: &Self) -> Self {
+        let less = |figure: Passes, empty: Passes| Passes {
+            median: figure.median - empty.median,
+            max: figure.max - empty.median,
+        };
+        Self {
+            instructions: less(self.instructions, empty.instructions),
+            low: less(self.low, empty.low),
+            estimate: less(self.estimate, empty.estimate),
+            high: less(self.high, empty.high),
+            flash: less(self.flash, empty.flash),
         }
-        self
+    }
+
+    /// Cells of a table.
+    pub fn cells(&self) -> String {
+        let Self { instructions, low, estimate, high, flash } = self;
+        let cells = [instructions.median, instructions.max, low.median, estimate.median, high.median, estimate.max];
+        let cells = cells.into_iter().chain([flash.median, flash.max]).map(|figure| figure.to_string());
+        cells.collect::<Vec<_>>().join(" | ")
     }
 }
 
@@ -111,8 +128,10 @@ pub fn parse(text: &str) -> Result<Vec<Ran>, String> {
             }
             "cost" => {
                 let numbers: Result<Vec<i64>, _> = rest.split(' ').map(str::parse).collect();
-                let (region, cost) = numbers.ok().and_then(|numbers| cost(&numbers)).ok_or_else(failed)?;
-                costs.insert(region, cost);
+                let numbers = numbers.map_err(|_| failed())?;
+                let [region, figures @ ..] = &numbers[..] else { return Err(failed()) };
+                let cost = Cost::read(figures).ok_or_else(failed)?;
+                costs.insert(u32::try_from(*region).map_err(|_| failed())?, cost);
             }
             _ => {
                 let ran = current.and_then(|region| runs.get_mut(&region)).ok_or_else(failed)?;
@@ -143,14 +162,6 @@ pub fn merged(shipped: Vec<Ran>, quick: Vec<Ran>) -> Result<Vec<Ran>, String> {
         Ok(if shipped.firmware { shipped } else { quick })
     };
     shipped.into_iter().zip(quick).map(pick).collect()
-}
-
-fn cost(numbers: &[i64]) -> Option<(u32, Cost)> {
-    let [region, figures @ ..] = numbers else { return None };
-    let mut passes = figures.chunks_exact(2).map(|pair| Passes { median: pair[0], max: pair[1] });
-    let mut next = || passes.next();
-    let cost = Cost { instructions: next()?, low: next()?, estimate: next()?, high: next()?, flash: next()? };
-    Some((u32::try_from(*region).ok()?, cost))
 }
 
 /// Pairs of a format and a number: `i16 -5`, `f 3f800000`, `d 3ff0000000000000`.

@@ -34,26 +34,18 @@ fn section(page: &mut String, kernel: &Kernel, points: &[Point]) {
     let (more, rule) = other.map_or((String::new(), ""), |other| (format!(" {other}, max | rms |"), " --- | --- |"));
     let _ = writeln!(
         page,
-        "| variant | instructions | max | cycles: low | estimate | high | max | with flash | max | {error}, max | rms |{more} |\n\
-        | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |{rule} --- |"
+        "| variant | {} | {error}, max | rms |{more} |\n\
+        | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |{rule} --- |",
+        Cost::HEADS
     );
     let beaten = beaten_by(points);
     for (point, by) in points.iter().zip(&beaten) {
         let Point { name, firmware, cost, error_max, error_rms, other } = point;
         let bold = if *firmware { "**" } else { "" };
-        let Cost { instructions, low, estimate, high, flash } = cost;
-        let mut cells = [
-            (instructions.median, instructions.max),
-            (low.median, estimate.median),
-            (high.median, estimate.max),
-            (flash.median, flash.max),
-        ]
-        .map(|(left, right)| format!("{left} | {right}"))
-        .to_vec();
         let errors = [[*error_max, *error_rms]].into_iter().chain(*other);
-        cells.extend(errors.flatten().map(figure));
+        let errors = errors.flatten().map(figure).collect::<Vec<_>>().join(" | ");
         let verdict = verdict(point, by.map(|by| &points[by]));
-        let _ = writeln!(page, "| {bold}{name}{bold} | {} | {verdict} |", cells.join(" | "));
+        let _ = writeln!(page, "| {bold}{name}{bold} | {} | {errors} | {verdict} |", cost.cells());
     }
     let beats_firmware = points.iter().zip(&beaten).any(|(point, by)| point.firmware && by.is_some());
     if beats_firmware {
@@ -73,25 +65,13 @@ fn section(page: &mut String, kernel: &Kernel, points: &[Point]) {
 fn costs(page: &mut String, kernel: &Kernel, points: &[Point]) {
     let _ = write!(
         page,
-        "\n## {}\n\n{}\n\n\
-        | part | instructions | max | cycles: low | estimate | high | max | with flash | max |\n\
-        | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
-        kernel.title, kernel.text
+        "\n## {}\n\n{}\n\n| part | {} |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
+        kernel.title,
+        kernel.text,
+        Cost::HEADS
     );
     for Point { name, cost, .. } in points.iter().rev() {
-        let Cost { instructions, low, estimate, high, flash } = cost;
-        let _ = writeln!(
-            page,
-            "| {name} | {} | {} | {} | {} | {} | {} | {} | {} |",
-            instructions.median,
-            instructions.max,
-            low.median,
-            estimate.median,
-            high.median,
-            estimate.max,
-            flash.median,
-            flash.max
-        );
+        let _ = writeln!(page, "| {name} | {} |", cost.cells());
     }
 }
 

@@ -86,8 +86,9 @@ pub struct Conduct {
     pub(super) travel_min_mm: f64,
     pub(super) runaway_mm: f64,
     air_mm_per_s: f64,
-    over_force: Vec<AtGoal>,
-    over_force_defective: Vec<AtGoal>,
+    /// Largest true force beyond each goal, mN, except where a smaller goal has a larger one; also while a defect acts.
+    pub(super) over_force_mn: Vec<AtGoal>,
+    pub(super) over_force_defective_mn: Vec<AtGoal>,
     pub(super) stop_force_n: f64,
     pub(super) disturbed: bool,
 }
@@ -195,8 +196,8 @@ impl Conduct {
         }
         if truth.force_n > 0.0 && time_s >= self.pushed_s {
             let defective = time_s < self.defective_s;
-            let kept = if defective { &mut self.over_force_defective } else { &mut self.over_force };
-            note(kept, AtGoal { goal_n: self.counted_n, value: truth.force_n - self.counted_n });
+            let kept = if defective { &mut self.over_force_defective_mn } else { &mut self.over_force_mn };
+            note(kept, AtGoal { goal_n: self.counted_n, value: 1e3 * (truth.force_n - self.counted_n) });
         }
     }
 
@@ -243,15 +244,6 @@ impl Conduct {
         ended
     }
 
-    /// Returns the largest true force beyond each goal, except where a smaller goal has a larger one.
-    pub(super) fn over_force(&self) -> &[AtGoal] {
-        &self.over_force
-    }
-
-    pub(super) fn over_force_defective(&self) -> &[AtGoal] {
-        &self.over_force_defective
-    }
-
     /// Returns the largest speed without a contact, as a share of the approach speed.
     pub(super) fn air_share(&self) -> f64 {
         self.air_mm_per_s / self.allowed.approach_mm_per_s
@@ -259,15 +251,15 @@ impl Conduct {
 }
 
 impl Ended {
-    /// Returns the errors of the holds, without those of a fault.
-    pub fn errors(&self) -> Vec<AtGoal> {
+    /// Returns the errors of the holds, mN, without those of a fault.
+    pub fn errors_mn(&self) -> Vec<AtGoal> {
         let judged = self.holds.iter().filter(|hold| !hold.faulty);
-        judged.map(|hold| AtGoal { goal_n: hold.goal_n, value: (hold.mean_n - hold.goal_n).abs() }).collect()
+        judged.map(|hold| AtGoal { goal_n: hold.goal_n, value: 1e3 * (hold.mean_n - hold.goal_n).abs() }).collect()
     }
 
-    /// Returns the ranges of the force in holds.
-    pub fn swings(&self) -> Vec<AtGoal> {
-        self.holds.iter().map(|hold| AtGoal { goal_n: hold.goal_n, value: hold.swing_n }).collect()
+    /// Returns the ranges of the force in holds, mN.
+    pub fn swings_mn(&self) -> Vec<AtGoal> {
+        self.holds.iter().map(|hold| AtGoal { goal_n: hold.goal_n, value: 1e3 * hold.swing_n }).collect()
     }
 
     /// Returns the number of holds that touched nothing.

@@ -14,11 +14,13 @@ pub struct Response {
     before: Option<[f64; 2]>,
     tenth_s: Option<f64>,
     nine_tenths_s: Option<f64>,
-    beyond_n: f64,
+    /// Largest force beyond the goal, in the direction of the step.
+    pub beyond_n: f64,
     inside_since_s: Option<f64>,
-    steady_max_n: f64,
-    steady_squares: f64,
-    steady_samples: u64,
+    /// Largest steady error, the sum of the squares of these errors, and their number.
+    pub steady_max_n: f64,
+    pub steady_squares: f64,
+    pub steady_samples: u64,
 }
 
 impl Response {
@@ -62,11 +64,6 @@ impl Response {
         Some(self.nine_tenths_s? - self.tenth_s?)
     }
 
-    /// Largest force beyond the goal, in the direction of the step.
-    pub fn beyond_n(&self) -> f64 {
-        self.beyond_n
-    }
-
     /// Time from the start until the force stays within 2 % of [`Response::unit_n`]; none if it never does.
     pub fn settled_s(&self) -> Option<f64> {
         Some(self.inside_since_s? - self.start_s?)
@@ -75,16 +72,6 @@ impl Response {
     /// True later than 100 ms after the start.
     pub fn is_steady(&self, time_s: f64) -> bool {
         self.start_s.is_some_and(|start_s| time_s >= start_s + STEADY_AFTER_S)
-    }
-
-    /// Largest error later than 100 ms after the start; 0 without such a time.
-    pub fn steady_max_n(&self) -> f64 {
-        self.steady_max_n
-    }
-
-    /// Sum of the squares of these errors, and their number.
-    pub fn steady_squares(&self) -> (f64, u64) {
-        (self.steady_squares, self.steady_samples)
     }
 }
 
@@ -102,13 +89,6 @@ pub struct AtGoal {
     pub goal_n: f64,
     /// The value, in the metric's unit.
     pub value: f64,
-}
-
-impl AtGoal {
-    /// Returns the value in another unit.
-    pub fn times(self, factor: f64) -> Self {
-        Self { value: self.value * factor, ..self }
-    }
 }
 
 /// Adds a value unless a smaller goal has a larger one, and removes those that it exceeds in this way. So a long run

@@ -10,7 +10,7 @@ use fingertip::shipped::Config;
 use std::fmt;
 use std::ops::Range;
 use std::path::Path;
-use toml_edit::{Document, Item, TableLike};
+use toml_edit::{Document, Item, TableLike, TomlError};
 
 /// Reads a scene. Errors name the file `file`; `[[expect]]` may name `metrics`.
 pub fn read(file: &str, text: &str, metrics: &[&str]) -> Result<Scene, SceneErrors> {
@@ -18,8 +18,7 @@ pub fn read(file: &str, text: &str, metrics: &[&str]) -> Result<Scene, SceneErro
     let scene = match Document::parse(text) {
         Ok(document) => reader.scene(document.as_table(), metrics),
         Err(error) => {
-            let message = format!("this is not TOML: {}", error.message().trim().replace('\n', "; "));
-            reader.error(error.span().unwrap_or(0..0), message, String::new());
+            reader.errors.push(not_toml(file, text, &error));
             None
         }
     };
@@ -30,6 +29,12 @@ pub fn read(file: &str, text: &str, metrics: &[&str]) -> Result<Scene, SceneErro
             Err(SceneErrors(reader.errors))
         }
     }
+}
+
+/// Mistake of a text that is not TOML.
+pub(crate) fn not_toml(file: &str, text: &str, error: &TomlError) -> SceneError {
+    let message = format!("this is not TOML: {}", error.message().trim().replace('\n', "; "));
+    SceneError::new(file, text, error.span().unwrap_or(0..0), message, String::new())
 }
 
 struct Reader<'a> {
@@ -221,7 +226,7 @@ impl Reader<'_> {
                 let message = format!("bounds of `{}` for the second time", bound.metric);
                 self.error(metric(), message, "one [[expect]] a metric, with min, max or both".into());
             }
-            let by_goal = metrics::BY_GOAL.iter().map(|metric| metric.name);
+            let by_goal = metrics::BY_GOAL.iter().map(|(name, _)| *name);
             if bound.max_per_goal_n.is_some() {
                 let name = bound.metric.rsplit('.').next().unwrap_or_default();
                 let message = if by_goal.clone().all(|known| known != name) {

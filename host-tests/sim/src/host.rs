@@ -85,7 +85,7 @@ impl Host {
     /// Reads the controller when a reading is due. The reading arrives later, or not at all. Times never fall.
     pub fn read(&mut self, time_s: f64, reading: impl FnOnce() -> Reading, stages: &mut impl Stages) {
         if let Some(asked_s) = self.ask(time_s, time_s, stages) {
-            self.hear(Grip::answered_s(asked_s), reading());
+            self.hear(asked_s + READ_S, reading());
         }
     }
 
@@ -171,7 +171,7 @@ impl Host {
     }
 }
 
-/// Time from the request for a reading to its arrival: 14 and 23 bytes at 1 Mbaud, and the turn of the controller.
+/// Time from the request for a reading to its arrival without further delay: 14 and 23 bytes at 1 Mbaud, and the turn of the controller.
 const READ_S: f64 = 0.5e-3;
 /// Largest deviation of a settled force from the goal, as a share of the goal.
 const SETTLED_SHARE: f64 = 0.1;
@@ -234,11 +234,6 @@ impl Grip {
             centre_n_per_mm: host.number("centre_n_per_mm"),
             ..Self::default()
         }
-    }
-
-    /// Returns the arrival of a reading without further delay.
-    pub fn answered_s(asked_s: f64) -> f64 {
-        asked_s + READ_S
     }
 
     /// Returns the goal for the force of the script.

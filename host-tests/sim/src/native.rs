@@ -19,7 +19,7 @@ use crate::run::{RunError, by_effect};
 use crate::scene::Scene;
 use crate::setup::Setup;
 use crate::watch::{self, Controller, Cost, Step, Summary, Watch};
-use crate::world::{Surroundings, World, WorldError};
+use crate::world::{Surroundings, World};
 use core::ops::Range;
 use fingertip::command::Command;
 use fingertip::config::{ConfigError, newtons};
@@ -37,9 +37,9 @@ pub enum SimError {
     /// The controller refuses its parameters.
     #[error("[controller] {0}")]
     Controller(ConfigError),
-    /// The world cannot be simulated.
-    #[error(transparent)]
-    World(#[from] WorldError),
+    /// The step is too long for what moves.
+    #[error("{0}")]
+    Step(String),
 }
 
 /// [`simulate`] as a [`Run`](crate::run::Run).
@@ -162,11 +162,6 @@ impl StageTimes {
     }
 }
 
-/// Temperature in the type of the controller.
-fn celsius(degrees: f64) -> Celsius {
-    Celsius::from_bits((degrees * 65_536.0).floor() as i32)
-}
-
 impl<E: Set> Board<E> {
     fn new(scene: &Scene, begun: Begun) -> Result<Self, SimError> {
         let config = Config::shipped(&scene.params()).map_err(SimError::Controller)?;
@@ -280,7 +275,8 @@ impl<E: Set> Board<E> {
 
     /// Returns what the control step of a finger receives beside the frame.
     fn sense(&mut self, finger: usize, silent_ms: u16) -> Sense {
-        let chip = self.units[finger].sensor.chip_c(self.time_s()).map(celsius);
+        let chip_c = self.units[finger].sensor.chip_c(self.time_s());
+        let chip = chip_c.map(|degrees| Celsius::from_bits((degrees * 65_536.0).floor() as i32));
         Sense { chip, ..self.world.sense(finger, silent_ms) }
     }
 
@@ -447,19 +443,34 @@ fn long_units(units: f64) -> i128 {
 /// bit. It detects accidental differences, not intended ones.
 struct Digest(Hasher);
 
-/// Number of digest fields of the inputs beside the codes.
-const TAKEN: usize = 13;
-
 impl Digest {
     pub fn new() -> Self {
         Self(Hasher::new())
     }
 
-    /// Adds a control step.
+    /// Adds a control step. The command is complete but for whether a tare is forced: the outputs show the result.
     pub fn add(&mut self, frame: &Frame, sense: &Sense, command: &Command, duty: Duty, status: &Status) {
+        let Sense { encoder, supply_mv, bus_silent_ms, bridge_fault, answer, chip: _ } = *sense;
+        let Command { torque, goal, bus_watchdog_ms, fit_level, tare_request, clear_request, measure_request, .. } =
+            *command;
+        let inputs: [u32; 13] = [
+            frame.sequence,
+            encoder as u32,
+            supply_mv.into(),
+            bus_silent_ms.into(),
+            bridge_fault.into(),
+            answer.0,
+            torque.into(),
+            goal.to_bits() as u32,
+            bus_watchdog_ms.into(),
+            fit_level as u32,
+            tare_request.into(),
+            clear_request.into(),
+            measure_request.into(),
+        ];
         self.0.write(frame.codes.rows.map(|codes| codes.map(u16::to_le_bytes)).as_flattened().as_flattened());
         self.0.write(frame.codes.undriven.map(u16::to_le_bytes).as_flattened());
-        self.0.write(taken(frame.sequence, sense, command).map(u32::to_le_bytes).as_flattened());
+        self.0.write(inputs.map(u32::to_le_bytes).as_flattened());
         // The effect of the temperature is in the other fields.
         Status { chip: None, ..*status }.words(duty, |word| self.0.write(&word.to_le_bytes()));
     }
@@ -468,29 +479,6 @@ impl Digest {
     pub fn hex(&self) -> String {
         format!("{:032x}", self.0.finish_128())
     }
-}
-
-/// Returns the inputs of a step beside the codes. The command is complete but for whether a tare is forced: the outputs
-/// show the result.
-fn taken(sequence: u32, sense: &Sense, command: &Command) -> [u32; TAKEN] {
-    let Sense { encoder, supply_mv, bus_silent_ms, bridge_fault, answer, chip: _ } = *sense;
-    let Command { torque, goal, bus_watchdog_ms, fit_level, tare_request, clear_request, measure_request, .. } =
-        *command;
-    [
-        sequence,
-        encoder as u32,
-        supply_mv.into(),
-        bus_silent_ms.into(),
-        bridge_fault.into(),
-        answer.0,
-        torque.into(),
-        goal.to_bits() as u32,
-        bus_watchdog_ms.into(),
-        fit_level as u32,
-        tare_request.into(),
-        clear_request.into(),
-        measure_request.into(),
-    ]
 }
 
 #[cfg(test)]

@@ -170,7 +170,8 @@ pub fn fingers(population: &Population, seed: u64, all: usize, shard: Shard, boa
     go_on(population, seed, (0..all).filter(|number| shard.has(*number)), Vec::new(), board, |_| Ok(()))
 }
 
-/// Simulates the fingers that are not finished yet, and passes each result to `keep` as soon as it is there.
+/// Simulates the fingers that are not finished yet, and passes each result to `keep` as soon as it is there. Returns all
+/// fingers in order.
 fn go_on(
     population: &Population,
     seed: u64,
@@ -195,6 +196,7 @@ fn go_on(
         Ok(())
     })?;
     progress.finish_and_clear();
+    fingers.sort_by_key(|ran| ran.finger);
     Ok(fingers)
 }
 

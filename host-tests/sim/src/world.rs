@@ -7,6 +7,7 @@ use crate::effects::drive::Stages as _;
 use crate::events::{Event, Happened};
 use crate::mechanics::contact::{Contact, Place};
 use crate::mechanics::finger::Finger;
+use crate::native::SimError;
 use crate::scene::Scene;
 use crate::setup::{Setup, Tip};
 use crate::watch::Truth;
@@ -17,25 +18,6 @@ use fingertip::units::CoreCycles;
 /// Largest product of a step and the angular frequency of the fastest oscillation. Each iteration of the solution then
 /// gains a factor of 16 or more.
 const STEP_RAD: f64 = 0.5;
-
-/// Reason why a world cannot be simulated.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum WorldError {
-    /// The step is too long for what moves.
-    #[error(
-        "step_us of {step_us}: at most {allowed_us:.1} are allowed for a contact of {n_per_mm:.1} N/mm on {mass_g:.3} g"
-    )]
-    Step {
-        /// Requested step.
-        step_us: f64,
-        /// Largest allowed step.
-        allowed_us: f64,
-        /// Slope of the steepest contact.
-        n_per_mm: f64,
-        /// Mass that moves against it.
-        mass_g: f64,
-    },
-}
 
 /// Most iterations of the common solution of fingers and object, and the displacement below whose change they end.
 const ROUNDS: usize = 60;
@@ -86,7 +68,7 @@ impl<E: Set> World<E> {
     }
 
     /// Refuses a step that is too long for the steepest contact.
-    pub fn check_step(&self, step_s: f64) -> Result<(), WorldError> {
+    pub fn check_step(&self, step_s: f64) -> Result<(), SimError> {
         for finger in &self.fingers {
             let n_per_mm = finger.contact.steepest_n_per_mm(Tip::DEEPEST * finger.setup().tip.radius_mm);
             // An object between two fingers is pushed back by both.
@@ -94,8 +76,10 @@ impl<E: Set> World<E> {
             let potential = finger.drive.steepest_nm_per_rad() / finger.inertia_kg_m2();
             let allowed_s = STEP_RAD / (n_per_mm * 1e3 * lightness + potential).sqrt();
             if step_s > allowed_s {
-                let (step_us, allowed_us) = (step_s * 1e6, allowed_s * 1e6);
-                return Err(WorldError::Step { step_us, allowed_us, n_per_mm, mass_g: 1e3 / lightness });
+                let (step_us, allowed_us, mass_g) = (step_s * 1e6, allowed_s * 1e6, 1e3 / lightness);
+                return Err(SimError::Step(format!(
+                    "step_us of {step_us}: at most {allowed_us:.1} are allowed for a contact of {n_per_mm:.1} N/mm on {mass_g:.3} g"
+                )));
             }
         }
         Ok(())

@@ -5,7 +5,6 @@
 use crate::bridge::Bridge;
 use crate::effects::Set;
 use crate::effects::contact::Stages as _;
-use crate::effects::sensor::Stages as _;
 use crate::mechanics::finger::Finger;
 use crate::native::{Begun, Board, SimError, Unit};
 use crate::plant::{Faults, Reference};
@@ -16,7 +15,7 @@ use fingertip::command::Command;
 use fingertip::frame::Sense;
 use fingertip::measure::{MeasureState, MeasureStatus, Task};
 use fingertip::pipeline::Status;
-use fingertip::shipped::{COLUMNS, Capture, Config, Frame, Pipeline, ROWS, TARE_FRAMES};
+use fingertip::shipped::{Capture, Config, Frame, Pipeline, TARE_FRAMES};
 use images::record::Record;
 
 /// First finger of a scene, or the finger of the plant.
@@ -217,16 +216,6 @@ impl<E: Set> Bench<E> {
             each(self);
         }
         self.place_object(to_mm);
-    }
-
-    /// Returns the reading of each taxel under 100 kPa, as a share of it: its gain, if no effect has a memory.
-    pub fn sensitivities(&mut self) -> [[f64; COLUMNS]; ROWS] {
-        let unit = &mut self.board.units[0];
-        core::array::from_fn(|row| {
-            let mut kpa = [100.0; COLUMNS];
-            unit.sensor.pressure(row, 0.0, &mut kpa);
-            kpa.map(|kpa| kpa / 100.0)
-        })
     }
 }
 

@@ -134,7 +134,7 @@ pub fn calibrate(bench: &mut Bench<Named>, scene: &Scene) -> Result<Calibrated, 
         for share in SWINGS {
             hold(bench, goal_n * share, SWING_S);
         }
-        let Hold { true_n, read_n } = hold(bench, goal_n, HOLD_S);
+        let [true_n, read_n] = hold(bench, goal_n, HOLD_S);
         let Status { mode, fault, .. } = *bench.status();
         if mode == Mode::Force {
             held.push(Held { shown_n: (true_n / SCALE_STEP_N).round() * SCALE_STEP_N, read_n });
@@ -158,7 +158,7 @@ pub fn calibrate(bench: &mut Bench<Named>, scene: &Scene) -> Result<Calibrated, 
 
 /// The scene's finger before a level or inclined plate, with the contact at a place.
 pub fn plate(scene: &Scene, place: Place) -> Result<Scene, RunError> {
-    let Place { centre_mm: [x, y], tilt_deg: [along_columns, along_rows] } = place;
+    let ([x, y], [along_columns, along_rows]) = (place.centre_mm, place.tilt_deg);
     let number = |path, value: f64| (path, format!("{value:?}"));
     changed(
         scene,
@@ -181,14 +181,8 @@ pub fn changed(scene: &Scene, changes: &[(&str, String)]) -> Result<Scene, RunEr
     Ok(Scene { bounds: scene.bounds.clone(), ..read("finger.toml", &text, &[])? })
 }
 
-/// Means over the end of a hold, N.
-struct Hold {
-    true_n: f64,
-    read_n: f64,
-}
-
-/// Holds a force, starting from any state.
-fn hold(bench: &mut Bench<Named>, goal_n: f64, seconds: f64) -> Hold {
+/// Holds a force, starting from any state. Returns the means of the true force and of the reading over the end, N.
+fn hold(bench: &mut Bench<Named>, goal_n: f64, seconds: f64) -> [f64; 2] {
     bench.command().goal = newtons((goal_n * 1e3) as i32);
     bench.run(seconds - READ_S);
     let until_s = bench.time_s() + READ_S;
@@ -200,7 +194,7 @@ fn hold(bench: &mut Bench<Named>, goal_n: f64, seconds: f64) -> Hold {
         read_n += f64::from(status.contact.force.0) - f64::from(status.creep.0) - f64::from(status.drift.0);
         count += 1.0;
     }
-    Hold { true_n: true_n / count, read_n: read_n / count }
+    [true_n / count, read_n / count]
 }
 
 /// Releases the object, then torque off.
@@ -256,7 +250,7 @@ fn finger(seed: u64, number: usize) -> Result<Unlike, RunError> {
         for (error, (_, goal_n, is_off)) in errors.iter_mut().zip(TESTS) {
             bench.exchange(&plate(&scene, if is_off { off } else { Place::default() })?)?;
             bench.tare();
-            *error = hold(bench, goal_n, TEST_HOLD_S).true_n / goal_n - 1.0;
+            *error = hold(bench, goal_n, TEST_HOLD_S)[0] / goal_n - 1.0;
             release(bench);
             bench.rest(PAUSE_S);
         }
@@ -281,10 +275,7 @@ pub fn percentiles(fingers: &[Unlike]) -> [[[f64; 2]; 3]; 2] {
 
 /// Draws and calibrates fingers on all cores.
 pub fn fingers(seed: u64, count: usize) -> Result<Vec<Unlike>, RunError> {
-    cores::map(0..count, |number| finger(seed, number).map_err(|error| error.to_string()))
-        .into_iter()
-        .map(|finger| Ok(finger?))
-        .collect()
+    cores::map(0..count, |number| finger(seed, number)).into_iter().collect()
 }
 
 /// The errors as a text: worst fingers first, then percentiles.

@@ -104,7 +104,8 @@ impl<E: Set> Bus<E> {
             let board = &mut self.board;
             if device.reboot_s.is_some_and(|at_s| at_s <= now_s) {
                 let encoder = board.sense(finger, 0).encoder;
-                *device = Device { encoder_start: encoder, broken: device.broken.take(), ..device.rebooted(now_s) };
+                let rebooted = Device::new(device.flash, ResetCause::Software, now_s);
+                *device = Device { encoder_start: encoder, broken: device.broken.take(), ..rebooted };
                 board.units[finger].pipeline = device.pipeline();
                 board.units[finger].frame.sequence = 0;
             }
@@ -216,10 +217,6 @@ impl Device {
             reboot_s: None,
             capture: Box::new(Capture::NEW),
         }
-    }
-
-    fn rebooted(&self, now_s: f64) -> Self {
-        Self::new(self.flash, ResetCause::Software, now_s)
     }
 
     /// Builds the pipeline from the stored values, as the firmware does.

@@ -1,6 +1,5 @@
 //! Error budget of the force: the same fingers without one cause at a time.
 
-use super::report::Ran;
 use super::{Draw, Drawn, Population, load};
 use crate::metrics::Hold;
 use crate::run::{Run, RunError};
@@ -89,7 +88,8 @@ impl Budget {
         let population = load(POPULATION)?;
         let off_on = |board: Run, causes: &[Cause]| {
             let less = causes.iter().try_fold(population.clone(), |less, cause| less.without(cause.names))?;
-            Ok::<Off, RunError>(errors(&super::fingers(&less, SEED, fingers, Shard::WHOLE, board)?))
+            let fingers = super::fingers(&less, SEED, fingers, Shard::WHOLE, board)?;
+            Ok::<Off, RunError>(fingers.iter().map(|ran| off_n(&ran.holds)).collect())
         };
         let off = |causes: &[Cause]| off_on(board, causes);
         let (all, none, calibrated) = (off(&[])?, off(&CAUSES)?, off_on(calibrated, &[])?);
@@ -139,12 +139,6 @@ impl Budget {
 
 fn cell(errors: &Errors, goal: usize) -> String {
     format!("{:.0} mN, {:.1} %", 1e3 * errors[goal], 100.0 * errors[goal] / GOALS_N[goal])
-}
-
-fn errors(fingers: &[Ran]) -> Off {
-    let mut numbered: Vec<_> = fingers.iter().map(|ran| (ran.finger, off_n(&ran.holds))).collect();
-    numbered.sort_by_key(|(number, _)| *number);
-    numbered.into_iter().map(|(_, off)| off).collect()
 }
 
 /// Errors of a finger's holds.

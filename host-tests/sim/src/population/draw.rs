@@ -3,7 +3,6 @@
 use crate::effects::normal_within_3;
 use fastrand::Rng;
 use serde::Serialize;
-use serde_json::{Value, json};
 
 /// Drawn value.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -126,11 +125,11 @@ impl Drawn {
     }
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Spread {
     pub count: usize,
     pub median: Option<f64>,
-    /// 95th percentile.
+    #[serde(rename = "percentile_95")]
     pub most: Option<f64>,
     /// Largest value.
     pub worst: Option<f64>,
@@ -142,11 +141,6 @@ impl Spread {
         values.sort_by(f64::total_cmp);
         let rank = |share: f64| values.get(((values.len() as f64 * share).ceil() as usize).max(1) - 1).copied();
         Self { count: values.len(), median: rank(0.5), most: rank(0.95), worst: values.last().copied() }
-    }
-
-    /// Returns the spread for scripts.
-    pub fn json(&self) -> Value {
-        json!({ "count": self.count, "median": self.median, "percentile_95": self.most, "worst": self.worst })
     }
 }
 

@@ -134,7 +134,7 @@ pub(super) fn id(population: &Population, board: &str, seed: u64, of_fingers: us
 }
 
 impl Report {
-    /// Report of these fingers, in any order.
+    /// Report of these fingers, in order.
     pub fn new(population: &Population, board: &str, seed: u64, of_fingers: usize, fingers: Vec<Ran>) -> Self {
         let id = id(population, board, seed, of_fingers);
         let mut report = Self {
@@ -194,16 +194,14 @@ impl Report {
     }
 
     fn finish(&mut self) {
-        self.fingers.sort_by_key(|ran| ran.finger);
-        let promises: Vec<Value> = self.promises().iter().map(Row::json).collect();
-        let [percent, mn] = self.errors().map(|spread| spread.json());
+        let [percent, mn] = self.errors();
         let counted = self.counted().map(
             |(Counted { metric, above }, fingers)| json!({ "metric": metric, "above": above, "fingers": fingers }),
         );
         self.summary = json!({
             "fingers": self.fingers.len(),
             "inside": self.inside(),
-            "promises": promises,
+            "promises": self.promises(),
             "hold_error_percent": percent,
             "hold_error_mn": mn,
             "counted": counted.collect::<Vec<_>>(),
@@ -267,23 +265,15 @@ impl Report {
 }
 
 /// A promise over all fingers.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Row {
+    /// Spread of the values.
+    #[serde(flatten)]
+    pub spread: Spread,
     /// Metric of the promise.
     pub metric: String,
     /// Fingers that broke it.
     pub broken: usize,
-    /// Spread of the values.
-    pub spread: Spread,
-}
-
-impl Row {
-    fn json(&self) -> Value {
-        let Value::Object(mut row) = self.spread.json() else { return Value::Null };
-        row.insert("metric".into(), json!(self.metric));
-        row.insert("broken".into(), json!(self.broken));
-        Value::Object(row)
-    }
 }
 
 /// Most fingers that are listed.

@@ -17,7 +17,11 @@ pub fn set(text: &str, path: &str, value: &str) -> Result<String, String> {
     let key = names.pop().filter(|key| !key.is_empty()).ok_or_else(|| format!("`{path}` names no key"))?;
     let mut table: &mut dyn toml_edit::TableLike = document.as_table_mut();
     for (place, name) in names.iter().enumerate().filter(|(_, name)| name.parse::<usize>().is_err()) {
-        let item = table.entry(name).or_insert_with(|| Item::Table(new_table(*name == "effects")));
+        let item = table.entry(name).or_insert_with(|| {
+            let mut table = Table::new();
+            table.set_implicit(*name == "effects");
+            Item::Table(table)
+        });
         let index = names.get(place + 1).and_then(|next| next.parse::<usize>().ok());
         table = match (item, index) {
             (Item::ArrayOfTables(tables), Some(index)) => {
@@ -40,12 +44,6 @@ pub fn set(text: &str, path: &str, value: &str) -> Result<String, String> {
         }
     }
     Ok(document.to_string())
-}
-
-fn new_table(implicit: bool) -> Table {
-    let mut table = Table::new();
-    table.set_implicit(implicit);
-    table
 }
 
 /// Writes the scene as a text with every key and without comments, which reads as the same scene.

@@ -24,15 +24,11 @@ const QUICK_S: [f64; 2] = [0.5, 0.25];
 /// Array at the end of a hold, with the contact that the controller sensed.
 #[derive(Clone, Copy, Debug)]
 pub struct HeldImage {
-    /// Requested force.
     pub goal_n: f64,
-    /// Sensed force.
     pub force_n: f64,
     /// Centre of the contact, along columns and rows.
     pub centre_mm: [f64; 2],
-    /// Contact radius.
     pub radius_mm: f64,
-    /// Pressures from the codes of the frame.
     pub pressures_kpa: Pressures,
 }
 
@@ -41,9 +37,7 @@ pub struct HeldImage {
 pub struct Asked {
     /// Time at which the goal reached the controller.
     pub at_s: f64,
-    /// Requested force.
     pub goal_n: f64,
-    /// True force at that time.
     pub from_n: f64,
     /// Measurement until the next goal.
     pub meter: Meter,
@@ -56,7 +50,6 @@ pub struct Run {
     pub goals: Vec<Asked>,
     /// State of the world at each frame.
     pub trace: Vec<Sample>,
-    /// Pressure maps.
     pub pictures: Vec<HeldImage>,
     /// Frames that the controller missed, by its own count.
     pub missed_frames: u32,
@@ -73,10 +66,8 @@ impl Run {
 /// Reason why the demonstration has no result.
 #[derive(Debug, thiserror::Error)]
 pub enum DemoError {
-    /// The scene has a mistake.
     #[error("{0}")]
     Scene(String),
-    /// The scene cannot be simulated.
     #[error(transparent)]
     Simulated(#[from] crate::SimError),
     /// The run has no touch or no release.
@@ -85,7 +76,6 @@ pub enum DemoError {
     /// The motor cannot reach a force at all.
     #[error("no bound for a step: {0}")]
     Unreachable(#[from] Unreachable),
-    /// The controller stopped with this fault.
     #[error("the controller stopped with fault {0}")]
     Fault(u8),
     /// A figure could not be drawn.
@@ -93,12 +83,7 @@ pub enum DemoError {
     Plot(#[from] PlotError),
     /// A file could not be written.
     #[error("cannot write {}: {source}", path.display())]
-    Write {
-        /// Path of the file.
-        path: PathBuf,
-        /// Cause.
-        source: std::io::Error,
-    },
+    Write { path: PathBuf, source: std::io::Error },
 }
 
 /// Returns the scene. The quick one holds the same goals for a shorter time.
@@ -144,7 +129,6 @@ impl Trace {
         Self { array: Taxels::of(scene), run: Run::default(), controllers: Vec::new(), last: None, fault: None }
     }
 
-    /// Returns the result of the run.
     pub fn finish(mut self) -> Result<Run, DemoError> {
         self.keep();
         match self.fault {
@@ -225,8 +209,7 @@ impl Taxels {
         }
     }
 
-    /// Returns the pressures of a frame as `fingertip::pressure` does: n codes in a row of N in all are n / (1 - rho N)
-    /// behind a perfect switch.
+    /// Returns the pressures of a frame as `fingertip::pressure` does: n codes in a row of N become n / (1 - rho N).
     pub fn kilopascals(&self, frame: &Frame) -> Pressures {
         core::array::from_fn(|row| {
             let net: [f64; COLUMNS] = core::array::from_fn(|column| {

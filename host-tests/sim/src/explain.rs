@@ -152,7 +152,7 @@ fn stages(page: &mut String) {
 /// Returns the stage of the readout at which an effect acts.
 fn stage_of(effect: &Description) -> Option<&'static str> {
     let values = Values::defaults(effect.keys);
-    match (effect.build)(&Build { values: &values, seed: 0 }) {
+    match (effect.build)(&Build::new(&values, 0)) {
         Part::Pressure(_) => Some("pressure"),
         Part::Conductance(_) => Some("conductance"),
         Part::Network(_) => Some("network"),

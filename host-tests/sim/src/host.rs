@@ -41,7 +41,6 @@ pub struct Host {
     arrived_n: f64,
     arrived_s: f64,
     reader: Option<Reader>,
-    /// Packets sent.
     pub sent: u64,
     /// Packets that were sent and do not arrive.
     pub lost: u64,
@@ -187,11 +186,8 @@ const AFTER_SLIP: f64 = 1.25;
 /// Values of a reading.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reading {
-    /// Contact force.
     pub force_n: f64,
-    /// Centre of pressure.
     pub centre_mm: [f64; 2],
-    /// Travel of the tip.
     pub travel_mm: f64,
 }
 
@@ -224,7 +220,6 @@ struct Grip {
 }
 
 impl Grip {
-    /// Policy with the values of the table `[host]`.
     pub fn new(host: &Values) -> Self {
         Self {
             friction: host.number("grip_friction"),
@@ -236,7 +231,6 @@ impl Grip {
         }
     }
 
-    /// Returns the goal for the force of the script.
     pub fn goal_n(&self, script_n: f64) -> f64 {
         if script_n > 0.0 { self.grip_n(script_n) - self.centring_n(script_n) } else { 0.0 }
     }

@@ -27,7 +27,6 @@ const FINGERS: usize = 2;
 pub struct Metric {
     /// Name, with its unit last.
     pub name: &'static str,
-    /// Definition.
     pub about: &'static str,
     /// Value that counts if a scene has several fingers.
     pub of_several: Worst,
@@ -38,11 +37,8 @@ pub struct Metric {
 /// Selection of one of several values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Worst {
-    /// Largest value.
     Largest,
-    /// Least value.
     Least,
-    /// Sum of the values.
     Sum,
     /// Value of the finger with the earliest fault.
     FirstFault,
@@ -71,7 +67,6 @@ impl Meter {
         Measured(scene.chain(fingers).collect())
     }
 
-    /// Compares each bound with the results.
     pub fn verdicts(&self, bounds: &[Bound]) -> Vec<Verdict> {
         let measured = self.measured();
         bounds.iter().map(|bound| self.verdict(&measured, bound)).collect()
@@ -154,13 +149,11 @@ impl Measured {
 /// Comparison of a result with its bound.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verdict {
-    /// Bound of the scene.
     pub bound: Bound,
     /// Result. A metric without a value breaks its bound.
     pub value: Option<f64>,
     /// Largest allowed value: for a bound that grows with the goal, that of the worst goal.
     pub max: Option<f64>,
-    /// True if the bound is held.
     pub held: bool,
 }
 

@@ -34,7 +34,6 @@ use twox_hash::xxhash3_128::Hasher;
 /// Reason why a scene does not run.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SimError {
-    /// The controller refuses its parameters.
     #[error("[controller] {0}")]
     Controller(ConfigError),
     /// The step is too long for what moves.
@@ -114,8 +113,7 @@ struct Board<E: Set> {
     times: StageTimes,
 }
 
-/// Wall time of the stages of a frame: motion, readout, control step, and truth with its watchers. One of this number of
-/// frames is timed, as reading the clock takes time itself.
+/// Wall time of the stages of a frame. One of [`TIMED`] frames is timed, as reading the clock takes time itself.
 #[derive(Clone, Copy, Debug, Default)]
 struct StageTimes {
     frames: u64,
@@ -123,10 +121,9 @@ struct StageTimes {
     spent: [Duration; 4],
 }
 
-/// Frames for one that is timed.
+/// Frames for each timed one.
 const TIMED: u64 = 64;
-/// Stages of a frame, and the families of the effects whose own time is not counted with each. Effects of clock and bus act
-/// between the stages: their time, which is small, is in their own row and in a stage.
+/// Stages of a frame, and the families of the effects whose time is not counted with each: it has its own row.
 const STAGES: [(&str, &[Family]); 4] = [
     ("motion", &[registry::CONTACT, registry::DRIVE]),
     ("readout", &[registry::SENSOR]),
@@ -319,8 +316,7 @@ impl<E: Set> Board<E> {
     }
 }
 
-/// Slots between the end of a frame and the effect of its duty: the time of the step on the microcontroller, rounded
-/// up.
+/// Slots between the end of a frame and the effect of its duty: the time of the step, rounded up.
 pub const DUTY_DELAY_SLOTS: usize = 3;
 
 impl<E: Set> Board<E> {
@@ -381,8 +377,7 @@ impl<E: Set> Board<E> {
     }
 }
 
-// Virtual time is exact: whole 21sts of a femtosecond, of which a tick of the timer (168 MHz) has 125 million. So no sum
-// of ticks is rounded.
+// Virtual time is exact: in whole 21sts of a femtosecond a tick of the timer (168 MHz) has 125 million.
 
 /// Units in a second.
 const UNITS: i128 = 21_000_000_000_000_000;
@@ -397,12 +392,10 @@ impl Clock {
         Self(seconds.trunc() as i128 * UNITS + units(seconds.fract()))
     }
 
-    /// Advances by a time.
     pub fn go_on(&mut self, seconds: f64) {
         self.0 += units(seconds);
     }
 
-    /// Goes back by a time.
     pub fn go_back(&mut self, seconds: f64) {
         self.0 -= Self::from_start(seconds).0;
     }
@@ -414,7 +407,6 @@ impl Clock {
         i64::try_from(units).map_or_else(|_| long(units), |units| units as f64) / UNITS as f64
     }
 
-    /// Returns the time since the start of the clock.
     pub fn time_s(self) -> f64 {
         self.since(Self(0))
     }
@@ -439,8 +431,7 @@ fn long_units(units: f64) -> i128 {
     units as i128
 }
 
-/// The 128 bits of XXH3 over the inputs and outputs of every control step, in order: equal if two runs are equal to the
-/// bit. It detects accidental differences, not intended ones.
+/// XXH3 of 128 bits over the inputs and outputs of every control step, in order: equal if two runs are.
 struct Digest(Hasher);
 
 impl Digest {

@@ -62,7 +62,6 @@ impl Part {
         Ok((Self { lock, path, file, length: whole.len() as u64 }, lines))
     }
 
-    /// Adds a line.
     pub fn add(&mut self, text: &str) -> Result<(), RunError> {
         let line = line(text);
         if let Err(error) = self.file.write_all(line.as_bytes()) {
@@ -73,7 +72,6 @@ impl Part {
         Ok(())
     }
 
-    /// Writes the final file.
     pub fn write(&self, bytes: impl AsRef<[u8]>) -> Result<(), RunError> {
         let told = |error| {
             format!("{}; all that was done is kept in {}", cannot_write(self.lock.path(), &error), self.path.display())
@@ -92,7 +90,6 @@ impl Part {
     }
 }
 
-/// Makes a folder and those above it.
 pub fn make_folder(folder: &Path) -> Result<(), String> {
     fs::create_dir_all(folder).map_err(|error| format!("cannot make {}: {error}", folder.display()))
 }

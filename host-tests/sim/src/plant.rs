@@ -97,12 +97,10 @@ impl Plant {
         self.finger().shaft()
     }
 
-    /// Travel of the tip.
     pub fn travel_mm(&self) -> f64 {
         self.finger().tip_mm()
     }
 
-    /// Speed of the tip.
     pub fn speed_mm_per_s(&self) -> f64 {
         self.finger().speed_mm_per_s()
     }
@@ -112,7 +110,6 @@ impl Plant {
         (self.travel_mm() - self.setup().wall.distance_mm).max(0.0)
     }
 
-    /// True contact force.
     pub fn force_n(&self) -> f64 {
         self.world.force_n(0)
     }
@@ -122,7 +119,6 @@ impl Plant {
         self.finger().current_a()
     }
 
-    /// Voltage of the supply at the bridge.
     pub fn supply_v(&self) -> f64 {
         self.finger().supply_v()
     }
@@ -145,8 +141,7 @@ impl Plant {
         self.world.row_kpa(0, f64::INFINITY, row)[column]
     }
 
-    /// Voltages of all columns at a time after the driven rows changed from `previous`, settled until then, to
-    /// `driven`.
+    /// Voltages of all columns at a time after the driven rows changed from `previous`, where they had settled.
     pub fn settling_volts(
         &mut self,
         driven: &[bool; ROWS],
@@ -244,19 +239,16 @@ impl core::fmt::Debug for Plant {
 /// State of a taxel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Taxel {
-    /// No defect.
     #[default]
     Sound,
     /// An open circuit: no preload, no pressure.
     Dead,
-    /// A short circuit.
     Shorted,
 }
 
 /// State of the switch of a row.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Row {
-    /// No defect.
     #[default]
     Sound,
     /// Stuck in the driven state (its pin high).
@@ -268,9 +260,7 @@ pub enum Row {
 /// Defects of the array.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ArrayFaults {
-    /// `taxels[row][column]`.
     pub taxels: [[Taxel; COLUMNS]; ROWS],
-    /// Row switches.
     pub rows: [Row; ROWS],
     /// True if all amplifiers are at their upper rail.
     pub saturated: bool,
@@ -290,9 +280,7 @@ impl ArrayFaults {
 /// Defects of the board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Faults {
-    /// Defects of the array.
     pub array: ArrayFaults,
-    /// True if the count of the encoder is frozen.
     pub encoder_frozen: bool,
     /// True if the channels of the encoder are swapped: it counts down as the tip presses.
     pub encoder_reversed: bool,
@@ -300,7 +288,6 @@ pub struct Faults {
     pub leads_swapped: bool,
     /// Travels at the end stops of the finger, rear and front.
     pub end_stops_mm: Option<[f64; 2]>,
-    /// Voltage by which the source drops.
     pub supply_drop_v: f64,
 }
 
@@ -308,7 +295,6 @@ pub struct Faults {
 pub struct Reference;
 
 impl Reference {
-    /// Effects for a setup.
     pub fn parts(setup: &Setup) -> Parts<Self> {
         Parts { sensor: Sensor::new(&setup.array), contact: (), drive: Drive::new(setup), link: () }
     }
@@ -331,7 +317,6 @@ impl Set for Reference {
 
 /// Friction, gear and supply.
 pub struct Drive {
-    /// Defects.
     pub faults: Faults,
     /// Count of the encoder at the last read.
     pub counts: i32,
@@ -341,7 +326,6 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// Drive without defects.
     pub fn new(setup: &Setup) -> Self {
         Self {
             faults: Faults::default(),
@@ -385,7 +369,6 @@ impl drive::Stages for Drive {
 
 /// Characteristic of the taxels, row switches and settling.
 pub struct Sensor {
-    /// Defects.
     pub faults: ArrayFaults,
     array: Array,
     settling: Settling,
@@ -394,7 +377,6 @@ pub struct Sensor {
 }
 
 impl Sensor {
-    /// Sensor without defects.
     pub fn new(array: &Array) -> Self {
         Self {
             faults: ArrayFaults::default(),

@@ -182,7 +182,6 @@ pub fn digest(entries: &BTreeMap<String, String>) -> String {
     texts(entries.iter().flat_map(|(name, value)| [name.as_bytes(), value.as_bytes()]))
 }
 
-/// Digest of texts.
 pub fn texts<'a>(texts: impl IntoIterator<Item = &'a [u8]>) -> String {
     let mut digest = Hasher::new();
     for text in texts {
@@ -210,7 +209,6 @@ pub struct Difference {
     pub frame: u64,
     /// Nanoseconds after the recording's first step.
     pub time_ns: u64,
-    /// Recorded duty and digest.
     pub recorded: (i16, String),
     /// Duty and digest of the replay.
     pub replayed: (i16, String),

@@ -11,10 +11,10 @@ pub use files::{Shard, merge};
 pub use summary::Table;
 
 use crate::metrics::METRICS;
-use crate::registry::Named;
+use crate::registry::{self, Named};
 use crate::run::{Run, RunError, run};
 use crate::scene::Scene;
-use crate::{cli, cores};
+use crate::{cli, cores, effects};
 use files::Rows;
 use indicatif::{ProgressBar, ProgressStyle};
 use output::say;
@@ -27,11 +27,9 @@ pub struct Plan {
     pub scene: String,
     /// `TABLE.KEY=VALUE` for all runs.
     pub set: Vec<String>,
-    /// Keys that vary.
     pub vary: Vec<Vary>,
     /// Number of seeds at each point, counted from the seed of the scene.
     pub seeds: u64,
-    /// Shard of the runs.
     pub shard: Shard,
     /// Folder of the results; none for its own folder in [`FOLDER`].
     pub out: Option<PathBuf>,
@@ -65,7 +63,7 @@ pub fn sweep(plan: &Plan, board: Run) -> Result<(Table, PathBuf), RunError> {
         return Err(format!(
             "nothing in {} is random: all {seeds} seeds would give the same run. Leave --seeds out, or name an effect that draws: {}",
             first.name,
-            EFFECTS.join(", ")
+            registry::all().filter(|effect| effects::draws(effect)).map(|effect| effect.name).collect::<Vec<_>>().join(", ")
         )
         .into());
     }
@@ -92,7 +90,6 @@ pub fn sweep(plan: &Plan, board: Run) -> Result<(Table, PathBuf), RunError> {
     Ok((rows.finish(plan, &out)?, out))
 }
 
-/// Progress bar on the terminal.
 pub fn progress(all: usize, things: &str) -> Result<ProgressBar, RunError> {
     let template = format!("{{bar:40}} {{pos}} of {{len}} {things}, {{eta}} to go");
     Ok(ProgressBar::new(all as u64).with_style(ProgressStyle::with_template(&template)?))
@@ -132,7 +129,6 @@ fn points(plan: &Plan) -> Result<Vec<(Vec<String>, Scene)>, RunError> {
 /// Key and its values as TOML.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Vary {
-    /// `table.key`.
     pub key: String,
     /// Values from the first to the last.
     pub values: Vec<String>,
@@ -175,10 +171,6 @@ impl std::str::FromStr for Vary {
     }
 }
 
-/// Effects that draw random numbers.
-pub const EFFECTS: [&str; 8] =
-    ["noise", "offset", "gain_spread", "tangential", "host_jitter", "lost_packets", "corrupted_packets", "burst"];
-
 /// True if another seed may give another run.
 pub fn is(scene: &Scene) -> bool {
     scene.effects.iter().any(draws)
@@ -188,7 +180,7 @@ pub fn is(scene: &Scene) -> bool {
 fn draws(named: &Named) -> bool {
     let Named { effect, values } = named;
     let idle = |keys: &[(&str, f64)]| keys.iter().all(|(key, zero)| values.number(key) == *zero);
-    EFFECTS.contains(&effect.name)
+    effects::draws(effect)
         && match effect.name {
             "tangential" => !idle(&[("spread_percent", 0.0)]),
             _ => effect.zero.is_empty() || !idle(effect.zero),
@@ -198,23 +190,6 @@ fn draws(named: &Named) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::registry;
-    use std::fs;
-
-    /// Source of the random numbers of an effect.
-    const DRAWN_FROM: &str = "build.seed";
-
-    #[test]
-    fn those_that_draw_are_listed() {
-        let folder = format!("{}/host-tests/sim/src/effects", env!("FINGERTIP_ROOT"));
-        let files = ["contact.rs", "drive.rs", "link.rs", "sensor/effects.rs"];
-        let text = files.map(|file| fs::read_to_string(format!("{folder}/{file}")).unwrap()).concat();
-        for effect in registry::all() {
-            let (_, text) = text.split_once(&format!("name: \"{}\"", effect.name)).unwrap();
-            let text = text.split("Description {").next().unwrap();
-            assert_eq!(text.contains(DRAWN_FROM), EFFECTS.contains(&effect.name), "{}", effect.name);
-        }
-    }
 
     #[test]
     fn ranges_are_read() {

@@ -15,8 +15,7 @@ use fingertip::frame::Sense;
 use fingertip::shipped::COLUMNS;
 use fingertip::units::CoreCycles;
 
-/// Largest product of a step and the angular frequency of the fastest oscillation. Each iteration of the solution then
-/// gains a factor of 16 or more.
+/// Largest product of a step and the fastest angular frequency: each iteration gains a factor of 16 or more.
 const STEP_RAD: f64 = 0.5;
 
 /// Most iterations of the common solution of fingers and object, and the displacement below whose change they end.
@@ -85,7 +84,6 @@ impl<E: Set> World<E> {
         Ok(())
     }
 
-    /// Fingers.
     pub fn fingers(&self) -> &[Finger<E::Drive, E::Contact>] {
         &self.fingers
     }
@@ -95,7 +93,6 @@ impl<E: Set> World<E> {
         &mut self.fingers
     }
 
-    /// Object.
     pub fn body(&self) -> &Body {
         &self.body
     }
@@ -187,8 +184,7 @@ impl<E: Set> World<E> {
         }
     }
 
-    /// Solves for fingers and object together: mean forces from the ends, ends from the mean forces, until both agree.
-    /// Then momentum and energy are conserved between them.
+    /// Solves for fingers and object together until forces and ends agree: momentum and energy are conserved.
     #[inline(never)]
     fn advance_together(&mut self, mass_kg: f64, time_s: f64) {
         let (dt_s, body) = (self.dt_s, self.body);
@@ -249,7 +245,6 @@ impl<E: Set> World<E> {
         self.fingers[index].contact.law().energy_mj(self.overlap_mm(index))
     }
 
-    /// Normal force on a finger.
     pub fn force_n(&self, finger: usize) -> f64 {
         self.fingers[finger].contact.law().force_n(self.overlap_mm(finger))
     }
@@ -310,8 +305,7 @@ fn surface_mm(setup: &Setup, finger: usize, body: &Body) -> f64 {
 }
 
 impl<E: Set> World<E> {
-    /// Returns the contact of a finger at a time within the last step. It is separate from the rows, so that several
-    /// places can be computed in parallel.
+    /// Returns the contact of a finger at a time within the last step, apart from its rows: several go in parallel.
     #[inline]
     pub fn place(&self, index: usize, since_s: f64) -> Place {
         let mut body = self.body;
@@ -337,8 +331,7 @@ impl<E: Set> World<E> {
         self.placed_kpa(index, &place, row)
     }
 
-    /// Mean pressures on a row at a time before the end of the last step (negative) or after it, at constant
-    /// acceleration.
+    /// Mean pressures on a row before the end of the last step (negative) or after it, at constant acceleration.
     pub fn row_off_kpa(&mut self, index: usize, off_s: f64, row: usize) -> [f64; COLUMNS] {
         if off_s < 0.0 {
             return self.row_kpa(index, (self.dt_s + off_s).max(0.0), row);
@@ -386,7 +379,6 @@ pub struct Surroundings {
 }
 
 impl Surroundings {
-    /// Surroundings of a scene.
     pub fn of(scene: &Scene) -> Self {
         let (object, hand) = (scene.table("object"), scene.table("hand"));
         let (shake_s, lift_s) = (object.number("shake_at_s"), hand.number("lift_at_s"));

@@ -13,28 +13,21 @@ use std::path::{Path, PathBuf};
 /// Figures of the true force.
 #[derive(Clone, Debug, Serialize)]
 pub struct Forces {
-    /// First touch of the object.
     pub touch: Touch,
-    /// The force steps.
     pub steps: Vec<Step>,
-    /// Release of the object.
     pub release: Release,
 }
 
 /// The first touch of an object.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Touch {
-    /// Requested force.
     pub goal_n: f64,
     /// Time from the goal to the touch.
     pub touched_after_ms: f64,
     /// Speed just before the touch.
     pub approach_mm_per_s: Option<f64>,
-    /// Travel from the goal to the touch.
     pub distance_mm: f64,
-    /// Largest force.
     pub peak_n: f64,
-    /// Peak above the goal, as a share of the goal.
     pub peak_above_goal_percent: f64,
     /// Time from the touch until the force stays within 2 % of the goal; none if it never does.
     pub settled_after_touch_ms: Option<f64>,
@@ -47,7 +40,6 @@ pub struct Touch {
 pub struct Step {
     /// True force when the goal changed.
     pub from_n: f64,
-    /// Requested force.
     pub to_n: f64,
     /// Time from 10 % to 90 % of the step; none if the force does not reach 90 %.
     pub rise_ms: Option<f64>,
@@ -75,15 +67,12 @@ pub struct Release {
 /// Figure and its bounds.
 #[derive(Clone, Debug, Serialize)]
 pub struct Check {
-    /// Name of the figure.
     pub name: String,
     /// Measured value; none if the run has none, which fails.
     pub measured: Option<f64>,
-    /// Unit of the figure.
     pub unit: &'static str,
     /// Lower bound: a figure too good to be true fails too.
     pub at_least: Option<f64>,
-    /// Upper bound.
     pub at_most: Option<f64>,
     /// True if the figure lies within its bounds.
     pub pass: bool,
@@ -99,7 +88,6 @@ impl Check {
     }
 }
 
-/// Returns the number of missed bounds.
 pub fn missed(checks: &[Check]) -> usize {
     checks.iter().filter(|check| !check.pass).count()
 }
@@ -155,7 +143,6 @@ impl Forces {
 }
 
 impl Touch {
-    /// Returns none if nothing was touched.
     fn of(asked: &Asked, samples: &[Sample]) -> Option<Self> {
         let measured = asked.meter.measured();
         let touched = samples.iter().find(|sample| sample.true_force_n > 0.0)?;

@@ -11,7 +11,6 @@ use crate::mechanics::decay;
 use crate::registry::Description;
 use crate::scene::tables::Key;
 use crate::watch::{Cost, Truth};
-use fastrand::Rng;
 
 /// Effect on the surface of the object.
 pub trait Shape: Send {
@@ -81,7 +80,9 @@ pub type Body = dyn FnMut() -> f64 + Send;
 /// Stages as the contact calls them: of the named effects, or of `()`, which has none compiled in.
 pub trait Stages {
     /// True if no stage has an effect: a step of the contact then calls none.
-    fn none(&self) -> bool;
+    fn none(&self) -> bool {
+        true
+    }
     /// True if the surface is not a plane.
     fn shaped(&self) -> bool {
         false
@@ -93,7 +94,9 @@ pub trait Stages {
     /// Counts the construction of the tables of the shape as a call of its effects.
     fn shape_built(&mut self) {}
     /// True if there is a [`Memory`].
-    fn forgets(&self) -> bool;
+    fn forgets(&self) -> bool {
+        false
+    }
     /// Sum of [`Memory::forgotten_n`].
     fn forgotten_n(&mut self) -> f64 {
         0.0
@@ -107,7 +110,9 @@ pub trait Stages {
         0.0
     }
     /// True if there is a [`Strength`].
-    fn breaks(&self) -> bool;
+    fn breaks(&self) -> bool {
+        false
+    }
     /// Product of [`Strength::left`].
     fn left(&mut self, _force_n: f64) -> f64 {
         1.0
@@ -124,19 +129,7 @@ pub trait Stages {
     fn tell(&self, _truth: &mut Truth) {}
 }
 
-impl Stages for () {
-    fn none(&self) -> bool {
-        true
-    }
-
-    fn forgets(&self) -> bool {
-        false
-    }
-
-    fn breaks(&self) -> bool {
-        false
-    }
-}
+impl Stages for () {}
 
 named! {
     Shape(shape: dyn Shape),
@@ -358,7 +351,7 @@ pub const EFFECTS: &[Description] = &[
         build: |build: &Build| {
             let values = build.values;
             let spread = values.number("spread_percent") / 100.0;
-            let drawn = 1.0 + spread * normal_within_3(&mut Rng::with_seed(build.seed));
+            let drawn = 1.0 + spread * normal_within_3(&mut build.rng());
             let grip = Grip {
                 n_per_mm: values.number("n_per_mm"),
                 n_s_per_mm: values.number("damping_n_s_per_mm"),

@@ -17,13 +17,11 @@ use serde::{Deserialize, Serialize};
 /// Circuit of the winding during a step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Circuit {
-    /// Voltage of the source.
     pub source_v: f64,
     /// Resistance of the source. The motor sees duty^2 of it.
     pub source_ohm: f64,
     /// Share of the supply at the motor, -1 to 1.
     pub duty: f64,
-    /// Resistance of the winding.
     pub winding_ohm: f64,
     /// Resistance of the two switches of the bridge.
     pub bridge_ohm: f64,
@@ -87,7 +85,6 @@ pub type Resist = dyn FnMut(f64, &mut Friction) + Send;
 
 /// Torque on the shaft that stores energy.
 pub trait Potential: Send {
-    /// Energy at an angle.
     fn energy_j(&self, angle_rad: f64) -> f64;
 
     /// Mean torque against the motion between two angles: the difference in energy over the distance.
@@ -106,7 +103,9 @@ pub type Encoder = dyn FnMut(i32) -> i32 + Send;
 /// Stages as the finger calls them: of the named effects, or of `()`, which has none compiled in.
 pub trait Stages {
     /// True if no stage has an effect: the finger then calls none.
-    fn none(&self) -> bool;
+    fn none(&self) -> bool {
+        true
+    }
     /// Sum of [`Inertia`].
     fn inertia_kg_m2(&mut self, _m_per_rad: f64) -> f64 {
         0.0
@@ -145,11 +144,7 @@ pub trait Stages {
     fn tell(&self, _truth: &mut Truth) {}
 }
 
-impl Stages for () {
-    fn none(&self) -> bool {
-        true
-    }
-}
+impl Stages for () {}
 
 named! {
     Inertia(inertia: Inertia),

@@ -51,7 +51,9 @@ pub type Codes = dyn FnMut(usize, f64, &mut Row) + Send;
 /// Stages as the readout calls them: of the named effects, or of `()`, which has none compiled in.
 pub trait Stages {
     /// True if no stage has an effect: the readout is then ideal and calls none.
-    fn none(&self) -> bool;
+    fn none(&self) -> bool {
+        true
+    }
     /// Temperature of the microcontroller, degrees Celsius, if an effect has one.
     fn chip_c(&self, _time_s: f64) -> Option<f64> {
         None
@@ -68,11 +70,7 @@ pub trait Stages {
     fn codes(&mut self, _slot: usize, _time_s: f64, _codes: &mut Row) {}
 }
 
-impl Stages for () {
-    fn none(&self) -> bool {
-        true
-    }
-}
+impl Stages for () {}
 
 named! {
     Pressure(pressure: dyn Pressure),

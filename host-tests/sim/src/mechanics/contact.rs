@@ -9,9 +9,7 @@ use fingertip::shipped::COLUMNS;
 
 /// Contact of one finger, with its effects.
 pub struct Contact<C> {
-    /// Effects on the contact.
     pub effects: C,
-    /// State along the surface.
     pub along: Along,
     elastic: Elastic,
     /// Indentations, each with the centre of pressure; empty on a plane.
@@ -50,7 +48,6 @@ pub struct Along {
 }
 
 impl<C: Stages> Contact<C> {
-    /// Contact of a finger.
     pub fn new(setup: &Setup, mut effects: C) -> Self {
         effects.shape_built();
         let (elastic, centres) = if effects.shaped() {
@@ -101,7 +98,6 @@ impl<C: Stages> Contact<C> {
         }
     }
 
-    /// Returns the contact at an overlap.
     #[inline]
     pub fn place(&self, x_mm: f64) -> Place {
         if x_mm <= 0.0 {
@@ -118,7 +114,6 @@ impl<C: Stages> Contact<C> {
         Place { between, share: if elastic_n > 0.0 { law.of_depth_n(d_mm) / elastic_n } else { law.left } }
     }
 
-    /// Returns the mean pressures on the taxels of a row.
     #[inline]
     pub fn row_kpa(&mut self, place: &Place, row: usize) -> [f64; COLUMNS] {
         let kpa = self.pressures.row_kpa(&self.effects, &place.between, row);
@@ -143,8 +138,7 @@ impl<C: Stages> Contact<C> {
 }
 
 impl Along {
-    /// Returns the mean force on the object along the surface over a step with this displacement against the tip, and
-    /// the state after it.
+    /// Returns the mean force on the object along the surface over a step by a displacement, and the state after it.
     pub fn moved(&self, grip: &Grip, normal_n: f64, way_mm: f64, dt_s: f64) -> (f64, Self) {
         let mut next = *self;
         let damping = if dt_s > 0.0 { grip.n_s_per_mm / dt_s } else { 0.0 };

@@ -15,9 +15,7 @@ const TOLERANCE: f64 = 1e-15;
 
 /// Finger with the effects on its drive.
 pub struct Finger<D, C> {
-    /// Contact with the object.
     pub contact: Contact<C>,
-    /// Effects on the drive.
     pub drive: D,
     setup: Setup,
     rotor: Rotor,
@@ -50,7 +48,6 @@ pub struct Motion {
 /// End of a step.
 #[derive(Clone, Copy, Debug)]
 pub struct End {
-    /// Angle and speed at the end.
     pub shaft: Shaft,
     winding_a: f64,
     square_a2_s: f64,
@@ -97,7 +94,6 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         self.rotor.inertia_kg_m2 / (self.mm_per_rad * 1e-3) / (self.mm_per_rad * 1e-3)
     }
 
-    /// Inertia at the shaft.
     pub fn inertia_kg_m2(&self) -> f64 {
         self.rotor.inertia_kg_m2
     }
@@ -122,8 +118,7 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         self.rotor.torque_nm_per_a = self.circuit.torque_nm_per_a;
     }
 
-    /// Returns the end of the prepared step against a load: the mean force between two places of the pressing flank.
-    /// Changes no state.
+    /// Returns the end of the prepared step against a load: its mean between two places of the pressing flank.
     pub fn solve(&mut self, load_n: impl Fn(&Contact<C>, f64, f64) -> f64) -> End {
         let mut acting = Acts {
             alone: self.drive.none(),
@@ -158,7 +153,6 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         }
     }
 
-    /// Stops the finger at its end stops.
     fn stop_at_ends(&mut self) {
         let Some([rear_mm, front_mm]) = self.drive.end_stops_mm() else { return };
         let held_mm = self.flank_mm().clamp(rear_mm, front_mm);
@@ -167,13 +161,11 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         }
     }
 
-    /// Returns the state of the motion.
     pub fn motion(&self) -> Motion {
         let Self { before, shaft, rad_per_s2, winding_a, tip_mm, bridge, circuit, dt_s, .. } = *self;
         Motion { shafts: [before, shaft], rad_per_s2, winding_a, tip_mm, bridge, circuit, dt_s }
     }
 
-    /// Continues from a state of the motion.
     pub fn resume(&mut self, motion: &Motion) {
         let Motion { shafts, rad_per_s2, winding_a, tip_mm, bridge, circuit, dt_s } = *motion;
         [self.before, self.shaft] = shafts;
@@ -245,7 +237,6 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         if self.drive.none() { count } else { self.drive.count(count) }
     }
 
-    /// Travel of the tip.
     pub fn tip_mm(&self) -> f64 {
         self.tip_mm
     }
@@ -260,7 +251,6 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         self.shaft.speed_rad_per_s * self.mm_per_rad
     }
 
-    /// Current in the winding.
     pub fn current_a(&self) -> f64 {
         if self.circuit.henry > 0.0 {
             return self.winding_a;
@@ -269,7 +259,6 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         self.rotor.current_a(&source, self.shaft.speed_rad_per_s)
     }
 
-    /// Voltage of the supply at the bridge.
     pub fn supply_v(&self) -> f64 {
         self.circuit.source_v - self.circuit.source_ohm * self.circuit.duty * self.current_a()
     }

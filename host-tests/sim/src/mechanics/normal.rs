@@ -44,12 +44,10 @@ impl Law<'_> {
         }
     }
 
-    /// Force at an overlap.
     pub fn force_n(&self, x_mm: f64) -> f64 {
         self.left * self.net_n(self.depth_mm(x_mm))
     }
 
-    /// Force of an indentation.
     pub fn of_depth_n(&self, d_mm: f64) -> f64 {
         self.left * self.net_n(d_mm)
     }
@@ -246,7 +244,6 @@ impl Elastic {
         }
     }
 
-    /// Slope of the force.
     pub fn n_per_mm(&self, d_mm: f64) -> f64 {
         match self {
             Self::Plane { n_per_mm2 } => 2.0 * n_per_mm2 * d_mm.max(0.0),

@@ -35,8 +35,7 @@ pub struct Pressures {
     centre_mm: [f64; 2],
     deepest_mm: f64,
     peak_per_mm: f64,
-    /// Knots by place of the centre and root of the indentation. The first root is the knot before 0: the shares are
-    /// even in the root.
+    /// Knots by place of the centre and root of the indentation. The first root mirrors the one after 0.
     knots: Vec<Vec<Knot>>,
     /// Points of a shaped surface by place of the centre, from the first contact there on.
     points: Vec<Option<shape::Points>>,
@@ -87,7 +86,6 @@ impl Pressures {
         Between { root, weights, peak_kpa: self.peak_per_mm * d_mm, shift_mm }
     }
 
-    /// Returns the mean pressures on a row.
     #[inline]
     pub fn row_kpa(&mut self, stages: &impl Stages, between: &Between, row: usize) -> Row {
         let mut kpa = [0.0; COLUMNS];
@@ -221,7 +219,6 @@ impl Cell {
         Self { x_mm: [left, left + pitch_mm], y_mm: [low, low + pitch_mm] }
     }
 
-    /// Mean pressure on the rectangle.
     pub fn mean_kpa(&self, tip: &Flattened) -> f64 {
         let rim2 = tip.contact_radius2_mm2();
         let near2 = square(nearest(self.x_mm)) + square(nearest(self.y_mm));
@@ -256,7 +253,6 @@ impl Cell {
     }
 }
 
-/// Integrates over an interval.
 fn gauss(rule: &[(f64, f64)], over: [f64; 2], f: impl Fn(f64) -> f64) -> f64 {
     let (middle, half) = (0.5 * (over[0] + over[1]), 0.5 * (over[1] - over[0]));
     half * rule.iter().map(|(node, weight)| weight * f(middle + half * node)).sum::<f64>()
@@ -305,7 +301,6 @@ impl Tip {
         (force_n.max(0.0) / self.force_per_mm2()).sqrt()
     }
 
-    /// The tip flattened by an indentation.
     pub fn flattened(&self, indentation_mm: f64) -> Flattened {
         let a = self.radius_mm;
         let d = indentation_mm.clamp(0.0, Self::DEEPEST * a);

@@ -50,7 +50,6 @@ pub(crate) struct Resistance {
 
 /// Torques and supply of a shaft during a step.
 pub(crate) trait Acting {
-    /// Resistance between two angles.
     fn resistance(&mut self, from_rad: f64, to_rad: f64) -> Resistance;
 
     /// Mean supply of the winding over a time.
@@ -85,7 +84,6 @@ impl Rotor {
         ((source.volts - back_emf) / source.ohms + source.kept_a).clamp(-source.limit_a, source.limit_a)
     }
 
-    /// Advances by one step.
     pub fn advance(&self, mut shaft: Shaft, dt_s: f64, acting: &mut impl Acting) -> Shaft {
         let mut left_s = dt_s;
         for _ in 0..RESTS_MAX {
@@ -199,7 +197,6 @@ pub struct Dynamics {
 const ROUNDS: usize = 3;
 
 impl Dynamics {
-    /// Motion of a setup.
     pub fn new(setup: &Setup) -> Self {
         let gear = &setup.transmission;
         let mm_per_rad = gear.drum_radius_mm / gear.ratio;
@@ -229,7 +226,6 @@ impl Dynamics {
         travel_mm / self.mm_per_rad
     }
 
-    /// Current at a speed.
     pub fn current_a(&self, source: &Source, speed_rad_per_s: f64) -> f64 {
         self.rotor.current_a(source, speed_rad_per_s)
     }
@@ -283,7 +279,6 @@ pub(crate) struct Acts<'a, D, L> {
     pub circuit: &'a Circuit,
     pub open: bool,
     pub friction: &'a Friction,
-    /// Travel of the tip per angle.
     pub mm_per_rad: f64,
     /// Load of the tip: its mean between two places of the pressing flank.
     pub load_n: L,

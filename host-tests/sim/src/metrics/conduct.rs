@@ -16,8 +16,7 @@ const TAKEN_BACK_S: f64 = 0.2;
 const STOP_S: f64 = 0.5;
 /// Displacement of the object between two steps, mm, that counts as a motion.
 const MOVES_MM: f64 = 1e-5;
-/// Last part of the time of a goal, and the time from which on a goal is judged: since it was requested, and since the
-/// first touch, as an approach is not a hold.
+/// Last part of the time of a goal; a goal is judged this long after it was requested and after the first touch.
 const LAST_S: f64 = 0.2;
 const JUDGED_S: f64 = 0.4;
 const JUDGED_TOUCH_S: f64 = 0.22;
@@ -34,13 +33,11 @@ struct Sample {
 /// Last part of a force that was held.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hold {
-    /// Requested force.
     pub goal_n: f64,
     /// Mean of the true force.
     pub mean_n: f64,
     /// Range of the true force.
     pub swing_n: f64,
-    /// True if nothing was touched.
     pub missed: bool,
     /// True if a fault had stopped the motor.
     pub faulty: bool,
@@ -96,7 +93,6 @@ pub struct Conduct {
 /// Goals that are over.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ended {
-    /// Holds of a force.
     pub holds: Vec<Hold>,
     /// Range of the tip at rest after a release.
     pub rest_mm: Option<f64>,
@@ -163,8 +159,7 @@ impl Conduct {
         }
     }
 
-    /// Measures the true force after a stop that remains although the motor could move, or beyond what friction holds.
-    /// A fault is a reason; an object that comes nearer ends the stop.
+    /// Measures the true force that remains after a stop although the motor could move, or beyond what friction holds.
     fn stop(&mut self, step: &Step, came: bool) {
         let Step { time_s, truth, command, status, .. } = *step;
         let acts_again = status.fault.is_some() || command.torque && self.torque_off;

@@ -85,7 +85,6 @@ pub struct Finger {
 }
 
 impl Finger {
-    /// Measurements of a finger with this controller.
     pub(super) fn of(controller: &Controller) -> Self {
         Self { conduct: Conduct::of(&controller.params), ..Self::default() }
     }
@@ -228,7 +227,6 @@ pub fn duty(duty: Duty) -> f64 {
     f64::from(duty.0) / f64::from(Duty::FULL)
 }
 
-/// Force as a number.
 pub fn newtons(force: Newtons) -> f64 {
     force.0.to_num()
 }

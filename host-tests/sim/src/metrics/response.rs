@@ -85,14 +85,12 @@ fn crossing_s(before: Option<[f64; 2]>, [after_s, after]: [f64; 2], part: f64) -
 /// Value at a goal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AtGoal {
-    /// Requested force.
     pub goal_n: f64,
     /// The value, in the metric's unit.
     pub value: f64,
 }
 
-/// Adds a value unless a smaller goal has a larger one, and removes those that it exceeds in this way. So a long run
-/// keeps few values.
+/// Adds a value unless a smaller goal has a larger one, and removes those that it exceeds in this way.
 pub fn note(kept: &mut Vec<AtGoal>, new: AtGoal) {
     let covers = |a: &AtGoal, b: &AtGoal| a.goal_n <= b.goal_n && a.value >= b.value;
     if !kept.iter().any(|known| covers(known, &new)) {
@@ -129,7 +127,6 @@ struct Slip {
 }
 
 impl Slips {
-    /// Adds a step.
     pub fn step(&mut self, time_s: f64, slip_mm: f64, goal_n: f64) {
         let moves = slip_mm > self.last_mm;
         let before_mm = core::mem::replace(&mut self.last_mm, slip_mm);

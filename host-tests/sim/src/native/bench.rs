@@ -36,8 +36,7 @@ impl<E: Set> Bench<E> {
         Ok(Self::around(Board::new(&scene.without_events(), Begun::default())?))
     }
 
-    /// Replaces the world around the finger. Controller, tip and array are kept with the memory of their effects, and
-    /// time continues.
+    /// Replaces the world around the finger. Controller, tip and array keep the memory of their effects.
     pub fn exchange(&mut self, scene: &Scene) -> Result<(), SimError> {
         let mut before = core::mem::replace(&mut self.board, Board::new(&scene.without_events(), Begun::default())?);
         let now = &mut self.board;
@@ -53,8 +52,7 @@ impl<E: Set> Bench<E> {
         Ok(())
     }
 
-    /// Copies the bench, so that several futures can begin at one instant. `scene` is the scene of this bench. The copy
-    /// is exact where no effect of the scene has a memory: noise, hysteresis and creep begin again.
+    /// Copies the bench of `scene`, exactly where no effect has a memory: noise, hysteresis and creep begin again.
     pub fn fork(&self, scene: &Scene) -> Result<Self, SimError> {
         let mut fork = Self::new(scene)?;
         let (from, to) = (&self.board, &mut fork.board);
@@ -81,17 +79,14 @@ impl<E: Set> Bench<E> {
         &mut self.board.world.fingers_mut()[0]
     }
 
-    /// Command of the host.
     pub fn command(&mut self) -> &mut Command {
         &mut self.board.units[0].command
     }
 
-    /// Controller of the finger.
     pub fn pipeline(&mut self) -> &mut Pipeline {
         &mut self.board.units[0].pipeline
     }
 
-    /// Status of the controller.
     pub fn status(&self) -> &Status {
         self.unit().pipeline.status()
     }
@@ -101,7 +96,6 @@ impl<E: Set> Bench<E> {
         Record { frame: self.unit().frame, sense: self.sense, command: self.unit().command }
     }
 
-    /// Last frame.
     pub fn frame(&self) -> &Frame {
         &self.unit().frame
     }
@@ -137,8 +131,7 @@ impl<E: Set> Bench<E> {
         largest_n
     }
 
-    /// Lets time pass over a finger that touches nothing, with few frames: tip and array recover, the temperature of
-    /// the array changes. Torque must be off.
+    /// Lets time pass over a finger that touches nothing, with few frames. Torque must be off.
     pub fn rest(&mut self, seconds: f64) {
         for _ in 0..(seconds / REST_STEP_S).ceil() as usize {
             self.finger_mut().contact.effects.relax(REST_STEP_S, None);
@@ -186,12 +179,10 @@ impl<E: Set> Bench<E> {
         self.command().torque = true;
     }
 
-    /// Virtual time.
     pub fn time_s(&self) -> f64 {
         self.board.time_s()
     }
 
-    /// Returns the true state of the finger.
     pub fn truth(&mut self) -> Truth {
         self.board.world.truth(0, false)
     }

@@ -63,7 +63,6 @@ const RELEASE_S: f64 = 0.4;
 pub struct Calibrated {
     /// Parameters with modulus and scale.
     pub params: Params,
-    /// Gains of the taxels.
     pub gains: Gains,
     /// Steps of the procedure that failed, each with its reason. The finger keeps its values there.
     pub refused: Vec<String>,
@@ -228,7 +227,6 @@ const TESTS: [(&str, f64, bool); 3] =
 /// Finger before and after its calibration.
 #[derive(Clone, Debug)]
 pub struct Unlike {
-    /// Result of the calibration.
     pub calibrated: Calibrated,
     /// Errors of the true force in the order of the tests, as shares of the goal: before and after calibration.
     pub errors: [[f64; 3]; 2],

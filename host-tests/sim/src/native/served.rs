@@ -44,11 +44,9 @@ pub struct Bus<E: Set> {
 /// Firmware of a finger around its pipeline.
 struct Device {
     server: Server,
-    /// Contents of the flash.
     flash: Record,
     started_s: f64,
     reset: ResetCause,
-    /// Count of the encoder at the start.
     encoder_start: i32,
     /// Number of good packets, and the time of its last change.
     packets: (u32, f64),
@@ -72,12 +70,10 @@ impl<E: Set> Bus<E> {
         Ok(Self { board, devices, object, answers: VecDeque::new() })
     }
 
-    /// Virtual time.
     pub fn now_s(&self) -> f64 {
         self.board.time_s()
     }
 
-    /// Duration of a frame.
     pub fn frame_s(&self) -> f64 {
         self.board.slot_s * SLOTS as f64
     }
@@ -300,7 +296,6 @@ const GAP_MM: f64 = 0.2;
 
 /// Place and goal of the object.
 struct Object {
-    /// Place in the scene.
     scene_mm: f64,
     now_mm: f64,
     goal_mm: f64,
@@ -461,7 +456,6 @@ impl Kind {
         ("leads-swapped", Self::LeadsSwapped),
     ];
 
-    /// Lists the names for people.
     pub fn names() -> String {
         Self::ALL.map(|(name, _)| name).join(", ")
     }
@@ -493,7 +487,6 @@ impl Broken {
         Self { kind, then: None }
     }
 
-    /// Returns the state of the bridge at the motor.
     fn at_motor(&self, bridge: Bridge) -> Bridge {
         match (self.kind, bridge) {
             (Kind::LeadsSwapped, Bridge::Driven { duty }) => Bridge::Driven { duty: -duty },

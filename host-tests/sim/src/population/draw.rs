@@ -8,15 +8,12 @@ use serde::Serialize;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Drawn {
-    /// A number.
     Number(f64),
-    /// A word of a choice.
     Word(String),
 }
 
 #[derive(Clone, Debug, PartialEq)]
 pub enum Draw {
-    /// Constant.
     Always(Drawn),
     /// Uniform distribution between two values.
     Uniform([f64; 2]),
@@ -76,7 +73,6 @@ impl Draw {
         }
     }
 
-    /// Draws of which it draws one.
     fn parts(&self) -> Vec<&Self> {
         match self {
             Self::Choice(choices) => choices.iter().map(|(_, draw)| draw).collect(),
@@ -92,13 +88,11 @@ impl Draw {
         if parts.is_empty() { vec![self] } else { parts.into_iter().flat_map(Self::ends).collect() }
     }
 
-    /// Words that it may draw.
     pub fn words(&self) -> Vec<&str> {
         let word = |end| if let &Self::Always(Drawn::Word(ref word)) = end { Some(word.as_str()) } else { None };
         self.ends().into_iter().filter_map(word).collect()
     }
 
-    /// Variables that it uses.
     pub fn uses(&self) -> Vec<&str> {
         let own = match self {
             Self::By(name, _) => vec![name.as_str()],
@@ -110,7 +104,6 @@ impl Draw {
 }
 
 impl Drawn {
-    /// Number, if it is one.
     pub fn number(&self) -> Option<f64> {
         if let Self::Number(number) = self { Some(*number) } else { None }
     }
@@ -131,7 +124,6 @@ pub struct Spread {
     pub median: Option<f64>,
     #[serde(rename = "percentile_95")]
     pub most: Option<f64>,
-    /// Largest value.
     pub worst: Option<f64>,
 }
 
@@ -158,7 +150,6 @@ pub fn range<'a>(text: &'a str, variable: &mut dyn FnMut(&'a str) -> Option<[f64
     }
 }
 
-/// Variables of an expression.
 pub fn variables(text: &str) -> Vec<&str> {
     let mut names = Vec::new();
     let _ = range(text, &mut |name| {

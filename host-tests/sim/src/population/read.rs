@@ -25,7 +25,6 @@ const EXAMPLES: &str = "{ uniform = [1, 10] }, { log_uniform = [0.3, 3] }, { nor
 pub struct DrawReader<'a> {
     /// Number by which `follows` multiplies or divides.
     pub magnitude: f64,
-    /// Variables that may be used.
     pub variables: &'a [(String, Draw)],
 }
 
@@ -212,8 +211,7 @@ pub fn load(name: &str) -> Result<Population, String> {
     Ok(Population { name: stem(&file), ..population })
 }
 
-/// Puts the contents of a file over those of the file it extends: value by value, bounds by their metric, a script as a
-/// whole. Counts are added.
+/// Puts a file over the one it extends: value by value, bounds by metric, a script as a whole. Counts are added.
 fn overlay(base: &mut Table, over: &Table) {
     for (name, item) in over.iter().filter(|(name, _)| *name != "extends") {
         match (base.get_mut(name), item) {
@@ -372,8 +370,7 @@ impl Parts {
         self.keys.push(Place { at, key, whole, draw: Some(draw) });
     }
 
-    /// Reads the draws of events: `[events]` with `count` and `at_s`, `[events.KIND]` with `weight` and the keys of the
-    /// kind.
+    /// Reads the draws of events: `count` and `at_s`, and for each kind a table with `weight` and its keys.
     fn events(&mut self, root: &Table) -> Option<Events> {
         let table = root.get("events")?.as_table()?;
         let own = ["count", "at_s"];

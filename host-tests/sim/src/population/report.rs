@@ -17,15 +17,11 @@ use std::path::{Path, PathBuf};
 /// All fingers of a population or of a shard, in order.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Report {
-    /// The population's name.
     pub population: String,
-    /// Description of the population.
     pub about: String,
     /// Always true.
     pub simulated: bool,
-    /// Name of the board.
     pub board: String,
-    /// Seed of the draws.
     pub seed: u64,
     /// Number of fingers of the whole.
     pub of_fingers: usize,
@@ -35,7 +31,6 @@ pub struct Report {
     pub counted: Vec<Counted>,
     /// Summary for scripts.
     pub summary: Value,
-    /// Results of the fingers.
     pub fingers: Vec<Ran>,
 }
 
@@ -44,34 +39,25 @@ pub struct Report {
 pub struct Ran {
     /// Number of the finger, from 1.
     pub finger: usize,
-    /// Seed of the scene.
     pub seed: u64,
-    /// True if it kept all promises.
     pub inside: bool,
-    /// Drawn values.
     pub drawn: Map<String, Value>,
-    /// Promises with their results.
     pub promises: Vec<Promise>,
     /// Forces that were held.
     pub holds: Vec<Hold>,
     /// All metrics; null if the run has none.
     pub metrics: Map<String, Value>,
-    /// Digest of the run.
     pub digest: String,
 }
 
 /// Promise of the envelope.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Promise {
-    /// Metric of the promise.
     pub metric: String,
     /// Measured value: for a metric with a value for each goal, the worst against its limit.
     pub value: Option<f64>,
-    /// Lower bound.
     pub min: Option<f64>,
-    /// Upper bound.
     pub max: Option<f64>,
-    /// True if it is kept.
     pub held: bool,
 }
 
@@ -90,7 +76,6 @@ impl Promise {
 }
 
 impl Ran {
-    /// Result of a finger.
     pub fn new(number: usize, finger: &Finger, outcome: &Outcome) -> Self {
         let promises = outcome.verdicts.iter().map(|verdict| Promise {
             metric: verdict.bound.metric.clone(),
@@ -111,7 +96,6 @@ impl Ran {
         }
     }
 
-    /// Promises that were broken.
     pub fn broken(&self) -> impl Iterator<Item = &Promise> {
         self.promises.iter().filter(|promise| !promise.held)
     }
@@ -267,12 +251,9 @@ impl Report {
 /// A promise over all fingers.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
-    /// Spread of the values.
     #[serde(flatten)]
     pub spread: Spread,
-    /// Metric of the promise.
     pub metric: String,
-    /// Fingers that broke it.
     pub broken: usize,
 }
 

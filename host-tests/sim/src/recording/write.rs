@@ -69,8 +69,7 @@ impl Recorder {
         })
     }
 
-    /// Notes that the steps do not have all inputs of the core, so a replay is impossible. Call it before the run
-    /// begins.
+    /// Notes before the run that the steps lack inputs of the core, so a replay is impossible.
     pub fn seen_from_outside(mut self) -> Self {
         self.whole = false;
         self

@@ -44,7 +44,6 @@ pub struct Plot {
     pub lines: Vec<Line>,
 }
 
-/// All plots of a finger.
 pub fn all(tracks: &Tracks) -> Vec<Plot> {
     let Tracks { goal, force, sensed, control_error, held_error, sensing_error, .. } = tracks;
     let Tracks { indentation, duty, current, supply, winding, slip, height, .. } = tracks;

@@ -31,7 +31,6 @@ pub fn read(file: &str, text: &str, metrics: &[&str]) -> Result<Scene, SceneErro
     }
 }
 
-/// Mistake of a text that is not TOML.
 pub(crate) fn not_toml(file: &str, text: &str, error: &TomlError) -> SceneError {
     let message = format!("this is not TOML: {}", error.message().trim().replace('\n', "; "));
     SceneError::new(file, text, error.span().unwrap_or(0..0), message, String::new())
@@ -259,8 +258,7 @@ impl Reader<'_> {
 }
 
 impl Reader<'_> {
-    /// Returns the checked values of a table; none if one is wrong or missing. `open` accepts keys that are not
-    /// described.
+    /// Returns the checked values of a table; none if one is wrong or missing. `open` accepts unknown keys.
     fn values(&mut self, table: &Table, given: &dyn TableLike, place: Range<usize>, open: bool) -> Option<Values> {
         let errors = self.errors.len();
         let strange = |name: &str| !open && table.keys.iter().all(|key| key.name != name);
@@ -380,19 +378,15 @@ pub(crate) fn item_span(table: &dyn TableLike, name: &str) -> Range<usize> {
 /// Mistake in a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SceneError {
-    /// File as it was named.
     pub file: String,
     /// Line, from 1.
     pub line: usize,
     /// Column in characters, from 1.
     pub column: usize,
-    /// Description of the mistake.
     pub message: String,
-    /// Allowed values.
     pub allowed: String,
     /// Word that was probably meant.
     pub suggestion: Option<String>,
-    /// Line of the mistake.
     pub source_line: String,
     /// Number of marked characters.
     pub width: usize,

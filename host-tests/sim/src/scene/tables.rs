@@ -8,11 +8,8 @@ use std::fmt;
 /// Table of a scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Table {
-    /// Name of the table.
     pub name: &'static str,
-    /// Description in one line.
     pub about: &'static str,
-    /// Keys of the table.
     pub keys: &'static [Key],
 }
 
@@ -195,9 +192,7 @@ const CONTROLLER: [Key; Params::COUNT] = {
 pub struct Key {
     /// Name, with its unit as a suffix if it has one: `rms_codes`, `radius_mm`.
     pub name: &'static str,
-    /// Description in one line.
     pub about: &'static str,
-    /// Allowed values.
     pub kind: Kind,
 }
 
@@ -206,34 +201,26 @@ pub struct Key {
 pub enum Kind {
     /// A number within bounds.
     Number {
-        /// Lower limit.
         min: f64,
-        /// Upper limit.
         max: f64,
         /// Value of a missing key.
         default: Option<f64>,
     },
     /// A whole number within bounds.
     Whole {
-        /// Lower limit.
         min: i64,
-        /// Upper limit.
         max: i64,
         /// Value of a missing key.
         default: Option<i64>,
     },
-    /// One of these words.
     Word {
-        /// Allowed words.
         words: &'static [&'static str],
         /// Value of a missing key.
         default: Option<&'static str>,
     },
     /// A number within bounds, which may be left out: [`Values::optional`].
     Optional {
-        /// Lower limit.
         min: f64,
-        /// Upper limit.
         max: f64,
         /// True if only whole numbers are allowed.
         whole: bool,
@@ -363,7 +350,6 @@ impl Values {
         }
     }
 
-    /// Returns a whole number.
     pub fn whole(&self, name: &str) -> i64 {
         match self.get(name) {
             Value::Whole(number) => *number,
@@ -371,7 +357,6 @@ impl Values {
         }
     }
 
-    /// Returns a word.
     pub fn word(&self, name: &str) -> &'static str {
         match self.get(name) {
             Value::Word(word) => word,
@@ -379,7 +364,6 @@ impl Values {
         }
     }
 
-    /// Returns pairs.
     pub fn pairs(&self, name: &str) -> &[[i64; 2]] {
         match self.get(name) {
             Value::Pairs(pairs) => pairs,
@@ -392,7 +376,6 @@ impl Values {
         self.0.iter().any(|(known, _)| *known == name).then(|| self.number(name))
     }
 
-    /// Returns a text.
     pub fn text(&self, name: &str) -> &str {
         match self.get(name) {
             Value::Text(text) => text,

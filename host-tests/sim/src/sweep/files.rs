@@ -35,7 +35,6 @@ pub(super) struct Head {
     expected: Vec<String>,
 }
 
-/// Returns the form of the rows of the plan.
 pub(super) fn head(plan: &Plan, scene: &Scene, runs: usize) -> Head {
     let mut columns: Vec<String> = [ID, RUN, RUNS].map(String::from).into();
     columns.extend(plan.vary.iter().map(|vary| vary.key.clone()));
@@ -86,7 +85,6 @@ impl Rows {
         self.rows.len()
     }
 
-    /// Adds a run.
     pub fn add(&mut self, number: usize, values: Vec<String>) -> Result<(), RunError> {
         let Head { id, runs, expected, .. } = &self.head;
         let first = [id.clone(), number.to_string(), runs.to_string()];
@@ -149,7 +147,6 @@ pub fn merge(files: &[PathBuf], out: &Path) -> Result<Table, RunError> {
 pub struct Shard {
     /// Number of the share, from 1.
     pub number: usize,
-    /// Number of shares.
     pub of: usize,
 }
 
@@ -162,7 +159,6 @@ impl Shard {
         run % self.of == self.number - 1
     }
 
-    /// True if the share is the whole.
     pub const fn is_whole(self) -> bool {
         self.of == 1
     }

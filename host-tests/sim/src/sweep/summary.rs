@@ -62,13 +62,10 @@ pub fn rows(table: &Table) -> Vec<Vec<String>> {
 /// All rows of a sweep or of a shard, in order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
-    /// Names of the columns.
     pub head: Vec<String>,
-    /// Rows, one per run.
     pub rows: Vec<Vec<String>>,
 }
 
-/// Formats rows as CSV.
 pub(super) fn csv<'a>(rows: impl IntoIterator<Item = &'a Vec<String>>) -> Result<Vec<u8>, RunError> {
     let mut writer = Writer::from_writer(Vec::new());
     rows.into_iter().try_for_each(|row| writer.write_record(row))?;
@@ -142,7 +139,6 @@ impl Table {
         3..self.place(SEED)
     }
 
-    /// Columns of the metrics.
     pub(super) fn metrics(&self) -> core::ops::Range<usize> {
         let end = self.head.iter().position(|name| name.starts_with(EXPECT)).unwrap_or(self.head.len());
         self.place(DIGEST) + 1..end

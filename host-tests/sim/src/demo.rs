@@ -8,14 +8,13 @@ pub mod figures;
 pub use crate::demo::figures::{Check, Forces};
 
 use crate::metrics::{self, Meter, newtons};
-use crate::optimal::Unreachable;
+use crate::run::RunError;
 use crate::scene::{Scene, library, read};
 use crate::watch::{Controller, Step, Watch};
 use fingertip::shipped::{COLUMNS, Frame, SLOTS};
 use fingertip::state::Fault;
 use output::heatmap::Pressures;
-use output::plot::{PlotError, Sample};
-use std::path::PathBuf;
+use output::plot::Sample;
 
 const SCENE: &str = "demo";
 /// Duration of the goals in the quick run: of the first, which includes the approach, and of the others.
@@ -64,36 +63,15 @@ impl Run {
 }
 
 /// Reason why the demonstration has no result.
-#[derive(Debug, thiserror::Error)]
-pub enum DemoError {
-    #[error("{0}")]
-    Scene(String),
-    #[error(transparent)]
-    Simulated(#[from] crate::SimError),
-    /// The run has no touch or no release.
-    #[error("nothing was touched, or it was not let go")]
-    NoTouch,
-    /// The motor cannot reach a force at all.
-    #[error("no bound for a step: {0}")]
-    Unreachable(#[from] Unreachable),
-    #[error("the controller stopped with fault {0}")]
-    Fault(u8),
-    /// A figure could not be drawn.
-    #[error(transparent)]
-    Plot(#[from] PlotError),
-    /// A file could not be written.
-    #[error("cannot write {}: {source}", path.display())]
-    Write { path: PathBuf, source: std::io::Error },
-}
+pub type DemoError = RunError;
 
 /// Returns the scene. The quick one holds the same goals for a shorter time.
 ///
 /// # Errors
 /// The scene is missing or has a mistake.
 pub fn scene(quick: bool) -> Result<Scene, DemoError> {
-    let (path, text) = library::text(SCENE).map_err(DemoError::Scene)?;
-    let scene = read(&path.to_string_lossy(), &text, &metrics::names());
-    let mut scene = scene.map_err(|errors| DemoError::Scene(errors.to_string()))?;
+    let (path, text) = library::text(SCENE)?;
+    let mut scene = read(&path.to_string_lossy(), &text, &metrics::names())?;
     if quick {
         scene.duration_s = 0.0;
         for (place, event) in scene.script.iter_mut().enumerate() {
@@ -132,7 +110,7 @@ impl Trace {
     pub fn finish(mut self) -> Result<Run, DemoError> {
         self.keep();
         match self.fault {
-            Some(fault) => Err(DemoError::Fault(fault as u8)),
+            Some(fault) => Err(format!("the controller stopped with fault {}", fault as u8).into()),
             None => Ok(self.run),
         }
     }

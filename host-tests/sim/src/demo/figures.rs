@@ -110,7 +110,7 @@ impl Forces {
                 release = Some(Release::of(samples));
             }
         }
-        let (touch, release) = touch.zip(release).ok_or(DemoError::NoTouch)?;
+        let (touch, release) = touch.zip(release).ok_or("nothing was touched, or it was not let go")?;
         Ok(Self { touch, steps, release })
     }
 
@@ -166,7 +166,8 @@ impl Step {
         let [volts, amperes] =
             [Params::DEFAULT.voltage_max_mv, Params::DEFAULT.current_max_ma].map(|milli| f64::from(milli) * 1e-3);
         let [d_from_mm, d_to_mm] = [asked.from_n, asked.goal_n].map(|force_n| setup.tip.indentation_mm(force_n));
-        let time_optimal_ms = minimum_time_s(&setup, d_from_mm, d_to_mm, volts, amperes)? * 1e3;
+        let time_optimal_s = minimum_time_s(&setup, d_from_mm, d_to_mm, volts, amperes);
+        let time_optimal_ms = 1e3 * time_optimal_s.map_err(|why| format!("no bound for a step: {why}"))?;
         let measured = asked.meter.measured();
         let settling_ms = measured.get("settling_ms");
         Ok(Self {
@@ -268,10 +269,11 @@ pub fn draw(run: &Run, forces: &Forces, folder: &Path) -> Result<Vec<PathBuf>, D
         ("maps.svg", plot::maps(&maps, Setup::default().array.pitch_mm)?),
     ];
 
-    std::fs::create_dir_all(folder).map_err(|source| DemoError::Write { path: folder.into(), source })?;
+    let failed = |path: &Path, error| format!("cannot write {}: {error}", path.display());
+    std::fs::create_dir_all(folder).map_err(|error| failed(folder, error))?;
     let write = |(name, svg): (&str, String)| {
         let path = folder.join(name);
-        std::fs::write(&path, svg).map_err(|source| DemoError::Write { path: path.clone(), source })?;
+        std::fs::write(&path, svg).map_err(|error| failed(&path, error))?;
         Ok(path)
     };
     pictures.into_iter().map(write).collect()

@@ -21,14 +21,7 @@ const EXAMPLES: &str = "{ uniform = [1, 10] }, { log_uniform = [0.3, 3] }, { nor
     { choice = [256, 512], weights = [1, 2] }, { is = \"1000 * modulus_kpa\" }, { by = \"thing\", ball = 0.05, otherwise = 0 }; \
     with follows = \"magnitude\" or \"1 / magnitude\"";
 
-/// Reader of draws: at one magnitude, with the variables that were read before.
-pub struct DrawReader<'a> {
-    /// Number by which `follows` multiplies or divides.
-    pub magnitude: f64,
-    pub variables: &'a [(String, Draw)],
-}
-
-impl DrawReader<'_> {
+impl Parts {
     /// Reads a draw or a constant.
     pub fn draw(&self, value: &Value) -> Result<Draw, Wrong> {
         let number = number(value).map(Drawn::Number);
@@ -320,7 +313,7 @@ impl Parts {
                 self.wrong.push((key_span(table, name), format!("`{name}` is no draw"), "a value or a draw".into()));
                 continue;
             };
-            match (DrawReader { magnitude: self.magnitude, variables: &self.variables }).draw(value) {
+            match self.draw(value) {
                 Ok(draw) => self.variables.push((name.into(), draw)),
                 Err(wrong) => self.wrong.push(wrong),
             }
@@ -349,7 +342,7 @@ impl Parts {
 
     fn key(&mut self, key: String, value: &toml_edit::Value) {
         let at = value.span().unwrap_or(0..0);
-        let draw = match (DrawReader { magnitude: self.magnitude, variables: &self.variables }).draw(value) {
+        let draw = match self.draw(value) {
             Ok(draw) => draw,
             Err(wrong) => return self.wrong.push(wrong),
         };

@@ -66,9 +66,6 @@ impl Run {
 pub type DemoError = RunError;
 
 /// Returns the scene. The quick one holds the same goals for a shorter time.
-///
-/// # Errors
-/// The scene is missing or has a mistake.
 pub fn scene(quick: bool) -> Result<Scene, DemoError> {
     let (path, text) = library::text(SCENE)?;
     let mut scene = read(&path.to_string_lossy(), &text, &metrics::names())?;

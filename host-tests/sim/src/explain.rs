@@ -36,9 +36,6 @@ pub fn scene(scene: &Scene) -> String {
 }
 
 /// Lists the scenes of the library, each with its description.
-///
-/// # Errors
-/// The library cannot be read, or a scene of it has a mistake.
 pub fn list() -> Result<String, Box<dyn std::error::Error + Send + Sync>> {
     let names = library::names()?;
     let width = names.iter().map(String::len).max().unwrap_or(0);

@@ -2,17 +2,6 @@
 //!
 //! The plant is a finger in the world of scenes, with these differences: its effects are part of its [`Setup`], it can
 //! be broken during a run ([`Faults`]), its rows are driven pin by pin, and a snapshot by serde restores every bit.
-//!
-//! ```
-//! use sim::bridge::Bridge;
-//! use sim::plant::{Plant, Setup};
-//!
-//! let mut plant = Plant::new(&Setup::default());
-//! while plant.force_n() < 1.0 {
-//!     plant.advance(10e-6, Bridge::Driven { duty: 0.3 });
-//! }
-//! assert!(plant.pressure_kpa(5, 5) > 0.0);
-//! ```
 
 pub use crate::setup::Setup;
 

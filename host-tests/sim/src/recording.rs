@@ -130,10 +130,7 @@ fn core() -> Value {
     })
 }
 
-/// Checks a file: every byte of it is covered by a checksum, or has fixed contents.
-///
-/// # Errors
-/// The file is cut off or changed. The text names the part.
+/// Checks a file: every byte of it is covered by a checksum, or has fixed contents. The error names the part.
 pub fn check(bytes: &[u8]) -> Result<(), RunError> {
     let options = LinearReaderOptions::default()
         .with_emit_chunks(true)
@@ -233,9 +230,6 @@ struct Core {
 }
 
 /// Replays a file.
-///
-/// # Errors
-/// The file cannot be read, is damaged, or is not a complete recording of this project.
 pub fn replay(path: &Path) -> Result<Replay, RunError> {
     let bytes = fs::read(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
     replay_bytes(&bytes).map_err(|error| format!("{}: {error}", path.display()).into())

@@ -39,9 +39,6 @@ pub struct Scene {
 
 impl Scene {
     /// Returns the values of a table.
-    ///
-    /// # Panics
-    /// No such table is described.
     pub fn table(&self, name: &str) -> &Values {
         let found = self.tables.iter().find(|(known, _)| *known == name);
         &found.unwrap_or_else(|| panic!("no table [{name}] is described")).1

@@ -49,9 +49,6 @@ struct Task<'a> {
 }
 
 /// Runs the sweep or the shard and writes its files. Returns their folder too. A sweep that was stopped continues.
-///
-/// # Errors
-/// The scene has a mistake at a point, a run fails, a file cannot be written, or another process writes it.
 pub fn sweep(plan: &Plan, board: Run) -> Result<(Table, PathBuf), RunError> {
     let seeds = usize::try_from(plan.seeds).unwrap_or(usize::MAX);
     let mut counts = plan.vary.iter().map(|vary| vary.values.len());

@@ -94,9 +94,6 @@ pub fn missed(checks: &[Check]) -> usize {
 
 impl Forces {
     /// Takes the figures of a run.
-    ///
-    /// # Errors
-    /// The tip touched nothing, or a force was never reached.
     pub fn of(run: &Run) -> Result<Self, DemoError> {
         let (mut touch, mut steps, mut release) = (None, Vec::new(), None);
         for (place, asked) in run.goals.iter().enumerate() {

@@ -141,9 +141,6 @@ impl<E: Set> Bench<E> {
     }
 
     /// Makes a measuring motion and calls `each` after every frame. Returns how the motion ended.
-    ///
-    /// # Panics
-    /// The motion does not end within 30 s.
     pub fn measure(&mut self, task: Task, mut each: impl FnMut(&mut Self)) -> MeasureStatus {
         self.request(task);
         let request = self.command().measure_request;
@@ -222,9 +219,6 @@ const SCENE: &str = "about = \"the plant\"\nduration_s = 1.0\n[world]\nstep_us =
 
 impl Bench {
     /// Creates the finger of the plant under a controller: at rest, torque off, not tared.
-    ///
-    /// # Panics
-    /// The contact is too stiff for steps of 10 us.
     pub fn of(setup: &Setup, config: &Config) -> Self {
         let scene = read("plant", SCENE, &[]).expect("the plant's scene is one");
         let parts = core::iter::once(Reference::parts(setup));

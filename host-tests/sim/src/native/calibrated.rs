@@ -94,9 +94,6 @@ pub fn board(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, RunError> 
 }
 
 /// Calibrates a finger in front of the plate of its scene. The finger has the result in the end.
-///
-/// # Errors
-/// The scene cannot be simulated, or the parameters found are not valid.
 pub fn calibrate(bench: &mut Bench<Named>, scene: &Scene) -> Result<Calibrated, RunError> {
     let mut params = scene.params();
     let (mut presses, mut refused) = (Vec::new(), Vec::new());

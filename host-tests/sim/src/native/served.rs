@@ -339,10 +339,7 @@ help                 says this
 ";
 
 impl<E: Set> Bus<E> {
-    /// Carries out a line of text and returns what was done.
-    ///
-    /// # Errors
-    /// The line is not a command or cannot be carried out. The text is for people.
+    /// Carries out a line of text and returns what was done. The error is for people.
     pub fn command(&mut self, text: &str) -> Result<String, String> {
         let words: Vec<&str> = text.split_whitespace().collect();
         match words[..] {

@@ -175,10 +175,7 @@ pub fn folder() -> PathBuf {
     Path::new(env!("FINGERTIP_ROOT")).join("host-tests/sim/populations")
 }
 
-/// Loads a population by its path, or by its name in the project.
-///
-/// # Errors
-/// No such population, or a mistake in its file. The text is for people.
+/// Loads a population by its path, or by its name in the project. The error is for people.
 pub fn load(name: &str) -> Result<Population, String> {
     let (path, text) = library::find(&folder(), "population", name)?;
     let file = path.to_string_lossy();

@@ -138,9 +138,6 @@ impl Report {
     }
 
     /// Merges shards. The result is the same, byte for byte, as that of the whole.
-    ///
-    /// # Errors
-    /// The shards are not of one population, a finger is missing or duplicate, or a file cannot be read.
     pub fn merge(files: &[PathBuf]) -> Result<Self, RunError> {
         let mut whole: Option<Self> = None;
         let mut fingers = BTreeMap::new();
@@ -239,10 +236,7 @@ impl Report {
         Ok(serde_json::to_string_pretty(self)? + "\n")
     }
 
-    /// Writes the report for scripts.
-    ///
-    /// # Errors
-    /// The file cannot be written. An earlier file remains.
+    /// Writes the report for scripts. After a failure an earlier file remains.
     pub fn write(&self, path: &Path) -> Result<(), RunError> {
         Ok(kept::write(path, self.json()?).map_err(|error| cannot_write(path, &error))?)
     }

@@ -48,9 +48,6 @@ struct Finger {
 impl Recorder {
     /// Records into a new file, which appears under its name when it is finished, with the scalars of each `every`-th
     /// step.
-    ///
-    /// # Errors
-    /// The file cannot be created, or another process records there.
     pub fn new(path: &Path, scene: &Scene, every: u64) -> Result<Self, RunError> {
         let file = Whole::create(path).map_err(|error| cannot_write(path, &error))?;
         let library = concat!("fingertip-sim/", env!("CARGO_PKG_VERSION"));
@@ -75,10 +72,7 @@ impl Recorder {
         self
     }
 
-    /// Closes the file after the run and moves it to its place.
-    ///
-    /// # Errors
-    /// Something could not be written. An earlier file remains.
+    /// Closes the file after the run and moves it to its place. After a failure an earlier file remains.
     pub fn finish(mut self, digest: &str) -> Result<(), RunError> {
         let path = std::mem::take(&mut self.path);
         if !self.begun {

@@ -161,7 +161,8 @@ impl Tracks {
 #[derive(Clone, Debug)]
 pub struct Trace {
     duration_s: f64,
-    other: Option<Path>,
+    /// Path of another board, if the difference from it is drawn too.
+    pub other: Option<Path>,
     /// Fingers in order.
     pub fingers: Vec<Tracks>,
 }
@@ -170,11 +171,6 @@ impl Trace {
     /// Trace of a run of this length.
     pub fn new(duration_s: f64) -> Self {
         Self { duration_s, other: None, fingers: Vec::new() }
-    }
-
-    /// Draws the difference from the path of another board too.
-    pub fn compare_with(&mut self, other: Path) {
-        self.other = Some(other);
     }
 
     fn map_is_due(&self, finger: usize, time_s: f64) -> bool {

@@ -7,9 +7,6 @@ use toml_edit::{DocumentMut, Item, Table, Value as TomlValue};
 
 /// Sets `table.key` (`effects.noise.rms_codes`, `script.0.goal_n`, `seed`) of a text to a value in TOML. Comments
 /// remain. The reader checks the value later.
-///
-/// # Errors
-/// The text or the value is not TOML, or there is no such place.
 pub fn set(text: &str, path: &str, value: &str) -> Result<String, String> {
     let mut document: DocumentMut = text.parse().map_err(|error: toml_edit::TomlError| error.message().to_owned())?;
     let mut value: TomlValue = value.parse().map_err(|_| format!("{path}={value}: `{value}` is not a TOML value"))?;

@@ -128,9 +128,6 @@ fn refuse_others(file: &Path, id: &str) -> Result<(), RunError> {
 }
 
 /// Merges shards.
-///
-/// # Errors
-/// The shards are not of one sweep, a run is missing or duplicate, or a file cannot be read or written.
 pub fn merge(files: &[PathBuf], out: &Path) -> Result<Table, RunError> {
     let table = table(files)?;
     make_folder(out)?;

@@ -31,7 +31,6 @@ pub struct HeldImage {
     pub pressures_kpa: Pressures,
 }
 
-/// Goal and the response to it.
 #[derive(Clone, Debug)]
 pub struct Asked {
     /// Time at which the goal reached the controller.
@@ -42,7 +41,6 @@ pub struct Asked {
     pub meter: Meter,
 }
 
-/// Result of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Run {
     /// Goals in order.
@@ -79,7 +77,6 @@ pub fn scene(quick: bool) -> Result<Scene, DemoError> {
     Ok(scene)
 }
 
-/// Text for a goal.
 pub fn what(goal_n: f64) -> String {
     if goal_n > 0.0 { format!("hold {goal_n} N") } else { "let go".into() }
 }

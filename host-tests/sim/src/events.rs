@@ -76,7 +76,6 @@ pub fn own_keys(kind: &Table) -> &'static [Key] {
     &kind.keys[EVENT.keys.len()..]
 }
 
-/// An event.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Event {
     /// Start of the event, from the scene's start.

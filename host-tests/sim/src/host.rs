@@ -24,7 +24,6 @@ use crate::scene::{Goal, Scene};
 use fingertip::pipeline::Status;
 use std::collections::VecDeque;
 
-/// Host of one finger.
 #[derive(Clone, Debug, Default)]
 pub struct Host {
     script: Vec<Goal>,
@@ -183,7 +182,6 @@ const BEARS: f64 = 0.25;
 const AHEAD: f64 = 1.1;
 const AFTER_SLIP: f64 = 1.25;
 
-/// Values of a reading.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reading {
     pub force_n: f64,
@@ -192,7 +190,6 @@ pub struct Reading {
 }
 
 impl Reading {
-    /// Reading of a controller.
     pub fn of(status: &Status) -> Self {
         let contact = &status.contact;
         Self {

@@ -22,7 +22,6 @@ use std::sync::LazyLock;
 /// Most fingers of a scene.
 const FINGERS: usize = 2;
 
-/// Metric of a run.
 #[derive(Clone, Copy)]
 pub struct Metric {
     /// Name, with its unit last.

@@ -57,7 +57,6 @@ impl Plant {
         &mut self.world.fingers_mut()[0]
     }
 
-    /// Setup of the finger.
     pub fn setup(&self) -> &Setup {
         self.finger().setup()
     }
@@ -225,7 +224,6 @@ impl core::fmt::Debug for Plant {
     }
 }
 
-/// State of a taxel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Taxel {
     #[default]
@@ -246,7 +244,6 @@ pub enum Row {
     StuckLow,
 }
 
-/// Defects of the array.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ArrayFaults {
     pub taxels: [[Taxel; COLUMNS]; ROWS],

@@ -31,7 +31,6 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// Population of fingers.
 #[derive(Clone, Debug)]
 pub struct Population {
     /// The file's name without its ending.
@@ -76,7 +75,6 @@ pub struct Counted {
     pub above: f64,
 }
 
-/// Drawn finger.
 #[derive(Clone, Debug)]
 pub struct Finger {
     /// Value of each variable and of each drawn key.

@@ -188,7 +188,6 @@ pub fn texts<'a>(texts: impl IntoIterator<Item = &'a [u8]>) -> String {
     format!("{:032x}", digest.finish_128())
 }
 
-/// Result of a replay.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Replay {
     /// Steps of all fingers, up to the first difference.

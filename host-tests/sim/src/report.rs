@@ -15,7 +15,6 @@ use crate::scene::Scene;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use output::plot::PlotError;
 
-/// Contents of a page.
 #[derive(Clone, Copy)]
 pub struct Report<'a> {
     pub scene: &'a Scene,

@@ -14,7 +14,6 @@ pub type RunError = Box<dyn Error + Send + Sync>;
 /// Board that runs a scene.
 pub type Run<'a> = &'a (dyn Fn(&Scene, &mut dyn Watch) -> Result<Summary, RunError> + Sync);
 
-/// Result of a run.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     pub measured: Measured,

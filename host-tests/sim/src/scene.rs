@@ -117,7 +117,6 @@ impl Scene {
     }
 }
 
-/// Goal of the host.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Goal {
     /// Time from the start.

@@ -20,7 +20,6 @@ use indicatif::{ProgressBar, ProgressStyle};
 use output::say;
 use std::path::{Path, PathBuf};
 
-/// Plan of a sweep.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// Path of a scene, or its name in the library.
@@ -40,7 +39,6 @@ pub const FOLDER: &str = "target/sweep";
 /// Most points or runs: more would take weeks and too much memory, so they are probably a typing error.
 const MOST: usize = 1_000_000;
 
-/// Run of the sweep.
 struct Task<'a> {
     number: usize,
     values: &'a [String],
@@ -123,7 +121,6 @@ fn points(plan: &Plan) -> Result<Vec<(Vec<String>, Scene)>, RunError> {
     combinations.into_iter().map(point).collect()
 }
 
-/// Key and its values as TOML.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Vary {
     pub key: String,

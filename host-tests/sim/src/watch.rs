@@ -97,7 +97,6 @@ pub trait Watch {
     fn step(&mut self, step: &Step);
 }
 
-/// Cost of an effect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cost {
     pub effect: &'static str,
@@ -106,7 +105,6 @@ pub struct Cost {
     pub seconds: f64,
 }
 
-/// Summary of a run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Summary {
     pub virtual_s: f64,

@@ -4,8 +4,7 @@ use crate::demo::{Asked, DemoError, HeldImage, Run};
 use crate::optimal::minimum_time_s;
 use crate::setup::Setup;
 use fingertip::params::Params;
-use output::plot;
-use output::plot::{Map, Panel, Sample};
+use output::plot::{self, Map, Panel, Sample};
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -55,7 +54,6 @@ pub struct Step {
     pub settling_to_optimal_ratio: Option<f64>,
 }
 
-/// Release of the object.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Release {
     /// Time from the goal of 0 to the end of the last contact; none while something is touched.

@@ -58,15 +58,11 @@ pub trait Stages {
     fn chip_c(&self, _time_s: f64) -> Option<f64> {
         None
     }
-    /// Calls the effects of the stage, in order.
+    /// Calls the effects of the stage, in order, as the methods below do for theirs.
     fn pressure(&mut self, _row: usize, _time_s: f64, _kpa: &mut Row) {}
-    /// Like [`Stages::pressure`].
     fn conductance(&mut self, _row: usize, _time_s: f64, _siemens: &mut Row) {}
-    /// Like [`Stages::pressure`].
     fn network(&mut self, _row: usize, _array: &[Row; ROWS], _seen: &mut Row) {}
-    /// Like [`Stages::pressure`].
     fn volts(&mut self, _slot: usize, _time_s: f64, _volts: &mut Row) {}
-    /// Like [`Stages::pressure`].
     fn codes(&mut self, _slot: usize, _time_s: f64, _codes: &mut Row) {}
 }
 

@@ -51,7 +51,6 @@ struct Allowed {
     travel_mm: f64,
 }
 
-/// Conduct of one finger.
 #[derive(Clone, Debug, Default)]
 pub struct Conduct {
     allowed: Allowed,

@@ -44,7 +44,6 @@ impl Squares {
     }
 }
 
-/// Measurements of one finger.
 #[derive(Clone, Debug, Default)]
 pub struct Finger {
     last_s: Option<f64>,

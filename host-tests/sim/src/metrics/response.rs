@@ -5,7 +5,6 @@ const SETTLED_SHARE: f64 = 0.02;
 /// Time after the change of the goal from which on the steady error counts.
 const STEADY_AFTER_S: f64 = 0.1;
 
-/// Response to one goal.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Response {
     from_n: f64,
@@ -82,7 +81,6 @@ fn crossing_s(before: Option<[f64; 2]>, [after_s, after]: [f64; 2], part: f64) -
     before_s + (after_s - before_s) * low / (low - high)
 }
 
-/// Value at a goal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AtGoal {
     pub goal_n: f64,
@@ -104,7 +102,6 @@ const COUNTS_MM: f64 = 1e-3;
 /// Time without motion after which a slip is over.
 const OVER_S: f64 = 0.01;
 
-/// Slips of a run.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Slips {
     under_way: Option<Slip>,

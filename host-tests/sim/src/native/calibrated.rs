@@ -221,7 +221,6 @@ const TEST_HOLD_S: f64 = 1.5;
 const TESTS: [(&str, f64, bool); 3] =
     [("1 N", 1.0, false), ("5 N, centred", 5.0, false), ("5 N, off the centre", 5.0, true)];
 
-/// Finger before and after its calibration.
 #[derive(Clone, Debug)]
 pub struct Unlike {
     pub calibrated: Calibrated,

@@ -4,7 +4,6 @@ use crate::effects::normal_within_3;
 use fastrand::Rng;
 use serde::Serialize;
 
-/// Drawn value.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Drawn {

@@ -50,7 +50,6 @@ pub struct Ran {
     pub digest: String,
 }
 
-/// Promise of the envelope.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Promise {
     pub metric: String,

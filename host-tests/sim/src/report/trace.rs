@@ -98,7 +98,6 @@ impl Track {
     }
 }
 
-/// The array at an instant.
 #[derive(Clone, Debug)]
 pub struct Instant {
     pub time_s: f64,

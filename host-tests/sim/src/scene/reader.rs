@@ -375,7 +375,6 @@ pub(crate) fn item_span(table: &dyn TableLike, name: &str) -> Range<usize> {
     table.get(name).and_then(Item::span).unwrap_or_else(|| key_span(table, name))
 }
 
-/// Mistake in a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SceneError {
     pub file: String,

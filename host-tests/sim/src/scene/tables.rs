@@ -5,7 +5,6 @@ use crate::events::{EVENT, KINDS};
 use fingertip::params::Params;
 use std::fmt;
 
-/// Table of a scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Table {
     pub name: &'static str,
@@ -187,7 +186,6 @@ const CONTROLLER: [Key; Params::COUNT] = {
     keys
 };
 
-/// Key of a table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Key {
     /// Name, with its unit as a suffix if it has one: `rms_codes`, `radius_mm`.
@@ -296,7 +294,6 @@ impl Key {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Values(Vec<(&'static str, Value)>);
 
-/// Checked value.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
     /// Value of [`Kind::Number`] and [`Kind::Optional`].

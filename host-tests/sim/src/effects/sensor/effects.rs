@@ -344,7 +344,6 @@ fn short_circuit(driven: usize, array: &[Row; ROWS], hold: f64) -> Row {
     core::array::from_fn(|j| (open[j] / diagonal[j]).max(0.0))
 }
 
-/// Settling of the columns.
 pub struct Settling {
     tau_s: f64,
     /// Share of a difference that remains at the sample.

@@ -82,19 +82,23 @@ pub enum Part {
     Network(Box<sensor::Network>),
     Volts(Box<sensor::Volts>),
     Codes(Box<sensor::Codes>),
-    Shape(Box<dyn contact::Shape>),
-    Memory(Box<dyn contact::Memory>),
-    Series(Box<contact::Series>),
-    Strength(Box<dyn contact::Strength>),
-    Tangent(Box<contact::Tangent>),
-    Body(Box<contact::Body>),
+    Shape(Box<contact::Surface>),
+    Memory(Box<contact::Relaxation>),
+    /// Compliance of the object behind its surface, mm/N.
+    Series(Box<f64>),
+    Strength(Box<contact::BreakableObject>),
+    /// Friction along the surface.
+    Tangent(Box<contact::Grip>),
+    /// Mass of an object that can move, kg.
+    Body(Box<f64>),
     Inertia(Box<drive::Inertia>),
     Electric(Box<dyn drive::Electric>),
     Resist(Box<drive::Resist>),
-    Potential(Box<dyn drive::Potential>),
+    Potential(Box<drive::Cogging>),
     Play(Box<drive::Play>),
     Encoder(Box<drive::Encoder>),
-    Clock(Box<link::Clock>),
+    /// Duration of a second of the controller in the world, s.
+    Clock(Box<f64>),
     Packets(Box<link::Packets>),
 }
 
@@ -217,7 +221,7 @@ pub(crate) fn waiting_s(rng: &mut Rng, rate_per_s: f64) -> f64 {
 /// Effects of one finger by family.
 pub struct Parts<E: Set + ?Sized> {
     pub sensor: E::Sensor,
-    pub contact: E::Contact,
+    pub contact: contact::Named,
     pub drive: E::Drive,
     /// Effects on clock and bus.
     pub link: E::Link,
@@ -228,7 +232,6 @@ pub trait Set {
     /// Effects on the array.
     type Sensor: sensor::Stages;
     /// Effects on the contact.
-    type Contact: contact::Stages;
     /// Effects on the drive.
     type Drive: drive::Stages;
     /// Effects on clock and bus.
@@ -237,20 +240,19 @@ pub trait Set {
     fn of(scene: &Scene, finger: usize) -> Parts<Self>;
 
     /// Cost of each effect so far.
-    fn costs(sensor: &Self::Sensor, contact: &Self::Contact, drive: &Self::Drive, link: &Self::Link) -> Vec<Cost>;
+    fn costs(sensor: &Self::Sensor, contact: &contact::Named, drive: &Self::Drive, link: &Self::Link) -> Vec<Cost>;
 }
 
 impl Set for () {
     type Sensor = ();
-    type Contact = ();
     type Drive = ();
     type Link = ();
 
     fn of(_scene: &Scene, _finger: usize) -> Parts<Self> {
-        Parts { sensor: (), contact: (), drive: (), link: () }
+        Parts { sensor: (), contact: contact::Named::default(), drive: (), link: () }
     }
 
-    fn costs(_sensor: &(), _contact: &(), _drive: &(), _link: &()) -> Vec<Cost> {
+    fn costs(_sensor: &(), _contact: &contact::Named, _drive: &(), _link: &()) -> Vec<Cost> {
         Vec::new()
     }
 }
@@ -260,7 +262,6 @@ pub struct Named;
 
 impl Set for Named {
     type Sensor = sensor::Named;
-    type Contact = contact::Named;
     type Drive = drive::Named;
     type Link = link::Named;
 

@@ -6,6 +6,7 @@
 pub use crate::setup::Setup;
 
 use crate::bridge::Bridge;
+use crate::effects::contact;
 use crate::effects::drive::{self, Circuit, Friction};
 use crate::effects::sensor::effects::Settling;
 use crate::effects::sensor::{self, Readout};
@@ -44,16 +45,16 @@ struct Kept {
 impl Plant {
     /// Creates a plant at rest at travel 0, with the bridge open.
     pub fn new(setup: &Setup) -> Self {
-        let world = World::new(setup, &Surroundings::default(), vec![(Drive::new(setup), ())]);
+        let world = World::new(setup, &Surroundings::default(), vec![(Drive::new(setup), contact::Named::default())]);
         let (sensor, readout) = (Sensor::new(&setup.array), Readout::new(&setup.array));
         Self { faults: Faults::default(), world, sensor, readout }
     }
 
-    fn finger(&self) -> &Finger<Drive, ()> {
+    fn finger(&self) -> &Finger<Drive> {
         &self.world.fingers()[0]
     }
 
-    fn finger_mut(&mut self) -> &mut Finger<Drive, ()> {
+    fn finger_mut(&mut self) -> &mut Finger<Drive> {
         &mut self.world.fingers_mut()[0]
     }
 
@@ -282,13 +283,17 @@ pub struct Reference;
 
 impl Reference {
     pub fn parts(setup: &Setup) -> Parts<Self> {
-        Parts { sensor: Sensor::new(&setup.array), contact: (), drive: Drive::new(setup), link: () }
+        Parts {
+            sensor: Sensor::new(&setup.array),
+            contact: contact::Named::default(),
+            drive: Drive::new(setup),
+            link: (),
+        }
     }
 }
 
 impl Set for Reference {
     type Sensor = Sensor;
-    type Contact = ();
     type Drive = Drive;
     type Link = ();
 
@@ -296,7 +301,7 @@ impl Set for Reference {
         Self::parts(&scene.setup())
     }
 
-    fn costs(_sensor: &Sensor, _contact: &(), _drive: &Drive, _link: &()) -> Vec<Cost> {
+    fn costs(_sensor: &Sensor, _contact: &contact::Named, _drive: &Drive, _link: &()) -> Vec<Cost> {
         Vec::new()
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::bridge::Bridge;
 use crate::effects::Set;
-use crate::effects::contact::Stages as _;
+use crate::effects::contact;
 use crate::effects::drive::Stages as _;
 use crate::events::{Event, Happened};
 use crate::mechanics::contact::{Contact, Place};
@@ -29,7 +29,7 @@ const PUT_BACK_MM_PER_S: f64 = 20.0;
 
 /// Fingers and their object.
 pub struct World<E: Set> {
-    fingers: Vec<Finger<E::Drive, E::Contact>>,
+    fingers: Vec<Finger<E::Drive>>,
     around: Surroundings,
     /// Mass of the object; none if it is fixed.
     mass_kg: Option<f64>,
@@ -48,12 +48,12 @@ fn side(finger: usize) -> f64 {
 
 impl<E: Set> World<E> {
     /// Creates a world of one finger or two.
-    pub fn new(setup: &Setup, around: &Surroundings, effects: Vec<(E::Drive, E::Contact)>) -> Self {
-        let mut fingers: Vec<Finger<E::Drive, E::Contact>> =
+    pub fn new(setup: &Setup, around: &Surroundings, effects: Vec<(E::Drive, contact::Named)>) -> Self {
+        let mut fingers: Vec<Finger<E::Drive>> =
             effects.into_iter().map(|(drive, contact)| Finger::new(setup, drive, contact)).collect();
         let mass_kg = fingers[0].contact.effects.mass_kg().filter(|kg| *kg > 0.0);
         let body = Body::default();
-        let bare = fingers.iter().all(|finger| finger.contact.effects.none());
+        let bare = fingers.iter().all(|finger| !finger.contact.effects.any());
         Self {
             fingers,
             around: around.clone(),
@@ -84,12 +84,12 @@ impl<E: Set> World<E> {
         Ok(())
     }
 
-    pub fn fingers(&self) -> &[Finger<E::Drive, E::Contact>] {
+    pub fn fingers(&self) -> &[Finger<E::Drive>] {
         &self.fingers
     }
 
     /// Fingers, to place or launch them.
-    pub fn fingers_mut(&mut self) -> &mut [Finger<E::Drive, E::Contact>] {
+    pub fn fingers_mut(&mut self) -> &mut [Finger<E::Drive>] {
         &mut self.fingers
     }
 
@@ -160,7 +160,7 @@ impl<E: Set> World<E> {
         for (index, finger) in self.fingers.iter_mut().enumerate() {
             let [from, to] = [&self.body_before, &self.body].map(|body| surface_mm(finger.setup(), index, body));
             let end =
-                finger.solve(|contact: &Contact<_>, from_mm, to_mm| contact.law().mean_n(from_mm - from, to_mm - to));
+                finger.solve(|contact: &Contact, from_mm, to_mm| contact.law().mean_n(from_mm - from, to_mm - to));
             finger.finish(&end, to);
         }
         if !self.bare {

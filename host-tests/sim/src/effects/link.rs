@@ -6,9 +6,6 @@ use crate::scene::tables::{Key, Kind};
 use crate::watch::Cost;
 use fingertip::link::packet::{CRC_START, HEADER, instruction, update_crc};
 
-/// Effect on the clock of the controller: duration of one of its seconds in the world from a time on, s.
-pub type Clock = dyn FnMut(f64) -> f64 + Send;
-
 /// Effect on packets from the host: time of arrival for a time of sending, s; none if the packet is lost.
 pub type Packets = dyn FnMut(f64) -> Option<f64> + Send;
 
@@ -28,14 +25,14 @@ pub trait Stages {
 impl Stages for () {}
 
 named! {
-    Clock(clock: Clock),
+    Clock(clock: f64),
     Packets(packets: Packets),
 }
 
 impl Stages for Named {
     #[inline]
-    fn second_s(&mut self, time_s: f64) -> f64 {
-        self.clock.iter_mut().map(|effect| effect.call(|part| part(time_s))).product()
+    fn second_s(&mut self, _time_s: f64) -> f64 {
+        self.clock.iter_mut().map(|effect| effect.call(|part| *part)).product()
     }
 
     fn pass(&mut self, sent_s: f64) -> Option<f64> {
@@ -55,7 +52,7 @@ pub const EFFECTS: &[Description] = &[
         zero: &[("fast_ppm", 0.0)],
         build: |build: &Build| {
             let second_s = 1.0 / (1.0 + build.number("fast_ppm") * 1e-6);
-            Part::Clock(Box::new(move |_| second_s))
+            Part::Clock(Box::new(second_s))
         },
     },
     Description {

@@ -1,6 +1,6 @@
 //! Contact of one finger: normal force, pressures on the taxels, and friction along the surface.
 
-use crate::effects::contact::{Grip, Stages};
+use crate::effects::contact::{Grip, Named};
 use crate::mechanics::normal::{Elastic, Law};
 use crate::mechanics::pressures::{Between, Pressures};
 use crate::mechanics::shape;
@@ -8,8 +8,8 @@ use crate::setup::Setup;
 use fingertip::shipped::COLUMNS;
 
 /// Contact of one finger, with its effects.
-pub struct Contact<C> {
-    pub effects: C,
+pub struct Contact {
+    pub effects: Named,
     pub along: Along,
     elastic: Elastic,
     /// Indentations, each with the centre of pressure; empty on a plane.
@@ -47,8 +47,8 @@ pub struct Along {
     pub slipping: f64,
 }
 
-impl<C: Stages> Contact<C> {
-    pub fn new(setup: &Setup, mut effects: C) -> Self {
+impl Contact {
+    pub fn new(setup: &Setup, mut effects: Named) -> Self {
         effects.shape_built();
         let (elastic, centres) = if effects.shaped() {
             shape::tables(&effects, &setup.tip)

@@ -14,8 +14,8 @@ const ROUNDS: usize = 40;
 const TOLERANCE: f64 = 1e-15;
 
 /// Finger with the effects on its drive.
-pub struct Finger<D, C> {
-    pub contact: Contact<C>,
+pub struct Finger<D> {
+    pub contact: Contact,
     pub drive: D,
     setup: Setup,
     rotor: Rotor,
@@ -47,9 +47,9 @@ pub struct End {
     square_a2_s: f64,
 }
 
-impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
+impl<D: drive::Stages> Finger<D> {
     /// Creates a finger at rest at travel 0, with the bridge open.
-    pub fn new(setup: &Setup, mut drive: D, contact: C) -> Self {
+    pub fn new(setup: &Setup, mut drive: D, contact: contact::Named) -> Self {
         let mm_per_rad = setup.transmission.drum_radius_mm / setup.transmission.ratio;
         let rotor = Rotor {
             inertia_kg_m2: setup.motor.inertia_kg_m2 + drive.inertia_kg_m2(mm_per_rad * 1e-3),
@@ -115,7 +115,7 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
     }
 
     /// Returns the end of the prepared step against a load: its mean between two places of the pressing flank.
-    pub fn solve(&mut self, load_n: impl Fn(&Contact<C>, f64, f64) -> f64) -> End {
+    pub fn solve(&mut self, load_n: impl Fn(&Contact, f64, f64) -> f64) -> End {
         let mut acting = Acts {
             alone: self.drive.none(),
             drive: &mut self.drive,

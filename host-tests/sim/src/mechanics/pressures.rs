@@ -13,7 +13,7 @@
 //! The tip on a rigid plane is that of Park, Kim and Hirai, "Development of a Soft-fingertip and Its Modeling Based on
 //! Force Distribution", ICRA 2003.
 
-use crate::effects::contact::Stages;
+use crate::effects::contact::Named;
 use crate::mechanics::shape;
 use crate::setup::{Setup, Tip};
 use core::f64::consts::PI;
@@ -87,11 +87,11 @@ impl Pressures {
     }
 
     #[inline]
-    pub fn row_kpa(&mut self, stages: &impl Stages, between: &Between, row: usize) -> Row {
+    pub fn row_kpa(&mut self, effects: &Named, between: &Between, row: usize) -> Row {
         let mut kpa = [0.0; COLUMNS];
         if between.peak_kpa > 0.0 {
             while let Err(missing) = self.sum(between, row, &mut kpa) {
-                self.work_out(stages, missing);
+                self.work_out(effects, missing);
             }
         }
         kpa
@@ -131,7 +131,7 @@ impl Pressures {
 
     /// Computes the knots around a root at the first contact there. Cold, so that the work for each row stays fast.
     #[cold]
-    fn work_out(&mut self, stages: &impl Stages, around: Around) {
+    fn work_out(&mut self, effects: &Named, around: Around) {
         let shift_mm = (around.place as f64 - PLACES as f64) * PLACE_MM;
         let centre_mm = [self.centre_mm[0], self.centre_mm[1] + shift_mm];
         let (tip, pitch_mm, points) = (&self.tip, self.pitch_mm, &mut self.points[around.place]);
@@ -145,8 +145,8 @@ impl Pressures {
             knot.get_or_insert_with(|| {
                 if d_mm == 0.0 {
                     Box::new([[0.0; COLUMNS]; ROWS])
-                } else if stages.shaped() {
-                    let points = points.get_or_insert_with(|| shape::Points::of(stages, tip, cells()));
+                } else if effects.shaped() {
+                    let points = points.get_or_insert_with(|| shape::Points::of(effects, tip, cells()));
                     by_row(points.means(d_mm).map(|share| share * tip.radius_mm / d_mm))
                 } else {
                     let (flattened, peak_kpa) = (tip.flattened(d_mm), tip.modulus_kpa * d_mm / tip.radius_mm);

@@ -4,7 +4,6 @@
 
 use crate::bridge::Bridge;
 use crate::effects::Set;
-use crate::effects::contact::Stages as _;
 use crate::mechanics::finger::Finger;
 use crate::native::{Begun, Board, SimError, Unit};
 use crate::plant::{Faults, Reference};
@@ -75,7 +74,7 @@ impl<E: Set> Bench<E> {
         &self.board.units[0]
     }
 
-    fn finger_mut(&mut self) -> &mut Finger<E::Drive, E::Contact> {
+    fn finger_mut(&mut self) -> &mut Finger<E::Drive> {
         &mut self.board.world.fingers_mut()[0]
     }
 

@@ -224,36 +224,37 @@ pub struct Parts<E: Set + ?Sized> {
     pub contact: contact::Named,
     pub drive: E::Drive,
     /// Effects on clock and bus.
-    pub link: E::Link,
+    pub link: link::Named,
+}
+
+impl<E: Set> Parts<E> {
+    /// Effects on array and drive alone.
+    pub fn new(sensor: E::Sensor, drive: E::Drive) -> Self {
+        Self { sensor, contact: contact::Named::default(), drive, link: link::Named::default() }
+    }
 }
 
 /// Set of effects: [`Named`], or `()`, which has none compiled in.
 pub trait Set {
     /// Effects on the array.
     type Sensor: sensor::Stages;
-    /// Effects on the contact.
     /// Effects on the drive.
     type Drive: drive::Stages;
-    /// Effects on clock and bus.
-    type Link: link::Stages;
 
     fn of(scene: &Scene, finger: usize) -> Parts<Self>;
 
     /// Cost of each effect so far.
-    fn costs(sensor: &Self::Sensor, contact: &contact::Named, drive: &Self::Drive, link: &Self::Link) -> Vec<Cost>;
+    fn costs(_: &Self::Sensor, _: &contact::Named, _: &Self::Drive, _: &link::Named) -> Vec<Cost> {
+        Vec::new()
+    }
 }
 
 impl Set for () {
     type Sensor = ();
     type Drive = ();
-    type Link = ();
 
     fn of(_scene: &Scene, _finger: usize) -> Parts<Self> {
-        Parts { sensor: (), contact: contact::Named::default(), drive: (), link: () }
-    }
-
-    fn costs(_sensor: &(), _contact: &contact::Named, _drive: &(), _link: &()) -> Vec<Cost> {
-        Vec::new()
+        Parts::new((), ())
     }
 }
 
@@ -263,15 +264,9 @@ pub struct Named;
 impl Set for Named {
     type Sensor = sensor::Named;
     type Drive = drive::Named;
-    type Link = link::Named;
 
     fn of(scene: &Scene, finger: usize) -> Parts<Self> {
-        let mut parts: Parts<Self> = Parts {
-            sensor: sensor::Named::default(),
-            contact: contact::Named::default(),
-            drive: drive::Named::default(),
-            link: link::Named::default(),
-        };
+        let mut parts = Parts::<Self>::new(sensor::Named::default(), drive::Named::default());
         for (name, part) in registry::build(&scene.effects, scene.seed, finger) {
             let rest = parts.sensor.take(name, part).and_then(|part| parts.contact.take(name, part));
             let rest = rest.and_then(|part| parts.drive.take(name, part)).and_then(|part| parts.link.take(name, part));

@@ -9,7 +9,7 @@ pub mod calibrated;
 pub mod served;
 
 use crate::bridge::Bridge;
-use crate::effects::link::Stages as _;
+use crate::effects::link::{self, Stages as _};
 use crate::effects::sensor::{Readout, Stages as _};
 use crate::effects::{Named, Parts, Set};
 use crate::host::{Host, Reading};
@@ -88,7 +88,7 @@ struct Unit<E: Set> {
     pipeline: Pipeline,
     readout: Readout,
     sensor: E::Sensor,
-    link: E::Link,
+    link: link::Named,
     host: Host,
     frame: Frame,
     command: Command,

@@ -6,17 +6,15 @@
 pub use crate::setup::Setup;
 
 use crate::bridge::Bridge;
-use crate::effects::contact;
 use crate::effects::drive::{self, Circuit, Friction};
 use crate::effects::sensor::effects::Settling;
 use crate::effects::sensor::{self, Readout};
-use crate::effects::{Parts, Set};
+use crate::effects::{Parts, Set, contact};
 use crate::mechanics::decay;
 use crate::mechanics::finger::{Finger, Motion};
 use crate::mechanics::rotor::Shaft;
 use crate::scene::Scene;
 use crate::setup::Array;
-use crate::watch::Cost;
 use crate::world::{Surroundings, World};
 use fingertip::frame::Sense;
 use fingertip::shipped::{COLUMNS, Frame, ROWS, SLOTS};
@@ -283,26 +281,16 @@ pub struct Reference;
 
 impl Reference {
     pub fn parts(setup: &Setup) -> Parts<Self> {
-        Parts {
-            sensor: Sensor::new(&setup.array),
-            contact: contact::Named::default(),
-            drive: Drive::new(setup),
-            link: (),
-        }
+        Parts::new(Sensor::new(&setup.array), Drive::new(setup))
     }
 }
 
 impl Set for Reference {
     type Sensor = Sensor;
     type Drive = Drive;
-    type Link = ();
 
     fn of(scene: &Scene, _finger: usize) -> Parts<Self> {
         Self::parts(&scene.setup())
-    }
-
-    fn costs(_sensor: &Sensor, _contact: &contact::Named, _drive: &Drive, _link: &()) -> Vec<Cost> {
-        Vec::new()
     }
 }
 

@@ -6,7 +6,7 @@
 pub mod files;
 mod summary;
 
-pub(crate) use files::first_missing;
+pub(crate) use files::complete;
 pub use files::{Shard, merge};
 pub use summary::Table;
 

@@ -212,9 +212,8 @@ impl<E: Set> World<E> {
                     along.push(state);
                 }
                 let end = finger.solve(|_, _, _| mean_n);
-                let flank_mm = finger.flank_at_mm(&end);
-                changed_mm = changed_mm.max((flank_mm - flanks[index]).abs());
-                flanks[index] = flank_mm;
+                changed_mm = changed_mm.max((end.flank_mm - flanks[index]).abs());
+                flanks[index] = end.flank_mm;
                 ends.push(end);
             }
             let moved = body.moved(mass_kg, force_n, &self.around, time_s, dt_s);

@@ -111,7 +111,7 @@ impl Contact {
         }
         // At the first touch of a shaped surface both forces may round to 0.
         let elastic_n = self.elastic.force_n(d_mm);
-        Place { between, share: if elastic_n > 0.0 { law.of_depth_n(d_mm) / elastic_n } else { law.left } }
+        Place { between, share: if elastic_n > 0.0 { law.left * law.net_n(d_mm) / elastic_n } else { law.left } }
     }
 
     #[inline]

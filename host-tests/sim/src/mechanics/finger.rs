@@ -42,7 +42,9 @@ pub struct Motion {
 
 #[derive(Clone, Copy, Debug)]
 pub struct End {
-    pub shaft: Shaft,
+    shaft: Shaft,
+    /// Travel of the pressing flank.
+    pub flank_mm: f64,
     winding_a: f64,
     square_a2_s: f64,
 }
@@ -129,7 +131,8 @@ impl<D: drive::Stages> Finger<D> {
             square_a2_s: 0.0,
         };
         let shaft = self.rotor.advance(self.now.shaft, self.now.dt_s, &mut acting);
-        End { shaft, winding_a: acting.winding_a, square_a2_s: acting.square_a2_s }
+        let flank_mm = shaft.angle_rad * self.mm_per_rad;
+        End { shaft, flank_mm, winding_a: acting.winding_a, square_a2_s: acting.square_a2_s }
     }
 
     /// Moves to the end of the step, where the surface of the object is at this travel.
@@ -196,11 +199,6 @@ impl<D: drive::Stages> Finger<D> {
     /// Travel of the pressing flank of the gear; that of the tip while it presses.
     pub fn flank_mm(&self) -> f64 {
         self.now.shaft.angle_rad * self.mm_per_rad
-    }
-
-    /// Travel of the pressing flank at the end of a step.
-    pub fn flank_at_mm(&self, end: &End) -> f64 {
-        end.shaft.angle_rad * self.mm_per_rad
     }
 
     /// Travel of the pressing flank at a time within the last step.

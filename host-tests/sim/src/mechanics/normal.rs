@@ -48,10 +48,6 @@ impl Law<'_> {
         self.left * self.net_n(self.depth_mm(x_mm))
     }
 
-    pub fn of_depth_n(&self, d_mm: f64) -> f64 {
-        self.left * self.net_n(d_mm)
-    }
-
     /// Energy at an overlap, mJ.
     pub fn energy_mj(&self, x_mm: f64) -> f64 {
         let (d_mm, free_mm) = (self.depth_mm(x_mm), self.free_mm);
@@ -82,7 +78,7 @@ impl Law<'_> {
         self.left * (self.tip_mean_n(d0, d1) * tip_mm + 0.5 * (n0 + n1) * object_mm) / way_mm
     }
 
-    fn net_n(&self, d_mm: f64) -> f64 {
+    pub fn net_n(&self, d_mm: f64) -> f64 {
         (self.elastic.force_n(d_mm) - self.forgotten_n).max(0.0)
     }
 

@@ -5,7 +5,7 @@ use super::{Counted, Finger, Population};
 use crate::metrics::{Hold, shown};
 use crate::part::{cannot_write, check};
 use crate::run::{Outcome, RunError, asked};
-use crate::sweep::first_missing;
+use crate::sweep::complete;
 use output::kept;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -161,14 +161,7 @@ impl Report {
         if let Some(number) = fingers.keys().find(|number| !(1..=all).contains(*number)) {
             return Err(format!("there is a finger {number}, where there are {all} in all").into());
         }
-        if let Some(first) = first_missing(fingers.keys(), all) {
-            let missing = all - fingers.len();
-            return Err(format!(
-                "{missing} of {all} fingers are missing, finger {first} the first: is a shard missing?"
-            )
-            .into());
-        }
-        whole.fingers = fingers.into_values().collect();
+        whole.fingers = complete(fingers, all, "finger")?;
         whole.finish();
         Ok(whole)
     }

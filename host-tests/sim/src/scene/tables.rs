@@ -201,19 +201,16 @@ pub enum Kind {
     Number {
         min: f64,
         max: f64,
-        /// Value of a missing key.
         default: Option<f64>,
     },
     /// A whole number within bounds.
     Whole {
         min: i64,
         max: i64,
-        /// Value of a missing key.
         default: Option<i64>,
     },
     Word {
         words: &'static [&'static str],
-        /// Value of a missing key.
         default: Option<&'static str>,
     },
     /// A number within bounds, which may be left out: [`Values::optional`].
@@ -296,15 +293,10 @@ pub struct Values(Vec<(&'static str, Value)>);
 
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
-    /// Value of [`Kind::Number`] and [`Kind::Optional`].
     Number(f64),
-    /// Value of [`Kind::Whole`].
     Whole(i64),
-    /// Value of [`Kind::Word`].
     Word(&'static str),
-    /// Value of [`Kind::Text`].
     Text(String),
-    /// Value of [`Kind::Pairs`].
     Pairs(Vec<[i64; 2]>),
 }
 

@@ -161,11 +161,13 @@ impl Shard {
     }
 }
 
-/// Returns the first number from 1 to `all` that is missing among these, which are in order.
-pub(crate) fn first_missing<'a>(numbers: impl Iterator<Item = &'a usize>, all: usize) -> Option<usize> {
-    // The first place whose number differs is missing.
-    let mut numbers = numbers.copied();
-    (1..=all).find(|place| numbers.next() != Some(*place))
+/// Returns the rows of merged shards, which must have every number from 1 to `all`.
+pub(crate) fn complete<T>(rows: BTreeMap<usize, T>, all: usize, thing: &str) -> Result<Vec<T>, String> {
+    if let Some(first) = (1..=all).find(|number| !rows.contains_key(number)) {
+        let missing = all - rows.len();
+        return Err(format!("{missing} of {all} {thing}s are missing, {thing} {first} the first: is a shard missing?"));
+    }
+    Ok(rows.into_values().collect())
 }
 
 impl fmt::Display for Shard {
@@ -220,11 +222,7 @@ pub fn table(files: &[PathBuf]) -> Result<Table, RunError> {
         }
     }
     let ((_, all), Table { head, .. }) = sweep.zip(known).ok_or("there are no runs in these files")?;
-    if let Some(first) = first_missing(rows.keys(), all) {
-        let missing = all - rows.len();
-        return Err(format!("{missing} of {all} runs are missing, run {first} the first: is a shard missing?").into());
-    }
-    Ok(Table { head, rows: rows.into_values().collect() })
+    Ok(Table { head, rows: complete(rows, all, "run")? })
 }
 
 /// Checks the names of the columns.

@@ -1,12 +1,10 @@
 //! Comparison of two boards in a scene by their trajectories.
 //!
-//! Both begin with the script. They cannot be alike to the bit: a goal is taken up to two frames earlier or later, as
-//! the frames of the emulated board do not start with the script; its duty acts some microseconds earlier or later than
-//! that of the native board; its PWM counts in steps; and a row is sampled where its conversions begin, not at the end
-//! of its slot. Except for the steps of the PWM these are shifts in time. So the bound is a tube: at each time the
-//! second board lies between the least and the largest value of the first one within [`SHIFT_S`], or beyond them by at
-//! most [`BEYOND_N`] and [`BEYOND_MM`]. The loop rests within two counts of the encoder, so two boards may rest four
-//! counts apart, 4.4 um of the reference finger, on different sides of the goal.
+//! Both begin with the script. They cannot be alike to the bit: the emulated board takes a goal up to two frames earlier or
+//! later, its duty acts some microseconds apart, its PWM counts in steps, and a row is sampled where its conversions
+//! begin. Except for the steps of the PWM these are shifts in time. So the bound is a tube: at each time the second board
+//! lies between the least and the largest value of the first one within [`SHIFT_S`], or beyond them by at most [`BEYOND_N`]
+//! and [`BEYOND_MM`]. The loop rests within two counts of the encoder, so two boards may rest four counts, 4.4 um, apart.
 
 use crate::scene::Scene;
 use crate::watch::{Step, Watch};

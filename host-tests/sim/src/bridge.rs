@@ -4,7 +4,6 @@ use crate::metrics;
 use fingertip::pipeline::{self, Status};
 use serde::{Deserialize, Serialize};
 
-/// State of the bridge.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum Bridge {
     /// Both half bridges open.

@@ -79,10 +79,7 @@ impl Args {
         !self.list && !self.keys && !self.explain && self.replay.is_none()
     }
 
-    /// Returns the scene of the arguments, changed as requested and checked.
-    ///
-    /// # Errors
-    /// The scene does not exist or has mistakes. The text is for people.
+    /// Returns the scene of the arguments, changed as requested and checked. The error is for people.
     pub fn scene(&self) -> Result<Scene, String> {
         load(self.scene.as_deref().unwrap_or_default(), &self.set, self.seed)
     }
@@ -142,9 +139,6 @@ pub fn verdict(done: Result<bool, RunError>) -> ExitCode {
 }
 
 /// Runs a scene and writes the requested files. Returns true if every bound held.
-///
-/// # Errors
-/// The board cannot run the scene, or a file cannot be written.
 pub fn run_scene(args: &Args, scene: &Scene, board: Run) -> Result<bool, RunError> {
     let name = match args.board {
         Board::Native => "native",
@@ -158,7 +152,7 @@ pub fn run_scene(args: &Args, scene: &Scene, board: Run) -> Result<bool, RunErro
     if args.board == Board::Both {
         let mut path = Path::default();
         native::simulate(scene, &mut path)?;
-        trace.compare_with(path.clone());
+        trace.other = Some(path.clone());
         agreement = Some(Agreement::new(scene, path));
     }
     let mut recorder = match &args.out {

@@ -8,14 +8,13 @@ pub mod figures;
 pub use crate::demo::figures::{Check, Forces};
 
 use crate::metrics::{self, Meter, newtons};
-use crate::optimal::Unreachable;
+use crate::run::RunError;
 use crate::scene::{Scene, library, read};
 use crate::watch::{Controller, Step, Watch};
 use fingertip::shipped::{COLUMNS, Frame, SLOTS};
 use fingertip::state::Fault;
 use output::heatmap::Pressures;
-use output::plot::{PlotError, Sample};
-use std::path::PathBuf;
+use output::plot::Sample;
 
 const SCENE: &str = "demo";
 /// Duration of the goals in the quick run: of the first, which includes the approach, and of the others.
@@ -24,39 +23,30 @@ const QUICK_S: [f64; 2] = [0.5, 0.25];
 /// Array at the end of a hold, with the contact that the controller sensed.
 #[derive(Clone, Copy, Debug)]
 pub struct HeldImage {
-    /// Requested force.
     pub goal_n: f64,
-    /// Sensed force.
     pub force_n: f64,
     /// Centre of the contact, along columns and rows.
     pub centre_mm: [f64; 2],
-    /// Contact radius.
     pub radius_mm: f64,
-    /// Pressures from the codes of the frame.
     pub pressures_kpa: Pressures,
 }
 
-/// Goal and the response to it.
 #[derive(Clone, Debug)]
 pub struct Asked {
     /// Time at which the goal reached the controller.
     pub at_s: f64,
-    /// Requested force.
     pub goal_n: f64,
-    /// True force at that time.
     pub from_n: f64,
     /// Measurement until the next goal.
     pub meter: Meter,
 }
 
-/// Result of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Run {
     /// Goals in order.
     pub goals: Vec<Asked>,
     /// State of the world at each frame.
     pub trace: Vec<Sample>,
-    /// Pressure maps.
     pub pictures: Vec<HeldImage>,
     /// Frames that the controller missed, by its own count.
     pub missed_frames: u32,
@@ -71,44 +61,12 @@ impl Run {
 }
 
 /// Reason why the demonstration has no result.
-#[derive(Debug, thiserror::Error)]
-pub enum DemoError {
-    /// The scene has a mistake.
-    #[error("{0}")]
-    Scene(String),
-    /// The scene cannot be simulated.
-    #[error(transparent)]
-    Simulated(#[from] crate::SimError),
-    /// The run has no touch or no release.
-    #[error("nothing was touched, or it was not let go")]
-    NoTouch,
-    /// The motor cannot reach a force at all.
-    #[error("no bound for a step: {0}")]
-    Unreachable(#[from] Unreachable),
-    /// The controller stopped with this fault.
-    #[error("the controller stopped with fault {0}")]
-    Fault(u8),
-    /// A figure could not be drawn.
-    #[error(transparent)]
-    Plot(#[from] PlotError),
-    /// A file could not be written.
-    #[error("cannot write {}: {source}", path.display())]
-    Write {
-        /// Path of the file.
-        path: PathBuf,
-        /// Cause.
-        source: std::io::Error,
-    },
-}
+pub type DemoError = RunError;
 
 /// Returns the scene. The quick one holds the same goals for a shorter time.
-///
-/// # Errors
-/// The scene is missing or has a mistake.
 pub fn scene(quick: bool) -> Result<Scene, DemoError> {
-    let (path, text) = library::text(SCENE).map_err(DemoError::Scene)?;
-    let scene = read(&path.to_string_lossy(), &text, &metrics::names());
-    let mut scene = scene.map_err(|errors| DemoError::Scene(errors.to_string()))?;
+    let (path, text) = library::text(SCENE)?;
+    let mut scene = read(&path.to_string_lossy(), &text, &metrics::names())?;
     if quick {
         scene.duration_s = 0.0;
         for (place, event) in scene.script.iter_mut().enumerate() {
@@ -119,7 +77,6 @@ pub fn scene(quick: bool) -> Result<Scene, DemoError> {
     Ok(scene)
 }
 
-/// Text for a goal.
 pub fn what(goal_n: f64) -> String {
     if goal_n > 0.0 { format!("hold {goal_n} N") } else { "let go".into() }
 }
@@ -144,11 +101,10 @@ impl Trace {
         Self { array: Taxels::of(scene), run: Run::default(), controllers: Vec::new(), last: None, fault: None }
     }
 
-    /// Returns the result of the run.
     pub fn finish(mut self) -> Result<Run, DemoError> {
         self.keep();
         match self.fault {
-            Some(fault) => Err(DemoError::Fault(fault as u8)),
+            Some(fault) => Err(format!("the controller stopped with fault {}", fault as u8).into()),
             None => Ok(self.run),
         }
     }
@@ -225,8 +181,7 @@ impl Taxels {
         }
     }
 
-    /// Returns the pressures of a frame as `fingertip::pressure` does: n codes in a row of N in all are n / (1 - rho N)
-    /// behind a perfect switch.
+    /// Returns the pressures of a frame as `fingertip::pressure` does: n codes in a row of N become n / (1 - rho N).
     pub fn kilopascals(&self, frame: &Frame) -> Pressures {
         core::array::from_fn(|row| {
             let net: [f64; COLUMNS] = core::array::from_fn(|column| {

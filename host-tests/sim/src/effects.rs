@@ -24,7 +24,6 @@ macro_rules! named {
                 None
             }
 
-            /// True if there is one.
             pub fn any(&self) -> bool {
                 self.any
             }
@@ -42,24 +41,34 @@ pub mod drive;
 pub mod link;
 pub mod sensor;
 
-use crate::registry;
+use crate::registry::{self, Description};
 use crate::scene::Scene;
 use crate::scene::tables::Values;
 use crate::watch::Cost;
 use fastrand::Rng;
+use std::cell::Cell;
 use std::time::{Duration, Instant};
 
 /// Input of the construction of an effect.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Build<'a> {
-    /// Checked values of its keys.
     pub values: &'a Values,
-    /// Seed of its own random numbers, from the seed of the scene, its name and the finger.
-    pub seed: u64,
+    seed: u64,
+    drawn: Cell<bool>,
 }
 
-impl Build<'_> {
-    /// Value of a key that is a number.
+impl<'a> Build<'a> {
+    /// Input with a seed of the scene, the name of the effect and the finger.
+    pub fn new(values: &'a Values, seed: u64) -> Self {
+        Self { values, seed, drawn: Cell::new(false) }
+    }
+
+    /// The random numbers of the effect.
+    pub fn rng(&self) -> Rng {
+        self.drawn.set(true);
+        Rng::with_seed(self.seed)
+    }
+
     pub fn number(&self, name: &str) -> f64 {
         self.values.number(name)
     }
@@ -73,24 +82,35 @@ pub enum Part {
     Network(Box<sensor::Network>),
     Volts(Box<sensor::Volts>),
     Codes(Box<sensor::Codes>),
-    Shape(Box<dyn contact::Shape>),
-    Memory(Box<dyn contact::Memory>),
-    Series(Box<contact::Series>),
-    Strength(Box<dyn contact::Strength>),
-    Tangent(Box<contact::Tangent>),
-    Body(Box<contact::Body>),
+    Shape(Box<contact::Surface>),
+    Memory(Box<contact::Relaxation>),
+    /// Compliance of the object behind its surface, mm/N.
+    Series(Box<f64>),
+    Strength(Box<contact::BreakableObject>),
+    /// Friction along the surface.
+    Tangent(Box<contact::Grip>),
+    /// Mass of an object that can move, kg.
+    Body(Box<f64>),
     Inertia(Box<drive::Inertia>),
     Electric(Box<dyn drive::Electric>),
     Resist(Box<drive::Resist>),
-    Potential(Box<dyn drive::Potential>),
+    Potential(Box<drive::Cogging>),
     Play(Box<drive::Play>),
     Encoder(Box<drive::Encoder>),
-    Clock(Box<link::Clock>),
+    /// Duration of a second of the controller in the world, s.
+    Clock(Box<f64>),
     Packets(Box<link::Packets>),
 }
 
-/// Returns the seed of the stream of an effect or of a drawn value. One more name does not change the numbers of
-/// another.
+/// True if an effect draws random numbers.
+pub fn draws(effect: &Description) -> bool {
+    let values = Values::defaults(effect.keys);
+    let build = Build::new(&values, 0);
+    (effect.build)(&build);
+    build.drawn.get()
+}
+
+/// Returns the seed of the stream of an effect or of a drawn value, independent of all other names.
 pub fn stream(seed: u64, name: &str, finger: usize) -> u64 {
     // FNV-1a over the name, then SplitMix64 over all three.
     let name = name
@@ -135,15 +155,13 @@ impl<T: ?Sized> Metered<T> {
         &self.part
     }
 
-    /// Cost so far.
     pub fn cost(&self) -> Cost {
         let share = self.calls as f64 / self.timed_calls.max(1) as f64;
         Cost { effect: self.name, evaluations: self.calls, seconds: self.timed.as_secs_f64() * share }
     }
 }
 
-/// Draws from the normal distribution, mean 0 and deviation 1, by Marsaglia's polar method. The logarithm is libm's, in
-/// plain Rust.
+/// Draws from the normal distribution, mean 0 and deviation 1, by Marsaglia's polar method with libm's logarithm.
 pub(crate) fn normal(rng: &mut Rng) -> f64 {
     loop {
         let (u, v) = (2.0 * rng.f64() - 1.0, 2.0 * rng.f64() - 1.0);
@@ -202,46 +220,41 @@ pub(crate) fn waiting_s(rng: &mut Rng, rate_per_s: f64) -> f64 {
 
 /// Effects of one finger by family.
 pub struct Parts<E: Set + ?Sized> {
-    /// Effects on the array.
     pub sensor: E::Sensor,
-    /// Effects on the contact.
-    pub contact: E::Contact,
-    /// Effects on the drive.
+    pub contact: contact::Named,
     pub drive: E::Drive,
     /// Effects on clock and bus.
-    pub link: E::Link,
+    pub link: link::Named,
+}
+
+impl<E: Set> Parts<E> {
+    /// Effects on array and drive alone.
+    pub fn new(sensor: E::Sensor, drive: E::Drive) -> Self {
+        Self { sensor, contact: contact::Named::default(), drive, link: link::Named::default() }
+    }
 }
 
 /// Set of effects: [`Named`], or `()`, which has none compiled in.
 pub trait Set {
     /// Effects on the array.
     type Sensor: sensor::Stages;
-    /// Effects on the contact.
-    type Contact: contact::Stages;
     /// Effects on the drive.
     type Drive: drive::Stages;
-    /// Effects on clock and bus.
-    type Link: link::Stages;
 
-    /// Effects of one finger.
     fn of(scene: &Scene, finger: usize) -> Parts<Self>;
 
     /// Cost of each effect so far.
-    fn costs(sensor: &Self::Sensor, contact: &Self::Contact, drive: &Self::Drive, link: &Self::Link) -> Vec<Cost>;
+    fn costs(_: &Self::Sensor, _: &contact::Named, _: &Self::Drive, _: &link::Named) -> Vec<Cost> {
+        Vec::new()
+    }
 }
 
 impl Set for () {
     type Sensor = ();
-    type Contact = ();
     type Drive = ();
-    type Link = ();
 
     fn of(_scene: &Scene, _finger: usize) -> Parts<Self> {
-        Parts { sensor: (), contact: (), drive: (), link: () }
-    }
-
-    fn costs(_sensor: &(), _contact: &(), _drive: &(), _link: &()) -> Vec<Cost> {
-        Vec::new()
+        Parts::new((), ())
     }
 }
 
@@ -250,17 +263,10 @@ pub struct Named;
 
 impl Set for Named {
     type Sensor = sensor::Named;
-    type Contact = contact::Named;
     type Drive = drive::Named;
-    type Link = link::Named;
 
     fn of(scene: &Scene, finger: usize) -> Parts<Self> {
-        let mut parts: Parts<Self> = Parts {
-            sensor: sensor::Named::default(),
-            contact: contact::Named::default(),
-            drive: drive::Named::default(),
-            link: link::Named::default(),
-        };
+        let mut parts = Parts::<Self>::new(sensor::Named::default(), drive::Named::default());
         for (name, part) in registry::build(&scene.effects, scene.seed, finger) {
             let rest = parts.sensor.take(name, part).and_then(|part| parts.contact.take(name, part));
             let rest = rest.and_then(|part| parts.drive.take(name, part)).and_then(|part| parts.link.take(name, part));

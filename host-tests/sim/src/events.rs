@@ -41,8 +41,8 @@ pub const EVENT: Table = Table {
     keys: &[AT, KIND],
 };
 
-/// The kinds of events with their keys. The kinds before `FIRST_DEFECT` are handling, which a sound finger must master.
-/// The others are defects: a fault is a legitimate answer to them.
+/// Kinds of events. Those before `FIRST_DEFECT` are handling, which a sound finger must master; to defects a fault is a
+/// legitimate answer.
 #[rustfmt::skip]
 pub const KINDS: [Table; 15] = [
     Table { name: "object_move", about: "The object moves along the finger's motion and stays there.", keys: &[AT, KIND,
@@ -76,12 +76,10 @@ pub fn own_keys(kind: &Table) -> &'static [Key] {
     &kind.keys[EVENT.keys.len()..]
 }
 
-/// An event.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Event {
     /// Start of the event, from the scene's start.
     pub at_s: f64,
-    /// End of the event.
     pub until_s: f64,
     /// Values as the scene gives them.
     pub values: Values,
@@ -149,7 +147,6 @@ impl Event {
         (self.at_s..self.until_s).contains(&time_s)
     }
 
-    /// True for an event that moves or removes the object.
     pub fn moves_object(&self) -> bool {
         matches!(self.what, What::Move { .. } | What::Oscillate { .. } | What::Removed)
     }
@@ -160,13 +157,10 @@ impl Event {
 pub(crate) struct Happened {
     /// Place of a fixed object, along the motion of the first finger.
     pub object_mm: f64,
-    /// Speed of the object.
     pub object_mm_per_s: f64,
     /// True while the object is taken away.
     pub object_gone: bool,
-    /// Counts that the encoder has gained.
     pub slipped_counts: i32,
-    /// Voltage to which the supply has fallen.
     pub supply_v: Option<f64>,
     /// True while an event acts on the finger, its object or its controller.
     pub disturbed: bool,
@@ -223,7 +217,6 @@ impl ArrayEvents {
         (!events.is_empty()).then(|| Box::new(Self { events, untouched: codes, last: codes, rng }))
     }
 
-    /// Changes the codes of a slot that was sampled at a time.
     pub fn change(&mut self, slot: usize, time_s: f64, codes: &mut [u16; COLUMNS]) {
         if time_s < 0.0 {
             self.untouched[slot] = *codes;
@@ -253,11 +246,8 @@ impl ArrayEvents {
 /// A request of the host other than a goal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
-    /// Enables or disables torque.
     Torque(bool),
-    /// Requests a tare.
     Tare,
-    /// Clears a fault.
     Clear,
 }
 
@@ -283,7 +273,6 @@ impl Request {
         all
     }
 
-    /// Applies the request to a command.
     pub fn apply(self, command: &mut Command) {
         match self {
             Self::Torque(on) => command.torque = on,

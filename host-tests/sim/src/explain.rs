@@ -36,9 +36,6 @@ pub fn scene(scene: &Scene) -> String {
 }
 
 /// Lists the scenes of the library, each with its description.
-///
-/// # Errors
-/// The library cannot be read, or a scene of it has a mistake.
 pub fn list() -> Result<String, Box<dyn std::error::Error + Send + Sync>> {
     let names = library::names()?;
     let width = names.iter().map(String::len).max().unwrap_or(0);
@@ -152,7 +149,7 @@ fn stages(page: &mut String) {
 /// Returns the stage of the readout at which an effect acts.
 fn stage_of(effect: &Description) -> Option<&'static str> {
     let values = Values::defaults(effect.keys);
-    match (effect.build)(&Build { values: &values, seed: 0 }) {
+    match (effect.build)(&Build::new(&values, 0)) {
         Part::Pressure(_) => Some("pressure"),
         Part::Conductance(_) => Some("conductance"),
         Part::Network(_) => Some("network"),

@@ -24,7 +24,6 @@ use crate::scene::{Goal, Scene};
 use fingertip::pipeline::Status;
 use std::collections::VecDeque;
 
-/// Host of one finger.
 #[derive(Clone, Debug, Default)]
 pub struct Host {
     script: Vec<Goal>,
@@ -41,7 +40,6 @@ pub struct Host {
     arrived_n: f64,
     arrived_s: f64,
     reader: Option<Reader>,
-    /// Packets sent.
     pub sent: u64,
     /// Packets that were sent and do not arrive.
     pub lost: u64,
@@ -85,7 +83,7 @@ impl Host {
     /// Reads the controller when a reading is due. The reading arrives later, or not at all. Times never fall.
     pub fn read(&mut self, time_s: f64, reading: impl FnOnce() -> Reading, stages: &mut impl Stages) {
         if let Some(asked_s) = self.ask(time_s, time_s, stages) {
-            self.hear(Grip::answered_s(asked_s), reading());
+            self.hear(asked_s + READ_S, reading());
         }
     }
 
@@ -171,7 +169,7 @@ impl Host {
     }
 }
 
-/// Time from the request for a reading to its arrival: 14 and 23 bytes at 1 Mbaud, and the turn of the controller.
+/// Time from the request for a reading to its arrival without further delay: 14 and 23 bytes at 1 Mbaud, and the turn of the controller.
 const READ_S: f64 = 0.5e-3;
 /// Largest deviation of a settled force from the goal, as a share of the goal.
 const SETTLED_SHARE: f64 = 0.1;
@@ -184,19 +182,14 @@ const BEARS: f64 = 0.25;
 const AHEAD: f64 = 1.1;
 const AFTER_SLIP: f64 = 1.25;
 
-/// Values of a reading.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reading {
-    /// Contact force.
     pub force_n: f64,
-    /// Centre of pressure.
     pub centre_mm: [f64; 2],
-    /// Travel of the tip.
     pub travel_mm: f64,
 }
 
 impl Reading {
-    /// Reading of a controller.
     pub fn of(status: &Status) -> Self {
         let contact = &status.contact;
         Self {
@@ -224,7 +217,6 @@ struct Grip {
 }
 
 impl Grip {
-    /// Policy with the values of the table `[host]`.
     pub fn new(host: &Values) -> Self {
         Self {
             friction: host.number("grip_friction"),
@@ -236,12 +228,6 @@ impl Grip {
         }
     }
 
-    /// Returns the arrival of a reading without further delay.
-    pub fn answered_s(asked_s: f64) -> f64 {
-        asked_s + READ_S
-    }
-
-    /// Returns the goal for the force of the script.
     pub fn goal_n(&self, script_n: f64) -> f64 {
         if script_n > 0.0 { self.grip_n(script_n) - self.centring_n(script_n) } else { 0.0 }
     }

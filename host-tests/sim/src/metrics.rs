@@ -11,21 +11,21 @@ pub use crate::metrics::conduct::Hold;
 pub use crate::metrics::finger::{Finger, duty, newtons};
 pub use crate::metrics::response::AtGoal;
 
-use crate::metrics::finger::{DROPPED_MM, LIMITS};
+use crate::metrics::finger::DROPPED_MM;
+use crate::metrics::response::Response;
 use crate::scene::Bound;
 use crate::watch::{Controller, Step, Watch};
 use Worst::{FirstFault, Largest, Least, Sum};
+use fingertip::state::Limits;
 use std::sync::LazyLock;
 
 /// Most fingers of a scene.
 const FINGERS: usize = 2;
 
-/// Metric of a run.
 #[derive(Clone, Copy)]
 pub struct Metric {
     /// Name, with its unit last.
     pub name: &'static str,
-    /// Definition.
     pub about: &'static str,
     /// Value that counts if a scene has several fingers.
     pub of_several: Worst,
@@ -33,23 +33,11 @@ pub struct Metric {
     pub value: fn(&Finger) -> Option<f64>,
 }
 
-/// A metric that has a value for each goal.
-#[derive(Clone, Copy)]
-pub struct ByGoal {
-    /// Name of the metric.
-    pub name: &'static str,
-    /// Values in the unit of the metric.
-    pub values: fn(&Finger) -> Vec<AtGoal>,
-}
-
 /// Selection of one of several values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Worst {
-    /// Largest value.
     Largest,
-    /// Least value.
     Least,
-    /// Sum of the values.
     Sum,
     /// Value of the finger with the earliest fault.
     FirstFault,
@@ -78,7 +66,6 @@ impl Meter {
         Measured(scene.chain(fingers).collect())
     }
 
-    /// Compares each bound with the results.
     pub fn verdicts(&self, bounds: &[Bound]) -> Vec<Verdict> {
         let measured = self.measured();
         bounds.iter().map(|bound| self.verdict(&measured, bound)).collect()
@@ -107,8 +94,8 @@ impl Meter {
             Some((number, name)) => (self.0.get(number..=number).unwrap_or_default(), name),
             None => (&self.0[..], metric),
         };
-        let known = BY_GOAL.iter().find(|known| known.name == name);
-        known.map_or(Vec::new(), |known| fingers.iter().flat_map(known.values).collect())
+        let known = BY_GOAL.iter().find(|(known, _)| *known == name);
+        known.map_or(Vec::new(), |(_, values)| fingers.iter().flat_map(values).collect())
     }
 
     /// Returns the forces that were held.
@@ -161,13 +148,11 @@ impl Measured {
 /// Comparison of a result with its bound.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verdict {
-    /// Bound of the scene.
     pub bound: Bound,
     /// Result. A metric without a value breaks its bound.
     pub value: Option<f64>,
     /// Largest allowed value: for a bound that grows with the goal, that of the worst goal.
     pub max: Option<f64>,
-    /// True if the bound is held.
     pub held: bool,
 }
 
@@ -205,25 +190,29 @@ const fn metric(
     Metric { name, about, of_several, value }
 }
 
-const fn flag(is: bool) -> Option<f64> {
-    Some(if is { 1.0 } else { 0.0 })
+/// Share of the time in which a limit held the controller back, percent.
+fn limited(finger: &Finger, limit: u16) -> Option<f64> {
+    (finger.time_s > 0.0).then(|| 100.0 * finger.limits_s[limit.trailing_zeros() as usize] / finger.time_s)
 }
 
-/// Share of the time in which a limit (by its bit) held the controller back, percent.
-fn limited<const BIT: usize>(finger: &Finger) -> Option<f64> {
-    const { assert!(LIMITS[BIT].1 == 1 << BIT) }
-    (finger.time_s > 0.0).then(|| 100.0 * finger.limits_s[BIT] / finger.time_s)
+/// Returns 0 if events left nothing to judge.
+fn unjudged(finger: &Finger) -> Option<f64> {
+    finger.conduct.disturbed.then_some(0.0)
+}
+
+fn largest(values: &[AtGoal]) -> Option<f64> {
+    values.iter().map(|at| at.value).reduce(f64::max)
 }
 
 /// Every metric, in the order of the output.
 #[rustfmt::skip]
 pub const METRICS: &[Metric] = &[
     metric("peak_force_n", Largest, "largest true normal force", |f| Some(f.peak_n)),
-    metric("overshoot_percent", Largest, "largest true force beyond a goal, of the goal or of the step to it, whichever is smaller; the worst of all goals", |f| f.answers().overshoot().map(|share| 100.0 * share)),
-    metric("rise_ms", Largest, "time from 10 % to 90 % of the step to a goal; the worst of all goals, none if one is not reached", |f| f.answers().rise_s().map(|s| 1e3 * s)),
-    metric("settling_ms", Largest, "from the goal's change, or from the touch, until the true force stays within 2 % of the goal or of the step, whichever is smaller; the worst of all goals, none where one never settles", |f| f.answers().settling_s().map(|s| 1e3 * s)),
-    metric("steady_error_max_mn", Largest, "largest error of the true force against the goal, from 100 ms after the goal's change or the touch", |f| f.answers().steady_max_n().map(|n| 1e3 * n)),
-    metric("steady_error_rms_mn", Largest, "root mean square of that error", |f| f.answers().steady_rms_n().map(|n| 1e3 * n)),
+    metric("overshoot_percent", Largest, "largest true force beyond a goal, of the goal or of the step to it, whichever is smaller; the worst of all goals", |f| f.worst(|r| Some(r.beyond_n / r.unit_n())).map(|share| 100.0 * share)),
+    metric("rise_ms", Largest, "time from 10 % to 90 % of the step to a goal; the worst of all goals, none if one is not reached", |f| f.worst(Response::rise_s).map(|s| 1e3 * s)),
+    metric("settling_ms", Largest, "from the goal's change, or from the touch, until the true force stays within 2 % of the goal or of the step, whichever is smaller; the worst of all goals, none where one never settles", |f| f.worst(Response::settled_s).map(|s| 1e3 * s)),
+    metric("steady_error_max_mn", Largest, "largest error of the true force against the goal, from 100 ms after the goal's change or the touch", |f| f.steady_error_n().map(|[n, _]| 1e3 * n)),
+    metric("steady_error_rms_mn", Largest, "root mean square of that error", |f| f.steady_error_n().map(|[_, n]| 1e3 * n)),
     metric("touch_ms", Largest, "from the start to the first contact", |f| f.touch_s.map(|s| 1e3 * s)),
     metric("approach_mm_per_s", Largest, "mean speed of the tip over the last 10 ms before the first contact", |f| f.approach_mm_per_s),
     metric("travel_max_mm", Largest, "largest travel of the tip", |f| Some(f.travel_max_mm)),
@@ -232,13 +221,13 @@ pub const METRICS: &[Metric] = &[
     metric("faults_count", Sum, "faults that stopped the motor, without those that come while a defect of the events acts or within a second after it", |f| Some(f64::from(f.faults))),
     metric("fault_number", FirstFault, "number of the first fault, as on the bus; 0 without", |f| Some(f.first_fault.map_or(0.0, |(fault, _)| f64::from(fault as u8)))),
     metric("fault_ms", FirstFault, "from the start to the first fault", |f| f.first_fault.map(|(_, s)| 1e3 * s)),
-    metric("limit_voltage_percent", Largest, "share of the time in which the voltage or the supply was used up", limited::<0>),
-    metric("limit_current_percent", Largest, "share of the time in which the current limit held back", limited::<1>),
-    metric("limit_speed_percent", Largest, "share of the time at the speed limit", limited::<2>),
-    metric("limit_goal_percent", Largest, "share of the time in which the goal was moved to the largest or the least force", limited::<3>),
-    metric("limit_travel_percent", Largest, "share of the time at the travel's end", limited::<4>),
-    metric("limit_taxels_percent", Largest, "share of the time in which taxels were left out", limited::<5>),
-    metric("limit_slew_percent", Largest, "share of the time in which the voltage's slew limit held back", limited::<8>),
+    metric("limit_voltage_percent", Largest, "share of the time in which the voltage or the supply was used up", |f| limited(f, Limits::VOLTAGE)),
+    metric("limit_current_percent", Largest, "share of the time in which the current limit held back", |f| limited(f, Limits::CURRENT)),
+    metric("limit_speed_percent", Largest, "share of the time at the speed limit", |f| limited(f, Limits::SPEED)),
+    metric("limit_goal_percent", Largest, "share of the time in which the goal was moved to the largest or the least force", |f| limited(f, Limits::GOAL)),
+    metric("limit_travel_percent", Largest, "share of the time at the travel's end", |f| limited(f, Limits::TRAVEL)),
+    metric("limit_taxels_percent", Largest, "share of the time in which taxels were left out", |f| limited(f, Limits::TAXELS)),
+    metric("limit_slew_percent", Largest, "share of the time in which the voltage's slew limit held back", |f| limited(f, Limits::SLEW)),
     metric("missed_frames_count", Sum, "frames that the controller missed", |f| Some(f64::from(f.missed))),
     metric("duty_rms_percent", Largest, "root mean square of the duty", |f| f.duty.rms().map(|share| 100.0 * share)),
     metric("force_error_max_mn", Largest, "largest difference of the sensed from the true force", |f| Some(1e3 * f.force_error_n.max)),
@@ -251,53 +240,31 @@ pub const METRICS: &[Metric] = &[
     metric("slip_noticed_ms", Largest, "longest time from the onset of a slip to a higher goal", |f| f.slips.noticed_after_s.map(|s| 1e3 * s)),
     metric("object_lift_mm", Least, "how much higher than at the start the object is at the end", |f| Some(f.object_lift_mm)),
     metric("object_fall_mm", Largest, "farthest that the object came below its highest place before", |f| Some(f.object_fall_mm)),
-    metric("object_dropped", Largest, "1 where it fell more than 5 mm", |f| flag(f.object_fall_mm > DROPPED_MM)),
-    metric("object_broken", Largest, "1 where the object broke", |f| flag(f.broken)),
+    metric("object_dropped", Largest, "1 where it fell more than 5 mm", |f| Some(f64::from(f.object_fall_mm > DROPPED_MM))),
+    metric("object_broken", Largest, "1 where the object broke", |f| Some(f64::from(f.broken))),
     metric("energy_j", Sum, "electrical energy that the bridge took from the supply, less what the motor gave back", |f| Some(f.energy_j)),
     metric("current_rms_a", Largest, "root mean square of the winding's current", |f| f.current_a.rms()),
     metric("current_max_a", Largest, "largest current in the winding", |f| Some(f.current_a.max)),
     metric("winding_max_c", Largest, "highest temperature of the winding", |f| f.winding_max_c),
     metric("runaway_mm", Largest, "largest distance of the tip behind the first touch, beyond the largest indentation and the clearance (before a touch: behind the start, beyond the clearance), or beyond the end of the travel", |f| Some(f.conduct.runaway_mm)),
     metric("air_speed_percent", Largest, "largest speed of the tip without a contact, from 20 ms after one ended, of the approach speed", |f| Some(100.0 * f.conduct.air_share())),
-    metric("over_force_mn", Largest, "largest true force beyond the goal; a goal that is reduced counts for 200 ms more, and during a fault or torque off; the push of an object on a finger without a motor does not count", |f| largest(&over_force(f)).or(Some(0.0))),
-    metric("over_force_defective_mn", Largest, "the same while a defect of the events acts and for a second after it; `over_force_mn` leaves that time out", |f| largest(&over_force_defective(f)).or(Some(0.0))),
+    metric("over_force_mn", Largest, "largest true force beyond the goal; a goal that is reduced counts for 200 ms more, and during a fault or torque off; the push of an object on a finger without a motor does not count", |f| largest(&f.conduct.over_force_mn).or(Some(0.0))),
+    metric("over_force_defective_mn", Largest, "the same while a defect of the events acts and for a second after it; `over_force_mn` leaves that time out", |f| largest(&f.conduct.over_force_defective_mn).or(Some(0.0))),
     metric("stop_force_mn", Largest, "largest true force later than 0.5 s after a stop (goal 0, or torque off) while it lasts, without faults, and until the object comes nearer or is put back; with torque off less what dry friction and the gear hold", |f| Some(1e3 * f.conduct.stop_force_n)),
     metric("rest_travel_um", Largest, "from the least to the farthest travel in the last 200 ms of a goal of 0 that lasted for 400 ms; the worst of all", |f| f.conduct.ended().rest_mm.map(|mm| 1e3 * mm).or(unjudged(f))),
     metric("rest_duty_percent", Largest, "deviation of the duty in the last 200 ms of a goal, 0 or not, that lasted for 400 ms; the worst of all", |f| f.conduct.ended().duty.map(|share| 100.0 * share).or(unjudged(f))),
-    metric("hold_swing_mn", Largest, "from the least to the largest true force in the last 200 ms of a goal that lasted for 400 ms; the worst of all", |f| largest(&swings(f)).or(unjudged(f))),
-    metric("hold_error_mn", Largest, "error of the mean of the true force in the last 200 ms of a goal that lasted for 400 ms; the worst of all, without those that a fault ended", |f| largest(&errors(f)).or(f.first_fault.map(|_| 0.0)).or(unjudged(f))),
+    metric("hold_swing_mn", Largest, "from the least to the largest true force in the last 200 ms of a goal that lasted for 400 ms; the worst of all", |f| largest(&f.conduct.ended().swings_mn()).or(unjudged(f))),
+    metric("hold_error_mn", Largest, "error of the mean of the true force in the last 200 ms of a goal that lasted for 400 ms; the worst of all, without those that a fault ended", |f| largest(&f.conduct.ended().errors_mn()).or(f.first_fault.map(|_| 0.0)).or(unjudged(f))),
     metric("touches_missed_count", Sum, "goals of at least 400 ms without a fault in whose last 200 ms nothing was touched", |f| Some(f.conduct.ended().missed() as f64)),
 ];
 
+/// Name of a metric that has a value for each goal, and these values.
+type ByGoal = (&'static str, fn(&Finger) -> Vec<AtGoal>);
+
 /// Metrics that have a value for each goal.
-pub const BY_GOAL: &[ByGoal] = &[
-    ByGoal { name: "over_force_mn", values: over_force },
-    ByGoal { name: "over_force_defective_mn", values: over_force_defective },
-    ByGoal { name: "hold_swing_mn", values: swings },
-    ByGoal { name: "hold_error_mn", values: errors },
+pub const BY_GOAL: [ByGoal; 4] = [
+    ("over_force_mn", |f| f.conduct.over_force_mn.clone()),
+    ("over_force_defective_mn", |f| f.conduct.over_force_defective_mn.clone()),
+    ("hold_swing_mn", |f| f.conduct.ended().swings_mn()),
+    ("hold_error_mn", |f| f.conduct.ended().errors_mn()),
 ];
-
-fn over_force(finger: &Finger) -> Vec<AtGoal> {
-    finger.conduct.over_force().iter().map(|at| at.times(1e3)).collect()
-}
-
-fn over_force_defective(finger: &Finger) -> Vec<AtGoal> {
-    finger.conduct.over_force_defective().iter().map(|at| at.times(1e3)).collect()
-}
-
-/// Returns 0 if events left nothing to judge.
-fn unjudged(finger: &Finger) -> Option<f64> {
-    finger.conduct.disturbed.then_some(0.0)
-}
-
-fn swings(finger: &Finger) -> Vec<AtGoal> {
-    finger.conduct.ended().swings().iter().map(|at| at.times(1e3)).collect()
-}
-
-fn errors(finger: &Finger) -> Vec<AtGoal> {
-    finger.conduct.ended().errors().iter().map(|at| at.times(1e3)).collect()
-}
-
-fn largest(values: &[AtGoal]) -> Option<f64> {
-    values.iter().map(|at| at.value).reduce(f64::max)
-}

@@ -9,7 +9,7 @@ pub mod calibrated;
 pub mod served;
 
 use crate::bridge::Bridge;
-use crate::effects::link::Stages as _;
+use crate::effects::link::{self, Stages as _};
 use crate::effects::sensor::{Readout, Stages as _};
 use crate::effects::{Named, Parts, Set};
 use crate::host::{Host, Reading};
@@ -19,7 +19,7 @@ use crate::run::{RunError, by_effect};
 use crate::scene::Scene;
 use crate::setup::Setup;
 use crate::watch::{self, Controller, Cost, Step, Summary, Watch};
-use crate::world::{Surroundings, World, WorldError};
+use crate::world::{Surroundings, World};
 use core::ops::Range;
 use fingertip::command::Command;
 use fingertip::config::{ConfigError, newtons};
@@ -34,12 +34,11 @@ use twox_hash::xxhash3_128::Hasher;
 /// Reason why a scene does not run.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SimError {
-    /// The controller refuses its parameters.
     #[error("[controller] {0}")]
     Controller(ConfigError),
-    /// The world cannot be simulated.
-    #[error(transparent)]
-    World(#[from] WorldError),
+    /// The step is too long for what moves.
+    #[error("{0}")]
+    Step(String),
 }
 
 /// [`simulate`] as a [`Run`](crate::run::Run).
@@ -89,7 +88,7 @@ struct Unit<E: Set> {
     pipeline: Pipeline,
     readout: Readout,
     sensor: E::Sensor,
-    link: E::Link,
+    link: link::Named,
     host: Host,
     frame: Frame,
     command: Command,
@@ -114,8 +113,7 @@ struct Board<E: Set> {
     times: StageTimes,
 }
 
-/// Wall time of the stages of a frame: motion, readout, control step, and truth with its watchers. One of this number of
-/// frames is timed, as reading the clock takes time itself.
+/// Wall time of the stages of a frame. One of [`TIMED`] frames is timed, as reading the clock takes time itself.
 #[derive(Clone, Copy, Debug, Default)]
 struct StageTimes {
     frames: u64,
@@ -123,10 +121,9 @@ struct StageTimes {
     spent: [Duration; 4],
 }
 
-/// Frames for one that is timed.
+/// Frames for each timed one.
 const TIMED: u64 = 64;
-/// Stages of a frame, and the families of the effects whose own time is not counted with each. Effects of clock and bus act
-/// between the stages: their time, which is small, is in their own row and in a stage.
+/// Stages of a frame, and the families of the effects whose time is not counted with each: it has its own row.
 const STAGES: [(&str, &[Family]); 4] = [
     ("motion", &[registry::CONTACT, registry::DRIVE]),
     ("readout", &[registry::SENSOR]),
@@ -160,11 +157,6 @@ impl StageTimes {
         };
         STAGES.iter().zip(self.spent).map(of).collect()
     }
-}
-
-/// Temperature in the type of the controller.
-fn celsius(degrees: f64) -> Celsius {
-    Celsius::from_bits((degrees * 65_536.0).floor() as i32)
 }
 
 impl<E: Set> Board<E> {
@@ -280,7 +272,8 @@ impl<E: Set> Board<E> {
 
     /// Returns what the control step of a finger receives beside the frame.
     fn sense(&mut self, finger: usize, silent_ms: u16) -> Sense {
-        let chip = self.units[finger].sensor.chip_c(self.time_s()).map(celsius);
+        let chip_c = self.units[finger].sensor.chip_c(self.time_s());
+        let chip = chip_c.map(|degrees| Celsius::from_bits((degrees * 65_536.0).floor() as i32));
         Sense { chip, ..self.world.sense(finger, silent_ms) }
     }
 
@@ -323,8 +316,7 @@ impl<E: Set> Board<E> {
     }
 }
 
-/// Slots between the end of a frame and the effect of its duty: the time of the step on the microcontroller, rounded
-/// up.
+/// Slots between the end of a frame and the effect of its duty: the time of the step, rounded up.
 pub const DUTY_DELAY_SLOTS: usize = 3;
 
 impl<E: Set> Board<E> {
@@ -385,8 +377,7 @@ impl<E: Set> Board<E> {
     }
 }
 
-// Virtual time is exact: whole 21sts of a femtosecond, of which a tick of the timer (168 MHz) has 125 million. So no sum
-// of ticks is rounded.
+// Virtual time is exact: in whole 21sts of a femtosecond a tick of the timer (168 MHz) has 125 million.
 
 /// Units in a second.
 const UNITS: i128 = 21_000_000_000_000_000;
@@ -401,12 +392,10 @@ impl Clock {
         Self(seconds.trunc() as i128 * UNITS + units(seconds.fract()))
     }
 
-    /// Advances by a time.
     pub fn go_on(&mut self, seconds: f64) {
         self.0 += units(seconds);
     }
 
-    /// Goes back by a time.
     pub fn go_back(&mut self, seconds: f64) {
         self.0 -= Self::from_start(seconds).0;
     }
@@ -418,7 +407,6 @@ impl Clock {
         i64::try_from(units).map_or_else(|_| long(units), |units| units as f64) / UNITS as f64
     }
 
-    /// Returns the time since the start of the clock.
     pub fn time_s(self) -> f64 {
         self.since(Self(0))
     }
@@ -443,23 +431,37 @@ fn long_units(units: f64) -> i128 {
     units as i128
 }
 
-/// The 128 bits of XXH3 over the inputs and outputs of every control step, in order: equal if two runs are equal to the
-/// bit. It detects accidental differences, not intended ones.
+/// XXH3 of 128 bits over the inputs and outputs of every control step, in order: equal if two runs are.
 struct Digest(Hasher);
-
-/// Number of digest fields of the inputs beside the codes.
-const TAKEN: usize = 13;
 
 impl Digest {
     pub fn new() -> Self {
         Self(Hasher::new())
     }
 
-    /// Adds a control step.
+    /// Adds a control step. The command is complete but for whether a tare is forced: the outputs show the result.
     pub fn add(&mut self, frame: &Frame, sense: &Sense, command: &Command, duty: Duty, status: &Status) {
+        let Sense { encoder, supply_mv, bus_silent_ms, bridge_fault, answer, chip: _ } = *sense;
+        let Command { torque, goal, bus_watchdog_ms, fit_level, tare_request, clear_request, measure_request, .. } =
+            *command;
+        let inputs: [u32; 13] = [
+            frame.sequence,
+            encoder as u32,
+            supply_mv.into(),
+            bus_silent_ms.into(),
+            bridge_fault.into(),
+            answer.0,
+            torque.into(),
+            goal.to_bits() as u32,
+            bus_watchdog_ms.into(),
+            fit_level as u32,
+            tare_request.into(),
+            clear_request.into(),
+            measure_request.into(),
+        ];
         self.0.write(frame.codes.rows.map(|codes| codes.map(u16::to_le_bytes)).as_flattened().as_flattened());
         self.0.write(frame.codes.undriven.map(u16::to_le_bytes).as_flattened());
-        self.0.write(taken(frame.sequence, sense, command).map(u32::to_le_bytes).as_flattened());
+        self.0.write(inputs.map(u32::to_le_bytes).as_flattened());
         // The effect of the temperature is in the other fields.
         Status { chip: None, ..*status }.words(duty, |word| self.0.write(&word.to_le_bytes()));
     }
@@ -468,29 +470,6 @@ impl Digest {
     pub fn hex(&self) -> String {
         format!("{:032x}", self.0.finish_128())
     }
-}
-
-/// Returns the inputs of a step beside the codes. The command is complete but for whether a tare is forced: the outputs
-/// show the result.
-fn taken(sequence: u32, sense: &Sense, command: &Command) -> [u32; TAKEN] {
-    let Sense { encoder, supply_mv, bus_silent_ms, bridge_fault, answer, chip: _ } = *sense;
-    let Command { torque, goal, bus_watchdog_ms, fit_level, tare_request, clear_request, measure_request, .. } =
-        *command;
-    [
-        sequence,
-        encoder as u32,
-        supply_mv.into(),
-        bus_silent_ms.into(),
-        bridge_fault.into(),
-        answer.0,
-        torque.into(),
-        goal.to_bits() as u32,
-        bus_watchdog_ms.into(),
-        fit_level as u32,
-        tare_request.into(),
-        clear_request.into(),
-        measure_request.into(),
-    ]
 }
 
 #[cfg(test)]

@@ -31,11 +31,8 @@ pub struct Profile {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("no way from {from_mm} mm to {to_mm} mm of indentation: {reason}")]
 pub struct Unreachable {
-    /// Start of the motion.
     pub from_mm: f64,
-    /// Target of the motion.
     pub to_mm: f64,
-    /// Cause.
     pub reason: Reason,
 }
 
@@ -61,9 +58,7 @@ pub fn minimum_time_s(
     profile(setup, d_from_mm, d_to_mm, voltage_limit, current_limit).map(|profile| profile.total_s)
 }
 
-/// The time-optimal motion from rest at one indentation to rest at another.
-///
-/// `voltage_limit` is the bridge's mean voltage before the supply sags; values above the supply voltage are limited to it.
+/// The time-optimal motion from rest at one indentation to rest at another. The voltage is at most that of the supply.
 pub fn profile(
     setup: &Setup,
     d_from_mm: f64,

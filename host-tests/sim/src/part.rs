@@ -21,13 +21,6 @@ pub struct Part {
     length: u64,
 }
 
-/// Contents of a file of lines.
-enum Found {
-    Nothing,
-    Lines(Vec<String>),
-    Others(String),
-}
-
 impl Part {
     /// Resumes from the lines of an earlier try of the same work, or begins. Creates the folder.
     ///
@@ -41,10 +34,17 @@ impl Part {
         let of = &fs::canonicalize(of).unwrap_or(of.into());
         let lock = Lock::take(of).map_err(|error| cannot_write(of, &error))?;
         let path = kept::beside(of, "part");
-        let lines = match found(&path, head).map_err(|error| format!("cannot read {}: {error}", path.display()))? {
-            Found::Lines(lines) => lines,
-            Found::Nothing => Vec::new(),
-            Found::Others(whose) => {
+        let bytes = match fs::read(&path) {
+            Err(error) if error.kind() == ErrorKind::NotFound => Vec::new(),
+            bytes => bytes.map_err(|error| format!("cannot read {}: {error}", path.display()))?,
+        };
+        let mut known = bytes.split_inclusive(|byte| *byte == b'\n').map(whole);
+        let lines: Vec<String> = match known.next().flatten() {
+            // The file has at most the head.
+            _ if line(head).as_bytes().starts_with(&bytes) => Vec::new(),
+            Some(found) if found == head => known.flatten().map(str::to_owned).collect(),
+            found => {
+                let whose = found.unwrap_or("something that cannot be read");
                 return Err(format!(
                     "{} holds what is done of {whose}, not of {head}: finish that, move the file away, or name another place",
                     path.display()
@@ -55,14 +55,13 @@ impl Part {
         // Rewrites the file, so that it has only whole lines.
         let whole: String = std::iter::once(head).chain(lines.iter().map(String::as_str)).map(line).collect();
         let failed = |error: io::Error| cannot_write(&path, &error);
-        if fs::read(&path).ok().as_deref() != Some(whole.as_bytes()) {
+        if bytes != whole.as_bytes() {
             lock.write_with(&path, &whole).map_err(failed)?;
         }
         let file = OpenOptions::new().append(true).open(&path).map_err(failed)?;
         Ok((Self { lock, path, file, length: whole.len() as u64 }, lines))
     }
 
-    /// Adds a line.
     pub fn add(&mut self, text: &str) -> Result<(), RunError> {
         let line = line(text);
         if let Err(error) = self.file.write_all(line.as_bytes()) {
@@ -73,7 +72,6 @@ impl Part {
         Ok(())
     }
 
-    /// Writes the final file.
     pub fn write(&self, bytes: impl AsRef<[u8]>) -> Result<(), RunError> {
         let told = |error| {
             format!("{}; all that was done is kept in {}", cannot_write(self.lock.path(), &error), self.path.display())
@@ -92,7 +90,6 @@ impl Part {
     }
 }
 
-/// Makes a folder and those above it.
 pub fn make_folder(folder: &Path) -> Result<(), String> {
     fs::create_dir_all(folder).map_err(|error| format!("cannot make {}: {error}", folder.display()))
 }
@@ -117,23 +114,6 @@ pub fn check(text: &str) -> String {
 
 fn line(text: &str) -> String {
     format!("{} {text}\n", check(text))
-}
-
-fn found(path: &Path, head: &str) -> io::Result<Found> {
-    let bytes = match fs::read(path) {
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Found::Nothing),
-        bytes => bytes?,
-    };
-    if line(head).as_bytes().starts_with(&bytes) {
-        // The file has at most the head.
-        return Ok(Found::Nothing);
-    }
-    let mut lines = bytes.split_inclusive(|byte| *byte == b'\n').map(whole);
-    Ok(match lines.next() {
-        Some(Some(found)) if found == head => Found::Lines(lines.flatten().map(str::to_owned).collect()),
-        Some(Some(others)) => Found::Others(others.to_owned()),
-        Some(None) | None => Found::Others("something that cannot be read".into()),
-    })
 }
 
 /// Text of a line; none if it is cut off or damaged.

@@ -2,17 +2,6 @@
 //!
 //! The plant is a finger in the world of scenes, with these differences: its effects are part of its [`Setup`], it can
 //! be broken during a run ([`Faults`]), its rows are driven pin by pin, and a snapshot by serde restores every bit.
-//!
-//! ```
-//! use sim::bridge::Bridge;
-//! use sim::plant::{Plant, Setup};
-//!
-//! let mut plant = Plant::new(&Setup::default());
-//! while plant.force_n() < 1.0 {
-//!     plant.advance(10e-6, Bridge::Driven { duty: 0.3 });
-//! }
-//! assert!(plant.pressure_kpa(5, 5) > 0.0);
-//! ```
 
 pub use crate::setup::Setup;
 
@@ -20,13 +9,12 @@ use crate::bridge::Bridge;
 use crate::effects::drive::{self, Circuit, Friction};
 use crate::effects::sensor::effects::Settling;
 use crate::effects::sensor::{self, Readout};
-use crate::effects::{Parts, Set};
+use crate::effects::{Parts, Set, contact};
 use crate::mechanics::decay;
 use crate::mechanics::finger::{Finger, Motion};
 use crate::mechanics::rotor::Shaft;
 use crate::scene::Scene;
 use crate::setup::Array;
-use crate::watch::Cost;
 use crate::world::{Surroundings, World};
 use fingertip::frame::Sense;
 use fingertip::shipped::{COLUMNS, Frame, ROWS, SLOTS};
@@ -55,20 +43,19 @@ struct Kept {
 impl Plant {
     /// Creates a plant at rest at travel 0, with the bridge open.
     pub fn new(setup: &Setup) -> Self {
-        let world = World::new(setup, &Surroundings::default(), vec![(Drive::new(setup), ())]);
+        let world = World::new(setup, &Surroundings::default(), vec![(Drive::new(setup), contact::Named::default())]);
         let (sensor, readout) = (Sensor::new(&setup.array), Readout::new(&setup.array));
         Self { faults: Faults::default(), world, sensor, readout }
     }
 
-    fn finger(&self) -> &Finger<Drive, ()> {
+    fn finger(&self) -> &Finger<Drive> {
         &self.world.fingers()[0]
     }
 
-    fn finger_mut(&mut self) -> &mut Finger<Drive, ()> {
+    fn finger_mut(&mut self) -> &mut Finger<Drive> {
         &mut self.world.fingers_mut()[0]
     }
 
-    /// Setup of the finger.
     pub fn setup(&self) -> &Setup {
         self.finger().setup()
     }
@@ -97,12 +84,10 @@ impl Plant {
         self.finger().shaft()
     }
 
-    /// Travel of the tip.
     pub fn travel_mm(&self) -> f64 {
         self.finger().tip_mm()
     }
 
-    /// Speed of the tip.
     pub fn speed_mm_per_s(&self) -> f64 {
         self.finger().speed_mm_per_s()
     }
@@ -112,7 +97,6 @@ impl Plant {
         (self.travel_mm() - self.setup().wall.distance_mm).max(0.0)
     }
 
-    /// True contact force.
     pub fn force_n(&self) -> f64 {
         self.world.force_n(0)
     }
@@ -122,7 +106,6 @@ impl Plant {
         self.finger().current_a()
     }
 
-    /// Voltage of the supply at the bridge.
     pub fn supply_v(&self) -> f64 {
         self.finger().supply_v()
     }
@@ -145,8 +128,7 @@ impl Plant {
         self.world.row_kpa(0, f64::INFINITY, row)[column]
     }
 
-    /// Voltages of all columns at a time after the driven rows changed from `previous`, settled until then, to
-    /// `driven`.
+    /// Voltages of all columns at a time after the driven rows changed from `previous`, where they had settled.
     pub fn settling_volts(
         &mut self,
         driven: &[bool; ROWS],
@@ -241,22 +223,18 @@ impl core::fmt::Debug for Plant {
     }
 }
 
-/// State of a taxel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Taxel {
-    /// No defect.
     #[default]
     Sound,
     /// An open circuit: no preload, no pressure.
     Dead,
-    /// A short circuit.
     Shorted,
 }
 
 /// State of the switch of a row.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Row {
-    /// No defect.
     #[default]
     Sound,
     /// Stuck in the driven state (its pin high).
@@ -265,12 +243,9 @@ pub enum Row {
     StuckLow,
 }
 
-/// Defects of the array.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ArrayFaults {
-    /// `taxels[row][column]`.
     pub taxels: [[Taxel; COLUMNS]; ROWS],
-    /// Row switches.
     pub rows: [Row; ROWS],
     /// True if all amplifiers are at their upper rail.
     pub saturated: bool,
@@ -290,9 +265,7 @@ impl ArrayFaults {
 /// Defects of the board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Faults {
-    /// Defects of the array.
     pub array: ArrayFaults,
-    /// True if the count of the encoder is frozen.
     pub encoder_frozen: bool,
     /// True if the channels of the encoder are swapped: it counts down as the tip presses.
     pub encoder_reversed: bool,
@@ -300,7 +273,6 @@ pub struct Faults {
     pub leads_swapped: bool,
     /// Travels at the end stops of the finger, rear and front.
     pub end_stops_mm: Option<[f64; 2]>,
-    /// Voltage by which the source drops.
     pub supply_drop_v: f64,
 }
 
@@ -308,30 +280,22 @@ pub struct Faults {
 pub struct Reference;
 
 impl Reference {
-    /// Effects for a setup.
     pub fn parts(setup: &Setup) -> Parts<Self> {
-        Parts { sensor: Sensor::new(&setup.array), contact: (), drive: Drive::new(setup), link: () }
+        Parts::new(Sensor::new(&setup.array), Drive::new(setup))
     }
 }
 
 impl Set for Reference {
     type Sensor = Sensor;
-    type Contact = ();
     type Drive = Drive;
-    type Link = ();
 
     fn of(scene: &Scene, _finger: usize) -> Parts<Self> {
         Self::parts(&scene.setup())
-    }
-
-    fn costs(_sensor: &Sensor, _contact: &(), _drive: &Drive, _link: &()) -> Vec<Cost> {
-        Vec::new()
     }
 }
 
 /// Friction, gear and supply.
 pub struct Drive {
-    /// Defects.
     pub faults: Faults,
     /// Count of the encoder at the last read.
     pub counts: i32,
@@ -341,7 +305,6 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// Drive without defects.
     pub fn new(setup: &Setup) -> Self {
         Self {
             faults: Faults::default(),
@@ -385,7 +348,6 @@ impl drive::Stages for Drive {
 
 /// Characteristic of the taxels, row switches and settling.
 pub struct Sensor {
-    /// Defects.
     pub faults: ArrayFaults,
     array: Array,
     settling: Settling,
@@ -394,7 +356,6 @@ pub struct Sensor {
 }
 
 impl Sensor {
-    /// Sensor without defects.
     pub fn new(array: &Array) -> Self {
         Self {
             faults: ArrayFaults::default(),

@@ -31,14 +31,12 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// Population of fingers.
 #[derive(Clone, Debug)]
 pub struct Population {
     /// The file's name without its ending.
     pub name: String,
     /// File as errors name it.
     pub file: String,
-    /// Description in one line.
     pub about: String,
     /// Whole text, with that of the population it extends.
     pub text: String,
@@ -52,9 +50,7 @@ pub struct Population {
 /// Place in the text of a population, and the value there in the scene of a finger.
 #[derive(Clone, Debug)]
 struct Place {
-    /// Range in the text.
     at: Range<usize>,
-    /// `table.key`.
     key: String,
     /// True if only whole numbers are allowed.
     whole: bool,
@@ -68,31 +64,26 @@ struct Events {
     count: Place,
     at_s: Place,
     kind: Place,
-    /// Keys of each kind.
     keys: Vec<(&'static str, Place)>,
 }
 
 /// Count of the fingers whose metric is above a value.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Counted {
-    /// The metric.
     pub metric: String,
     /// Value above which a finger counts.
     pub above: f64,
 }
 
-/// Drawn finger.
 #[derive(Clone, Debug)]
 pub struct Finger {
     /// Value of each variable and of each drawn key.
     pub drawn: Vec<(String, Drawn)>,
-    /// Scene of the finger.
     pub scene: Scene,
 }
 
 impl Population {
-    /// Draws a finger; numbers count from 0. Each value has its own stream of random numbers, so one more draw does not
-    /// change the others.
+    /// Draws a finger; numbers count from 0. Each value has its own stream: one more draw does not change the others.
     pub fn finger(&self, seed: u64, number: usize) -> Result<Finger, SceneErrors> {
         let mut drawn: Vec<(String, Drawn)> = Vec::new();
         let draw = |name: &str, draw: &Draw, whole: bool, drawn: &[(String, Drawn)]| {
@@ -170,7 +161,7 @@ pub fn fingers(population: &Population, seed: u64, all: usize, shard: Shard, boa
     go_on(population, seed, (0..all).filter(|number| shard.has(*number)), Vec::new(), board, |_| Ok(()))
 }
 
-/// Simulates the fingers that are not finished yet, and passes each result to `keep` as soon as it is there.
+/// Simulates the fingers that are not in `fingers`, passes each result to `keep`, and returns all in order.
 fn go_on(
     population: &Population,
     seed: u64,
@@ -195,6 +186,7 @@ fn go_on(
         Ok(())
     })?;
     progress.finish_and_clear();
+    fingers.sort_by_key(|ran| ran.finger);
     Ok(fingers)
 }
 

@@ -23,8 +23,9 @@ use fingertip::params::Params;
 use fingertip::shipped::{Calibration, Config, Pipeline};
 use images::record::{Digest, Record};
 use mcap::read::Options;
-use mcap::records::Metadata;
-use mcap::{Attachment, MAGIC, McapResult, MessageStream};
+use mcap::records::{Metadata, op};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::{Attachment, McapError, McapResult, MessageStream};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
@@ -32,14 +33,11 @@ use std::path::Path;
 use std::{fmt, fs};
 use twox_hash::xxhash3_128::Hasher;
 
-/// Metadata record of the scene and the controllers.
+/// Metadata record of the scene and the controllers, and the one at the end of a complete recording.
 const SETUP: &str = "fingertip.setup";
-/// Metadata record at the end of a complete recording.
 const END: &str = "fingertip.end";
-
 /// Entry that states if a replay is possible.
 const WHOLE: &str = "whole";
-
 /// Entries of the last record: digests of the record of the controllers, and of the text of the scene.
 const OF_SETUP: &str = "setup";
 const OF_SCENE: &str = "scene";
@@ -132,55 +130,48 @@ fn core() -> Value {
     })
 }
 
-// A recording is intact if all checksums are right: every byte of the file is covered by one.
-//
-// MCAP has one checksum for everything before the record `DataEnd` and one for the summary after it with the footer. The
-// rest (the checksums, the magic at both ends, the head of `DataEnd`) has fixed contents.
-
-const CRC: crc::Crc<u32, crc::Table<16>> = crc::Crc::<u32, crc::Table<16>>::new(&crc::CRC_32_ISO_HDLC);
-
-/// Types of records.
-const FOOTER: u8 = 2;
-const DATA_END: u8 = 15;
-/// Length of the type and the length of a record.
-const HEAD: usize = 9;
-/// Lengths of `DataEnd` and `Footer`.
-const DATA_END_BYTES: usize = HEAD + 4;
-const FOOTER_BYTES: usize = HEAD + 20;
-
-/// Checks a file.
-///
-/// # Errors
-/// The file is cut off or changed. The text names the part.
+/// Checks a file: every byte of it is covered by a checksum, or has fixed contents. The error names the part.
 pub fn check(bytes: &[u8]) -> Result<(), RunError> {
-    if !bytes.starts_with(MAGIC) {
-        return Err("this is no MCAP file: it does not begin as one".into());
-    }
-    let cut = "the recording was cut off: it does not end as an MCAP file does";
-    let end = bytes.strip_suffix(MAGIC).and_then(|bytes| bytes.len().checked_sub(FOOTER_BYTES)).ok_or(cut)?;
-    let footer = &bytes[end..end + FOOTER_BYTES];
-    let start = usize::try_from(number(footer, HEAD)).unwrap_or(usize::MAX);
-    let data_end = start.checked_sub(DATA_END_BYTES).filter(|_| start <= end);
-    if !is_head(footer, FOOTER, 20) || data_end.is_none() {
-        return Err("the recording is damaged in its footer".into());
-    }
-    let data_end = data_end.unwrap_or(0);
-    if word(footer, FOOTER_BYTES - 4) != CRC.checksum(&bytes[start..end + FOOTER_BYTES - 4]) {
-        return Err("the recording is damaged in its summary, behind its messages: the CRC differs".into());
-    }
-    let (data, end) = bytes.split_at(data_end);
-    if !is_head(end, DATA_END, 4) {
-        return Err("the recording is damaged at the end of its messages".into());
-    }
-    if word(end, HEAD) == 0 {
-        return Err(
-            "the recording has no checksum over its data: another program rewrote it. Replay the original".into()
-        );
-    }
-    if word(end, HEAD) != CRC.checksum(data) {
-        return Err("the recording is damaged in its messages, its metadata or the attached scene: the CRC differs. Copy it or record the scene again".into());
+    let options = LinearReaderOptions::default()
+        .with_emit_chunks(true)
+        .with_record_length_limit(bytes.len())
+        .with_check_finishes_after_end_magic(true)
+        .with_validate_data_section_crc(true)
+        .with_validate_summary_section_crc(true);
+    let mut reader = LinearReader::new_with_options(options);
+    let mut rest = bytes;
+    while let Some(event) = reader.next_event() {
+        match event.map_err(damage)? {
+            LinearReadEvent::ReadRequest(wanted) => {
+                let (next, later) = rest.split_at(wanted.min(rest.len()));
+                reader.insert(next.len()).copy_from_slice(next);
+                reader.notify_read(next.len());
+                rest = later;
+            }
+            LinearReadEvent::Record { opcode: op::DATA_END | op::FOOTER, data } if data.ends_with(&[0; 4]) => {
+                let message = "the recording lacks a checksum: another program rewrote it. Replay the original";
+                return Err(message.into());
+            }
+            LinearReadEvent::Record { .. } => {}
+        }
     }
     Ok(())
+}
+
+fn damage(error: McapError) -> String {
+    match error {
+        McapError::BadMagic => "this is no MCAP file: it does not begin and end as one".into(),
+        McapError::UnexpectedEof => "the recording was cut off: it does not end as an MCAP file does".into(),
+        McapError::BadDataCrc { .. } => {
+            "the recording is damaged in its messages, its metadata or the attached scene: \
+                                         the CRC differs. Copy it or record the scene again"
+                .into()
+        }
+        McapError::BadSummaryCrc { .. } => {
+            "the recording is damaged in its summary, behind its messages: the CRC differs".into()
+        }
+        error => format!("the recording is damaged: {error}"),
+    }
 }
 
 /// Digest of the entries of a metadata record. It remains the same if another program rewrites the file.
@@ -188,7 +179,6 @@ pub fn digest(entries: &BTreeMap<String, String>) -> String {
     texts(entries.iter().flat_map(|(name, value)| [name.as_bytes(), value.as_bytes()]))
 }
 
-/// Digest of texts.
 pub fn texts<'a>(texts: impl IntoIterator<Item = &'a [u8]>) -> String {
     let mut digest = Hasher::new();
     for text in texts {
@@ -198,19 +188,6 @@ pub fn texts<'a>(texts: impl IntoIterator<Item = &'a [u8]>) -> String {
     format!("{:032x}", digest.finish_128())
 }
 
-fn is_head(record: &[u8], kind: u8, length: u64) -> bool {
-    record[0] == kind && number(record, 1) == length
-}
-
-fn number(bytes: &[u8], at: usize) -> u64 {
-    u64::from_le_bytes(core::array::from_fn(|n| bytes[at + n]))
-}
-
-fn word(bytes: &[u8], at: usize) -> u32 {
-    u32::from_le_bytes(core::array::from_fn(|n| bytes[at + n]))
-}
-
-/// Result of a replay.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Replay {
     /// Steps of all fingers, up to the first difference.
@@ -228,7 +205,6 @@ pub struct Difference {
     pub frame: u64,
     /// Nanoseconds after the recording's first step.
     pub time_ns: u64,
-    /// Recorded duty and digest.
     pub recorded: (i16, String),
     /// Duty and digest of the replay.
     pub replayed: (i16, String),
@@ -253,9 +229,6 @@ struct Core {
 }
 
 /// Replays a file.
-///
-/// # Errors
-/// The file cannot be read, is damaged, or is not a complete recording of this project.
 pub fn replay(path: &Path) -> Result<Replay, RunError> {
     let bytes = fs::read(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
     replay_bytes(&bytes).map_err(|error| format!("{}: {error}", path.display()).into())
@@ -265,24 +238,23 @@ fn replay_bytes(bytes: &[u8]) -> Result<Replay, RunError> {
     check(bytes)?;
     let setup = metadata(bytes, SETUP)?;
     if setup.metadata.get(WHOLE).is_some_and(|whole| whole == "false") {
-        return Err(
-            "a recording of the emulated board: what its core was given is not all in it, so it cannot be fed \
-                    through the core again"
-                .into(),
-        );
+        let message = "a recording of the emulated board: what its core was given is not all in it, so it cannot be fed \
+                       through the core again";
+        return Err(message.into());
     }
     let end = metadata(bytes, END)?;
     let field = |of: &Metadata, name: &str| {
-        of.metadata
-            .get(name)
-            .cloned()
-            .ok_or_else(|| format!("{} has no {name}: not a recording of this version", of.name))
+        let found = of.metadata.get(name).cloned();
+        found.ok_or_else(|| format!("{} has no {name}: not a recording of this version", of.name))
     };
     // The file is intact, but another program may have rewritten it with other contents.
     if field(&end, OF_SETUP)? != digest(&setup.metadata) {
         return Err(format!("its {SETUP}, how the controllers were set, was changed after the run").into());
     }
-    if field(&end, OF_SCENE)? != texts(scene(bytes)?.iter().map(|scene| &scene.data[..])) {
+    let summary = mcap::Summary::read(bytes)?.ok_or("the file has no summary")?;
+    let attached = summary.attachment_indexes.iter().map(|index| mcap::read::attachment(bytes, index));
+    let attached = attached.collect::<McapResult<Vec<Attachment>>>()?;
+    if field(&end, OF_SCENE)? != texts(attached.iter().map(|scene| &scene.data[..])) {
         return Err("the attached scene was changed after the run, or is missing".into());
     }
     let fingers: usize = field(&setup, "fingers")?.parse()?;
@@ -299,7 +271,7 @@ fn replay_bytes(bytes: &[u8]) -> Result<Replay, RunError> {
         cores.push((topic(number, "core"), pipeline, 0));
     }
     let mut steps = 0;
-    for message in messages(bytes)? {
+    for message in MessageStream::new_with_options(bytes, Options::ValidateChunkCrcs.into())? {
         let message = message?;
         let found = cores.iter_mut().enumerate().find(|(_, (topic, ..))| *topic == message.channel.topic);
         let Some((finger, (_, pipeline, frame))) = found else { continue };
@@ -326,19 +298,6 @@ fn replay_bytes(bytes: &[u8]) -> Result<Replay, RunError> {
         }
     }
     Ok(Replay { steps, difference: None })
-}
-
-fn messages(bytes: &[u8]) -> McapResult<MessageStream<'_>> {
-    MessageStream::new_with_options(bytes, Options::ValidateChunkCrcs.into())
-}
-
-fn scene(bytes: &[u8]) -> Result<Vec<Attachment<'_>>, RunError> {
-    let summary = mcap::Summary::read(bytes)?.ok_or("the file has no summary")?;
-    Ok(summary
-        .attachment_indexes
-        .iter()
-        .map(|index| mcap::read::attachment(bytes, index))
-        .collect::<McapResult<_>>()?)
 }
 
 fn metadata(bytes: &[u8], name: &str) -> Result<Metadata, RunError> {

@@ -16,18 +16,15 @@ pub struct Description {
     pub state: &'static str,
     /// Source of equations and magnitudes.
     pub reference: &'static str,
-    /// Keys of the effect.
     pub keys: &'static [Key],
     /// Values of keys at which the effect changes nothing. Other keys may have any value.
     pub zero: &'static [(&'static str, f64)],
-    /// Builds the effect for one finger.
     pub build: fn(&Build) -> Part,
 }
 
 /// A family of effects, by the place at which they act.
 #[derive(Clone, Copy, Debug)]
 pub struct Family {
-    /// Name in one word.
     pub name: &'static str,
     /// Heading on the reference page.
     pub title: &'static str,
@@ -53,9 +50,7 @@ const FAMILIES: [Family; 4] = [LINK, SENSOR, CONTACT, DRIVE];
 /// Effect of a scene.
 #[derive(Clone, Debug)]
 pub struct Named {
-    /// Description of the effect.
     pub effect: &'static Description,
-    /// Values of its keys.
     pub values: Values,
 }
 
@@ -64,16 +59,13 @@ pub fn all() -> impl Iterator<Item = &'static Description> {
     FAMILIES.iter().flat_map(|family| family.effects)
 }
 
-/// Returns the name of the family of an effect.
 pub fn family_of(effect: &Description) -> &'static str {
     let family = FAMILIES.iter().find(|family| family.effects.iter().any(|known| known.name == effect.name));
     family.map_or("", |family| family.name)
 }
 
-/// Builds the named effects of a finger, each with its name.
 pub fn build(named: &[Named], seed: u64, finger: usize) -> impl Iterator<Item = (&'static str, Part)> {
     named.iter().map(move |Named { effect, values }| {
-        let build = Build { values, seed: stream(seed, effect.name, finger) };
-        (effect.name, (effect.build)(&build))
+        (effect.name, (effect.build)(&Build::new(values, stream(seed, effect.name, finger))))
     })
 }

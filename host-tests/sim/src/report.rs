@@ -15,16 +15,11 @@ use crate::scene::Scene;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use output::plot::PlotError;
 
-/// Contents of a page.
 #[derive(Clone, Copy)]
 pub struct Report<'a> {
-    /// Scene that was run.
     pub scene: &'a Scene,
-    /// Name of the board.
     pub board: &'a str,
-    /// Result of the run.
     pub outcome: &'a Outcome,
-    /// Trace of the run.
     pub trace: &'a Trace,
     /// Metrics without each effect, if requested.
     pub ablated: &'a [Without],
@@ -51,7 +46,6 @@ const SCRIPTS: [&str; 5] = [
     include_str!("report/script/main.js"),
 ];
 
-/// Returns the page.
 pub fn page(report: &Report) -> Result<String, RunError> {
     let Report { scene, board, outcome, trace, over, .. } = report;
     let summary = &outcome.summary;
@@ -308,9 +302,7 @@ const REST: &str = "More";
 /// Metrics under a title.
 struct Group {
     pub title: &'static str,
-    /// Metrics in the order of the table.
     pub metrics: Vec<&'static Metric>,
-    /// Number of broken bounds.
     pub broken: usize,
 }
 

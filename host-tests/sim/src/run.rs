@@ -14,10 +14,8 @@ pub type RunError = Box<dyn Error + Send + Sync>;
 /// Board that runs a scene.
 pub type Run<'a> = &'a (dyn Fn(&Scene, &mut dyn Watch) -> Result<Summary, RunError> + Sync);
 
-/// Result of a run.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// Results of the metrics.
     pub measured: Measured,
     /// Comparison of the results with the bounds.
     pub verdicts: Vec<Verdict>,
@@ -41,8 +39,7 @@ impl Outcome {
         self.verdicts.iter().all(|verdict| verdict.held)
     }
 
-    /// Returns the result for scripts. The keys are stable; `null` is a metric without a value, or a side without a
-    /// bound.
+    /// Returns the result for scripts. The keys are stable; `null` is a missing value, or a side without a bound.
     #[cfg(feature = "files")]
     pub fn json(&self, scene: &Scene, board: &str, ablated: &[Without]) -> Value {
         let values = |measured: &Measured| -> Map<String, Value> {
@@ -170,8 +167,7 @@ pub fn by_effect(scene: &Scene, all: &[Cost]) -> Vec<Cost> {
     scene.effects.iter().map(|named| of(named.effect.name)).collect()
 }
 
-/// Returns each effect with its calls, its time and its share of the run in percent, then the stages of a frame without
-/// their effects, and the rest of the run.
+/// Returns each effect with its calls, time and share of the run in percent, then the stages and the rest of the run.
 pub fn ledger_rows(summary: &Summary) -> Vec<(&'static str, Option<u64>, f64, f64)> {
     let percent = |seconds: f64| if summary.wall_s > 0.0 { 100.0 * seconds / summary.wall_s } else { 0.0 };
     let effects = summary.ledger.iter();
@@ -194,9 +190,7 @@ pub fn ledger_json(summary: &Summary) -> Value {
 /// Metrics without an effect.
 #[derive(Clone, Debug)]
 pub struct Without {
-    /// Effect that was left out.
     pub effect: &'static str,
-    /// Metrics of that run.
     pub measured: Measured,
 }
 

@@ -18,11 +18,9 @@ use fingertip::params::Params;
 pub struct Scene {
     /// The file's name without its ending.
     pub name: String,
-    /// Whole text of the file.
     pub text: String,
     /// Values that the command line replaced, as `TABLE.KEY=VALUE`. `text` has them too.
     pub set: Vec<String>,
-    /// Description in one line.
     pub about: String,
     /// Seed of all random numbers.
     pub seed: u64,
@@ -36,15 +34,11 @@ pub struct Scene {
     pub events: Vec<Event>,
     /// Effects of the scene, in the order of the registry.
     pub effects: Vec<Named>,
-    /// Bounds on metrics.
     pub bounds: Vec<Bound>,
 }
 
 impl Scene {
     /// Returns the values of a table.
-    ///
-    /// # Panics
-    /// No such table is described.
     pub fn table(&self, name: &str) -> &Values {
         let found = self.tables.iter().find(|(known, _)| *known == name);
         &found.unwrap_or_else(|| panic!("no table [{name}] is described")).1
@@ -80,8 +74,7 @@ impl Scene {
         setup
     }
 
-    /// Returns the parameters of the controller, unchecked: those of `[controller]`, else those that follow from the other
-    /// tables, else the firmware's defaults.
+    /// Returns the unchecked parameters: of `[controller]`, else by the other tables, else the firmware's defaults.
     pub fn params(&self) -> Params {
         let [tip, array, motor] = ["tip", "array", "motor"].map(|name| self.table(name));
         let [transmission, supply] = ["transmission", "supply"].map(|name| self.table(name));
@@ -124,7 +117,6 @@ impl Scene {
     }
 }
 
-/// Goal of the host.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Goal {
     /// Time from the start.
@@ -138,9 +130,7 @@ pub struct Goal {
 pub struct Bound {
     /// Name of the metric, with its unit: `peak_force_n`.
     pub metric: String,
-    /// Lower limit.
     pub min: Option<f64>,
-    /// Upper limit.
     pub max: Option<f64>,
     /// Increase of the upper limit per N of the goal, for a metric with a value for each goal.
     pub max_per_goal_n: Option<f64>,

@@ -5,24 +5,18 @@ use serde::{Deserialize, Serialize};
 /// Everything around the microcontroller. The defaults are the reference finger of `docs/board.md`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Setup {
-    /// Soft fingertip.
     pub tip: Tip,
-    /// Place of the object.
     pub wall: Wall,
-    /// Tactile array and its amplifiers.
     pub array: Array,
-    /// Motor with its encoder.
     pub motor: Motor,
     /// Transmission from the shaft of the motor to the tip.
     pub transmission: Transmission,
-    /// Supply of the bridge.
     pub supply: Supply,
 }
 
 /// The hemispherical fingertip of Park, Kim and Hirai (2003).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Tip {
-    /// Radius a.
     pub radius_mm: f64,
     /// Young's modulus Y.
     pub modulus_kpa: f64,
@@ -62,7 +56,6 @@ pub struct Array {
     pub siemens_per_kpa: f64,
     /// Increase of the pressure per code from none to the full range of the converter; 0 is linear.
     pub growth: f64,
-    /// Conductance of a shorted taxel.
     pub short_siemens: f64,
     /// Row switch and trace, R_on.
     pub row_ohm: f64,
@@ -125,15 +118,12 @@ impl Default for Array {
 /// A brushed motor with its encoder. The defaults are the data sheet of the FAULHABER 1331 T 006 SR with an IE2-400.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Motor {
-    /// Terminal resistance.
     pub resistance_ohm: f64,
     /// Torque constant; also the back-EMF constant in V s/rad.
     pub torque_nm_per_a: f64,
-    /// Inertia at the shaft.
     pub inertia_kg_m2: f64,
     /// Friction torque, independent of speed.
     pub friction_nm: f64,
-    /// Quadrature counts for one turn.
     pub encoder_counts_per_turn: f64,
 }
 
@@ -178,8 +168,7 @@ pub struct Supply {
 }
 
 impl Supply {
-    /// Resistance of the whole circuit of a motor at a duty. The source gives the share u of the current for the share
-    /// u of the time, so the motor sees u^2 of the resistance of the source.
+    /// Resistance of the whole circuit at a duty u, in which the motor sees u^2 of the resistance of the source.
     pub fn circuit_ohm(&self, motor: &Motor, duty: f64) -> f64 {
         motor.resistance_ohm + self.bridge_ohm + duty * duty * self.source_ohm
     }

@@ -6,12 +6,13 @@
 pub mod files;
 mod summary;
 
-pub(crate) use files::first_missing;
+pub(crate) use files::complete;
 pub use files::{Shard, merge};
 pub use summary::Table;
 
+use crate::effects::draws;
 use crate::metrics::METRICS;
-use crate::registry::Named;
+use crate::registry::{self, Named};
 use crate::run::{Run, RunError, run};
 use crate::scene::Scene;
 use crate::{cli, cores};
@@ -20,18 +21,15 @@ use indicatif::{ProgressBar, ProgressStyle};
 use output::say;
 use std::path::{Path, PathBuf};
 
-/// Plan of a sweep.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// Path of a scene, or its name in the library.
     pub scene: String,
     /// `TABLE.KEY=VALUE` for all runs.
     pub set: Vec<String>,
-    /// Keys that vary.
     pub vary: Vec<Vary>,
     /// Number of seeds at each point, counted from the seed of the scene.
     pub seeds: u64,
-    /// Shard of the runs.
     pub shard: Shard,
     /// Folder of the results; none for its own folder in [`FOLDER`].
     pub out: Option<PathBuf>,
@@ -42,18 +40,7 @@ pub const FOLDER: &str = "target/sweep";
 /// Most points or runs: more would take weeks and too much memory, so they are probably a typing error.
 const MOST: usize = 1_000_000;
 
-/// Run of the sweep.
-struct Task<'a> {
-    number: usize,
-    values: &'a [String],
-    scene: &'a Scene,
-    seed: u64,
-}
-
 /// Runs the sweep or the shard and writes its files. Returns their folder too. A sweep that was stopped continues.
-///
-/// # Errors
-/// The scene has a mistake at a point, a run fails, a file cannot be written, or another process writes it.
 pub fn sweep(plan: &Plan, board: Run) -> Result<(Table, PathBuf), RunError> {
     let seeds = usize::try_from(plan.seeds).unwrap_or(usize::MAX);
     let mut counts = plan.vary.iter().map(|vary| vary.values.len());
@@ -61,11 +48,12 @@ pub fn sweep(plan: &Plan, board: Run) -> Result<(Table, PathBuf), RunError> {
     let all = all.ok_or_else(|| format!("more than {MOST} runs: vary fewer keys, or give fewer values or seeds"))?;
     let points = points(plan)?;
     let first = &points.first().ok_or("there is nothing to run")?.1;
-    if seeds > 1 && !points.iter().any(|(_, scene)| is(scene)) {
+    if seeds > 1 && !points.iter().any(|(_, scene)| is_random(scene)) {
+        let drawing: Vec<&str> = registry::all().filter(|effect| draws(effect)).map(|effect| effect.name).collect();
         return Err(format!(
             "nothing in {} is random: all {seeds} seeds would give the same run. Leave --seeds out, or name an effect that draws: {}",
             first.name,
-            EFFECTS.join(", ")
+            drawing.join(", ")
         )
         .into());
     }
@@ -76,35 +64,33 @@ pub fn sweep(plan: &Plan, board: Run) -> Result<(Table, PathBuf), RunError> {
         0 => format!("the runs go to {}", out.display()),
         count => format!("goes on in {}, where {count} runs are done", out.display()),
     });
-    let task = |number: usize| {
-        let (values, scene) = &points[number / seeds];
-        Task { number, values, scene, seed: scene.seed + (number % seeds) as u64 }
-    };
-    let mine = (0..all).filter(|number| plan.shard.has(*number));
-    let tasks: Vec<Task> = mine.filter(|number| !rows.has(number + 1)).map(task).collect();
+    let tasks: Vec<usize> = (0..all).filter(|run| plan.shard.has(*run) && !rows.has(run + 1)).collect();
     let progress = progress(tasks.len() + rows.count(), "runs")?.with_position(rows.count() as u64);
-    let done = |task: &Task, row| {
-        progress.inc(1);
-        rows.add(task.number + 1, row)
+    let work = |run: &usize| {
+        let (values, scene) = &points[run / seeds];
+        row(run + 1, values, Scene { seed: scene.seed + (run % seeds) as u64, ..scene.clone() }, board)
     };
-    cores::each(&tasks, |task| row(task, board), done)?;
+    let done = |run: &usize, row| {
+        progress.inc(1);
+        rows.add(run + 1, row)
+    };
+    cores::each(&tasks, work, done)?;
     progress.finish_and_clear();
     Ok((rows.finish(plan, &out)?, out))
 }
 
-/// Progress bar on the terminal.
 pub fn progress(all: usize, things: &str) -> Result<ProgressBar, RunError> {
     let template = format!("{{bar:40}} {{pos}} of {{len}} {things}, {{eta}} to go");
     Ok(ProgressBar::new(all as u64).with_style(ProgressStyle::with_template(&template)?))
 }
 
 /// Row of a run after its number: values, seed, verdict, digest and metrics.
-fn row(task: &Task, board: Run) -> Result<Vec<String>, RunError> {
-    let scene = Scene { seed: task.seed, ..task.scene.clone() };
-    let outcome = run(&scene, board, &mut [])
-        .map_err(|error| format!("run {} (seed {}, {:?}): {error}", task.number + 1, task.seed, task.values))?;
-    let mut row = task.values.to_vec();
-    row.extend([task.seed.to_string(), u8::from(outcome.passed()).to_string(), outcome.summary.digest.clone()]);
+fn row(number: usize, values: &[String], scene: Scene, board: Run) -> Result<Vec<String>, RunError> {
+    let seed = scene.seed;
+    let outcome =
+        run(&scene, board, &mut []).map_err(|error| format!("run {number} (seed {seed}, {values:?}): {error}"))?;
+    let mut row = values.to_vec();
+    row.extend([seed.to_string(), u8::from(outcome.passed()).to_string(), outcome.summary.digest.clone()]);
     // Infinite values are left out, as in JSON.
     let value = |name| outcome.measured.get(name).filter(|value| value.is_finite());
     row.extend(METRICS.iter().map(|metric| value(metric.name).map_or(String::new(), |value| value.to_string())));
@@ -129,10 +115,8 @@ fn points(plan: &Plan) -> Result<Vec<(Vec<String>, Scene)>, RunError> {
     combinations.into_iter().map(point).collect()
 }
 
-/// Key and its values as TOML.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Vary {
-    /// `table.key`.
     pub key: String,
     /// Values from the first to the last.
     pub values: Vec<String>,
@@ -175,46 +159,18 @@ impl std::str::FromStr for Vary {
     }
 }
 
-/// Effects that draw random numbers.
-pub const EFFECTS: [&str; 8] =
-    ["noise", "offset", "gain_spread", "tangential", "host_jitter", "lost_packets", "corrupted_packets", "burst"];
-
 /// True if another seed may give another run.
-pub fn is(scene: &Scene) -> bool {
-    scene.effects.iter().any(draws)
-}
-
-/// True if an effect draws with a deviation other than 0.
-fn draws(named: &Named) -> bool {
-    let Named { effect, values } = named;
-    let idle = |keys: &[(&str, f64)]| keys.iter().all(|(key, zero)| values.number(key) == *zero);
-    EFFECTS.contains(&effect.name)
-        && match effect.name {
-            "tangential" => !idle(&[("spread_percent", 0.0)]),
-            _ => effect.zero.is_empty() || !idle(effect.zero),
-        }
+fn is_random(scene: &Scene) -> bool {
+    scene.effects.iter().any(|Named { effect, values }| {
+        let idle = |keys: &[(&str, f64)]| keys.iter().all(|(key, zero)| values.number(key) == *zero);
+        let zero = if effect.name == "tangential" { &[("spread_percent", 0.0)] } else { effect.zero };
+        draws(effect) && (zero.is_empty() || !idle(zero))
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::registry;
-    use std::fs;
-
-    /// Source of the random numbers of an effect.
-    const DRAWN_FROM: &str = "build.seed";
-
-    #[test]
-    fn those_that_draw_are_listed() {
-        let folder = format!("{}/host-tests/sim/src/effects", env!("FINGERTIP_ROOT"));
-        let files = ["contact.rs", "drive.rs", "link.rs", "sensor/effects.rs"];
-        let text = files.map(|file| fs::read_to_string(format!("{folder}/{file}")).unwrap()).concat();
-        for effect in registry::all() {
-            let (_, text) = text.split_once(&format!("name: \"{}\"", effect.name)).unwrap();
-            let text = text.split("Description {").next().unwrap();
-            assert_eq!(text.contains(DRAWN_FROM), EFFECTS.contains(&effect.name), "{}", effect.name);
-        }
-    }
 
     #[test]
     fn ranges_are_read() {

@@ -10,7 +10,6 @@ use serde::{Deserialize, Serialize};
 /// Settings of a controller when a run begins. With all [`Step`]s they are sufficient for a replay.
 #[derive(Clone, Debug)]
 pub struct Controller {
-    /// Parameters of the controller.
     pub params: Params,
     /// Gains and mask of the taxels, if any.
     pub calibration: Option<Gains>,
@@ -34,9 +33,7 @@ pub struct Step<'a> {
     pub time_s: f64,
     /// Complete input of the core with `sense` and `command`: a recording of them replays the run to the bit.
     pub frame: &'a Frame,
-    /// See [`Step::frame`].
     pub sense: &'a Sense,
-    /// See [`Step::frame`].
     pub command: &'a Command,
     /// Output of the core, with the duty.
     pub status: &'a Status,
@@ -49,17 +46,13 @@ pub struct Step<'a> {
 pub struct Truth {
     /// Normal force between tip and object.
     pub force_n: f64,
-    /// Indentation of the tip.
     pub indentation_mm: f64,
     /// Centre of the contact from the array's middle, along columns and rows.
     pub centre_mm: [f64; 2],
     /// Travel of the tip from its start.
     pub travel_mm: f64,
-    /// Speed of the tip.
     pub speed_mm_per_s: f64,
-    /// Winding current.
     pub current_a: f64,
-    /// Supply at the bridge.
     pub supply_v: f64,
     /// Share of the supply at the motor, -1 to 1; positive presses.
     pub duty: f64,
@@ -79,7 +72,6 @@ pub struct Truth {
     pub defective: bool,
     /// Force at the tip that dry friction and the gear hold without the motor; infinite for a self-locking gear.
     pub friction_n: f64,
-    /// True if the object broke.
     pub broken: bool,
     /// Mean true pressure on each taxel if a watcher requests it ([`Watch::wants_pressures`]), else 0.
     pub pressures_kpa: [[f64; COLUMNS]; ROWS],
@@ -105,25 +97,19 @@ pub trait Watch {
     fn step(&mut self, step: &Step);
 }
 
-/// Cost of an effect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cost {
-    /// The effect's name.
     pub effect: &'static str,
-    /// Number of calls.
     pub evaluations: u64,
     /// Wall time, estimated from a sample of the calls.
     pub seconds: f64,
 }
 
-/// Summary of a run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Summary {
-    /// Virtual time.
     pub virtual_s: f64,
     /// Wall time before the start of the scene: to build the world, to power the boards up and to tare them.
     pub set_up_s: f64,
-    /// Wall time of the scene.
     pub wall_s: f64,
     /// Cost of each effect, in the order of the scene.
     pub ledger: Vec<Cost>,

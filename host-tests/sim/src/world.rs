@@ -2,11 +2,12 @@
 
 use crate::bridge::Bridge;
 use crate::effects::Set;
-use crate::effects::contact::Stages as _;
+use crate::effects::contact;
 use crate::effects::drive::Stages as _;
 use crate::events::{Event, Happened};
 use crate::mechanics::contact::{Contact, Place};
 use crate::mechanics::finger::Finger;
+use crate::native::SimError;
 use crate::scene::Scene;
 use crate::setup::{Setup, Tip};
 use crate::watch::Truth;
@@ -14,28 +15,8 @@ use fingertip::frame::Sense;
 use fingertip::shipped::COLUMNS;
 use fingertip::units::CoreCycles;
 
-/// Largest product of a step and the angular frequency of the fastest oscillation. Each iteration of the solution then
-/// gains a factor of 16 or more.
+/// Largest product of a step and the fastest angular frequency: each iteration gains a factor of 16 or more.
 const STEP_RAD: f64 = 0.5;
-
-/// Reason why a world cannot be simulated.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum WorldError {
-    /// The step is too long for what moves.
-    #[error(
-        "step_us of {step_us}: at most {allowed_us:.1} are allowed for a contact of {n_per_mm:.1} N/mm on {mass_g:.3} g"
-    )]
-    Step {
-        /// Requested step.
-        step_us: f64,
-        /// Largest allowed step.
-        allowed_us: f64,
-        /// Slope of the steepest contact.
-        n_per_mm: f64,
-        /// Mass that moves against it.
-        mass_g: f64,
-    },
-}
 
 /// Most iterations of the common solution of fingers and object, and the displacement below whose change they end.
 const ROUNDS: usize = 60;
@@ -48,7 +29,7 @@ const PUT_BACK_MM_PER_S: f64 = 20.0;
 
 /// Fingers and their object.
 pub struct World<E: Set> {
-    fingers: Vec<Finger<E::Drive, E::Contact>>,
+    fingers: Vec<Finger<E::Drive>>,
     around: Surroundings,
     /// Mass of the object; none if it is fixed.
     mass_kg: Option<f64>,
@@ -67,12 +48,12 @@ fn side(finger: usize) -> f64 {
 
 impl<E: Set> World<E> {
     /// Creates a world of one finger or two.
-    pub fn new(setup: &Setup, around: &Surroundings, effects: Vec<(E::Drive, E::Contact)>) -> Self {
-        let mut fingers: Vec<Finger<E::Drive, E::Contact>> =
+    pub fn new(setup: &Setup, around: &Surroundings, effects: Vec<(E::Drive, contact::Named)>) -> Self {
+        let mut fingers: Vec<Finger<E::Drive>> =
             effects.into_iter().map(|(drive, contact)| Finger::new(setup, drive, contact)).collect();
         let mass_kg = fingers[0].contact.effects.mass_kg().filter(|kg| *kg > 0.0);
         let body = Body::default();
-        let bare = fingers.iter().all(|finger| finger.contact.effects.none());
+        let bare = fingers.iter().all(|finger| !finger.contact.effects.any());
         Self {
             fingers,
             around: around.clone(),
@@ -86,7 +67,7 @@ impl<E: Set> World<E> {
     }
 
     /// Refuses a step that is too long for the steepest contact.
-    pub fn check_step(&self, step_s: f64) -> Result<(), WorldError> {
+    pub fn check_step(&self, step_s: f64) -> Result<(), SimError> {
         for finger in &self.fingers {
             let n_per_mm = finger.contact.steepest_n_per_mm(Tip::DEEPEST * finger.setup().tip.radius_mm);
             // An object between two fingers is pushed back by both.
@@ -94,24 +75,24 @@ impl<E: Set> World<E> {
             let potential = finger.drive.steepest_nm_per_rad() / finger.inertia_kg_m2();
             let allowed_s = STEP_RAD / (n_per_mm * 1e3 * lightness + potential).sqrt();
             if step_s > allowed_s {
-                let (step_us, allowed_us) = (step_s * 1e6, allowed_s * 1e6);
-                return Err(WorldError::Step { step_us, allowed_us, n_per_mm, mass_g: 1e3 / lightness });
+                let (step_us, allowed_us, mass_g) = (step_s * 1e6, allowed_s * 1e6, 1e3 / lightness);
+                return Err(SimError::Step(format!(
+                    "step_us of {step_us}: at most {allowed_us:.1} are allowed for a contact of {n_per_mm:.1} N/mm on {mass_g:.3} g"
+                )));
             }
         }
         Ok(())
     }
 
-    /// Fingers.
-    pub fn fingers(&self) -> &[Finger<E::Drive, E::Contact>] {
+    pub fn fingers(&self) -> &[Finger<E::Drive>] {
         &self.fingers
     }
 
     /// Fingers, to place or launch them.
-    pub fn fingers_mut(&mut self) -> &mut [Finger<E::Drive, E::Contact>] {
+    pub fn fingers_mut(&mut self) -> &mut [Finger<E::Drive>] {
         &mut self.fingers
     }
 
-    /// Object.
     pub fn body(&self) -> &Body {
         &self.body
     }
@@ -179,7 +160,7 @@ impl<E: Set> World<E> {
         for (index, finger) in self.fingers.iter_mut().enumerate() {
             let [from, to] = [&self.body_before, &self.body].map(|body| surface_mm(finger.setup(), index, body));
             let end =
-                finger.solve(|contact: &Contact<_>, from_mm, to_mm| contact.law().mean_n(from_mm - from, to_mm - to));
+                finger.solve(|contact: &Contact, from_mm, to_mm| contact.law().mean_n(from_mm - from, to_mm - to));
             finger.finish(&end, to);
         }
         if !self.bare {
@@ -203,8 +184,7 @@ impl<E: Set> World<E> {
         }
     }
 
-    /// Solves for fingers and object together: mean forces from the ends, ends from the mean forces, until both agree.
-    /// Then momentum and energy are conserved between them.
+    /// Solves for fingers and object together until forces and ends agree: momentum and energy are conserved.
     #[inline(never)]
     fn advance_together(&mut self, mass_kg: f64, time_s: f64) {
         let (dt_s, body) = (self.dt_s, self.body);
@@ -232,9 +212,8 @@ impl<E: Set> World<E> {
                     along.push(state);
                 }
                 let end = finger.solve(|_, _, _| mean_n);
-                let flank_mm = finger.flank_at_mm(&end);
-                changed_mm = changed_mm.max((flank_mm - flanks[index]).abs());
-                flanks[index] = flank_mm;
+                changed_mm = changed_mm.max((end.flank_mm - flanks[index]).abs());
+                flanks[index] = end.flank_mm;
                 ends.push(end);
             }
             let moved = body.moved(mass_kg, force_n, &self.around, time_s, dt_s);
@@ -265,7 +244,6 @@ impl<E: Set> World<E> {
         self.fingers[index].contact.law().energy_mj(self.overlap_mm(index))
     }
 
-    /// Normal force on a finger.
     pub fn force_n(&self, finger: usize) -> f64 {
         self.fingers[finger].contact.law().force_n(self.overlap_mm(finger))
     }
@@ -326,8 +304,7 @@ fn surface_mm(setup: &Setup, finger: usize, body: &Body) -> f64 {
 }
 
 impl<E: Set> World<E> {
-    /// Returns the contact of a finger at a time within the last step. It is separate from the rows, so that several
-    /// places can be computed in parallel.
+    /// Returns the contact of a finger at a time within the last step, apart from its rows: several go in parallel.
     #[inline]
     pub fn place(&self, index: usize, since_s: f64) -> Place {
         let mut body = self.body;
@@ -353,8 +330,7 @@ impl<E: Set> World<E> {
         self.placed_kpa(index, &place, row)
     }
 
-    /// Mean pressures on a row at a time before the end of the last step (negative) or after it, at constant
-    /// acceleration.
+    /// Mean pressures on a row before the end of the last step (negative) or after it, at constant acceleration.
     pub fn row_off_kpa(&mut self, index: usize, off_s: f64, row: usize) -> [f64; COLUMNS] {
         if off_s < 0.0 {
             return self.row_kpa(index, (self.dt_s + off_s).max(0.0), row);
@@ -402,7 +378,6 @@ pub struct Surroundings {
 }
 
 impl Surroundings {
-    /// Surroundings of a scene.
     pub fn of(scene: &Scene) -> Self {
         let (object, hand) = (scene.table("object"), scene.table("hand"));
         let (shake_s, lift_s) = (object.number("shake_at_s"), hand.number("lift_at_s"));

@@ -2,6 +2,7 @@
 
 use clap::Parser;
 use output::say;
+use sim::cli::verdict;
 use sim::native;
 use sim::population::budget::Budget;
 use sim::population::whole_loop;
@@ -21,18 +22,12 @@ struct Args {
 
 fn main() -> ExitCode {
     let Args { fingers, whole_loop: whole } = Args::parse();
-    let text = match whole {
+    let answer = match whole {
         true => whole_loop::lines(fingers as usize),
         false => Budget::of(fingers as usize, &native::board, &native::calibrated::board).map(|budget| budget.page()),
     };
-    match text {
-        Ok(text) => {
-            say::text(text);
-            ExitCode::SUCCESS
-        }
-        Err(why) => {
-            say::aside(why);
-            ExitCode::from(2)
-        }
-    }
+    verdict(answer.map(|text| {
+        say::text(text);
+        true
+    }))
 }

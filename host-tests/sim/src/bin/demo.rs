@@ -2,42 +2,34 @@
 //!
 //! It has the same scene and figures as on the flash image, without a microcontroller.
 
+use clap::Parser;
 use output::say;
 use sim::demo::figures::{draw, missed, table};
 use sim::demo::{self, DemoError, Forces, Trace};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+/// Runs the demonstration's scene on the native board.
+#[derive(Parser)]
+#[command(name = "demo", version)]
+struct Args {
+    /// Holds each force for a shorter time
+    #[arg(long)]
+    quick: bool,
+    /// Folder for the pictures
+    #[arg(long, value_name = "DIR", default_value = "target/demo/native")]
+    out: PathBuf,
+}
+
 fn main() -> ExitCode {
-    let mut arguments = std::env::args_os().skip(1);
-    let (mut quick, mut out) = (false, PathBuf::from("target/demo/native"));
-    while let Some(argument) = arguments.next() {
-        match (argument.to_str(), arguments.len()) {
-            (Some("--quick"), _) => quick = true,
-            (Some("--out"), 1..) => out = arguments.next().unwrap_or_default().into(),
-            _ => {
-                say::aside(format_args!(
-                    "demo: {} is not understood; usage: demo [--quick] [--out DIR]",
-                    argument.display()
-                ));
-                return ExitCode::from(2);
-            }
-        }
+    let Args { quick, out } = Args::parse();
+    match run(quick, &out) {
+        Ok(0) if say::end() => return ExitCode::SUCCESS,
+        Ok(0) => {}
+        Ok(missed) => say::aside(format_args!("demo: {missed} of the bounds missed; see the table")),
+        Err(error) => say::aside(format_args!("demo: {error}")),
     }
-    let missed = run(quick, &out);
-    let shown = say::end();
-    match missed {
-        Ok(0) if shown => ExitCode::SUCCESS,
-        Ok(0) => ExitCode::FAILURE,
-        Ok(missed) => {
-            say::aside(format_args!("demo: {missed} of the bounds missed; see the table"));
-            ExitCode::FAILURE
-        }
-        Err(error) => {
-            say::aside(format_args!("demo: {error}"));
-            ExitCode::FAILURE
-        }
-    }
+    ExitCode::FAILURE
 }
 
 /// Runs the scene, prints the table, draws the pictures; how many bounds are missed.

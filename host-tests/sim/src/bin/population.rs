@@ -2,6 +2,7 @@
 
 use clap::Parser;
 use output::say;
+use sim::cli::verdict;
 use sim::native;
 use sim::native::calibrated;
 use sim::population::cli::{self, Args, Board};
@@ -10,27 +11,19 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     let args = Args::parse();
     match args.board {
-        Board::Native if args.name() == Some("unlike") => errors(&args),
+        // Shows the error of the force before and after calibration.
+        Board::Native if args.name() == Some("unlike") => {
+            verdict(calibrated::fingers(args.seed, args.fingers as usize).map(|fingers| {
+                say::text(calibrated::errors_text(&fingers));
+                true
+            }))
+        }
         Board::Native => cli::answer(&args, &native::board),
         Board::Calibrated => cli::answer(&args, &native::calibrated::board),
         Board::Virtual => {
             say::aside(
                 "this program is the native board: `cargo xtask population --board virtual` runs the flash image",
             );
-            ExitCode::from(2)
-        }
-    }
-}
-
-/// Prints the error of the force before and after calibration.
-fn errors(args: &Args) -> ExitCode {
-    match calibrated::fingers(args.seed, args.fingers as usize) {
-        Ok(fingers) => {
-            say::text(calibrated::errors_text(&fingers));
-            ExitCode::SUCCESS
-        }
-        Err(why) => {
-            say::aside(why);
             ExitCode::from(2)
         }
     }

@@ -4,8 +4,7 @@ use crate::demo::{Asked, DemoError, HeldImage, Run};
 use crate::optimal::minimum_time_s;
 use crate::setup::Setup;
 use fingertip::params::Params;
-use output::plot;
-use output::plot::{Map, Panel, Sample};
+use output::plot::{self, Map, Panel, Sample};
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -13,28 +12,21 @@ use std::path::{Path, PathBuf};
 /// Figures of the true force.
 #[derive(Clone, Debug, Serialize)]
 pub struct Forces {
-    /// First touch of the object.
     pub touch: Touch,
-    /// The force steps.
     pub steps: Vec<Step>,
-    /// Release of the object.
     pub release: Release,
 }
 
 /// The first touch of an object.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Touch {
-    /// Requested force.
     pub goal_n: f64,
     /// Time from the goal to the touch.
     pub touched_after_ms: f64,
     /// Speed just before the touch.
     pub approach_mm_per_s: Option<f64>,
-    /// Travel from the goal to the touch.
     pub distance_mm: f64,
-    /// Largest force.
     pub peak_n: f64,
-    /// Peak above the goal, as a share of the goal.
     pub peak_above_goal_percent: f64,
     /// Time from the touch until the force stays within 2 % of the goal; none if it never does.
     pub settled_after_touch_ms: Option<f64>,
@@ -47,7 +39,6 @@ pub struct Touch {
 pub struct Step {
     /// True force when the goal changed.
     pub from_n: f64,
-    /// Requested force.
     pub to_n: f64,
     /// Time from 10 % to 90 % of the step; none if the force does not reach 90 %.
     pub rise_ms: Option<f64>,
@@ -63,7 +54,6 @@ pub struct Step {
     pub settling_to_optimal_ratio: Option<f64>,
 }
 
-/// Release of the object.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Release {
     /// Time from the goal of 0 to the end of the last contact; none while something is touched.
@@ -75,15 +65,12 @@ pub struct Release {
 /// Figure and its bounds.
 #[derive(Clone, Debug, Serialize)]
 pub struct Check {
-    /// Name of the figure.
     pub name: String,
     /// Measured value; none if the run has none, which fails.
     pub measured: Option<f64>,
-    /// Unit of the figure.
     pub unit: &'static str,
     /// Lower bound: a figure too good to be true fails too.
     pub at_least: Option<f64>,
-    /// Upper bound.
     pub at_most: Option<f64>,
     /// True if the figure lies within its bounds.
     pub pass: bool,
@@ -99,16 +86,12 @@ impl Check {
     }
 }
 
-/// Returns the number of missed bounds.
 pub fn missed(checks: &[Check]) -> usize {
     checks.iter().filter(|check| !check.pass).count()
 }
 
 impl Forces {
     /// Takes the figures of a run.
-    ///
-    /// # Errors
-    /// The tip touched nothing, or a force was never reached.
     pub fn of(run: &Run) -> Result<Self, DemoError> {
         let (mut touch, mut steps, mut release) = (None, Vec::new(), None);
         for (place, asked) in run.goals.iter().enumerate() {
@@ -122,7 +105,7 @@ impl Forces {
                 release = Some(Release::of(samples));
             }
         }
-        let (touch, release) = touch.zip(release).ok_or(DemoError::NoTouch)?;
+        let (touch, release) = touch.zip(release).ok_or("nothing was touched, or it was not let go")?;
         Ok(Self { touch, steps, release })
     }
 
@@ -155,7 +138,6 @@ impl Forces {
 }
 
 impl Touch {
-    /// Returns none if nothing was touched.
     fn of(asked: &Asked, samples: &[Sample]) -> Option<Self> {
         let measured = asked.meter.measured();
         let touched = samples.iter().find(|sample| sample.true_force_n > 0.0)?;
@@ -179,7 +161,8 @@ impl Step {
         let [volts, amperes] =
             [Params::DEFAULT.voltage_max_mv, Params::DEFAULT.current_max_ma].map(|milli| f64::from(milli) * 1e-3);
         let [d_from_mm, d_to_mm] = [asked.from_n, asked.goal_n].map(|force_n| setup.tip.indentation_mm(force_n));
-        let time_optimal_ms = minimum_time_s(&setup, d_from_mm, d_to_mm, volts, amperes)? * 1e3;
+        let time_optimal_s = minimum_time_s(&setup, d_from_mm, d_to_mm, volts, amperes);
+        let time_optimal_ms = 1e3 * time_optimal_s.map_err(|why| format!("no bound for a step: {why}"))?;
         let measured = asked.meter.measured();
         let settling_ms = measured.get("settling_ms");
         Ok(Self {
@@ -281,10 +264,11 @@ pub fn draw(run: &Run, forces: &Forces, folder: &Path) -> Result<Vec<PathBuf>, D
         ("maps.svg", plot::maps(&maps, Setup::default().array.pitch_mm)?),
     ];
 
-    std::fs::create_dir_all(folder).map_err(|source| DemoError::Write { path: folder.into(), source })?;
+    let failed = |path: &Path, error| format!("cannot write {}: {error}", path.display());
+    std::fs::create_dir_all(folder).map_err(|error| failed(folder, error))?;
     let write = |(name, svg): (&str, String)| {
         let path = folder.join(name);
-        std::fs::write(&path, svg).map_err(|source| DemoError::Write { path: path.clone(), source })?;
+        std::fs::write(&path, svg).map_err(|error| failed(&path, error))?;
         Ok(path)
     };
     pictures.into_iter().map(write).collect()

@@ -11,17 +11,23 @@ use crate::mechanics::decay;
 use crate::registry::Description;
 use crate::scene::tables::Key;
 use crate::watch::{Cost, Truth};
-use fastrand::Rng;
 
-/// Effect on the surface of the object.
-pub trait Shape: Send {
-    /// Height of the surface towards the tip above the plane from which indentations count; negative where the surface
-    /// falls away. `x` runs along the columns of the array and `y` along its rows, from the axis of a tip of this
-    /// radius.
-    fn height_mm(&self, x_mm: f64, y_mm: f64, radius_mm: f64) -> f64;
+/// Height of the surface towards the tip above the plane from which indentations count, mm; negative where the surface
+/// falls away. The arguments are x along the columns of the array and y along its rows, from the axis of the tip, and the
+/// radius of the tip.
+type Height = dyn Fn(f64, f64, f64) -> f64 + Send;
 
+/// Surface of the object.
+pub struct Surface {
     /// True if the height is 0 within reach of a tip, so that the closed forms of the plane hold.
-    fn plain(&self) -> bool;
+    plain: bool,
+    height_mm: Box<Height>,
+}
+
+impl Surface {
+    fn part(plain: bool, height_mm: impl Fn(f64, f64, f64) -> f64 + Send + 'static) -> Part {
+        Part::Shape(Box::new(Self { plain, height_mm: Box::new(height_mm) }))
+    }
 }
 
 /// Height beyond the end of an object: no tip reaches it.
@@ -32,27 +38,6 @@ fn round(per_mm: f64, distance2_mm2: f64) -> f64 {
     let turned = per_mm * per_mm * distance2_mm2;
     // R - sqrt(R^2 - s^2) without cancellation for a large R.
     if turned < 1.0 { -per_mm * distance2_mm2 / (1.0 + (1.0 - turned).sqrt()) } else { NOTHING_MM }
-}
-
-/// Effect by which the tip relaxes.
-pub trait Memory: Send {
-    /// Returns the force to subtract from the elastic force.
-    fn forgotten_n(&mut self) -> f64;
-
-    /// Advances in time at a constant elastic force; none while the tip touches nothing.
-    fn relax(&mut self, dt_s: f64, elastic_n: Option<f64>);
-}
-
-/// Compliance of the object behind its surface, mm/N. Called once.
-pub type Series = dyn FnMut() -> f64 + Send;
-
-/// Effect that limits the force on the object.
-pub trait Strength: Send {
-    /// Returns the share of a force that remains after the object was loaded by it.
-    fn left(&mut self, force_n: f64) -> f64;
-
-    /// Adds the state to the truth.
-    fn tell(&self, truth: &mut Truth);
 }
 
 /// Friction along the surface, and compliance of the patch.
@@ -72,137 +57,75 @@ pub struct Grip {
     pub drift_from_s: f64,
 }
 
-/// Effect along the surface. Called once a step.
-pub type Tangent = dyn FnMut() -> Grip + Send;
-
-/// Mass of an object that can move, kg. Called once.
-pub type Body = dyn FnMut() -> f64 + Send;
-
-/// Stages as the contact calls them: of the named effects, or of `()`, which has none compiled in.
-pub trait Stages {
-    /// True if no stage has an effect: a step of the contact then calls none.
-    fn none(&self) -> bool;
-    /// True if the surface is not a plane.
-    fn shaped(&self) -> bool {
-        false
-    }
-    /// Sum of [`Shape::height_mm`].
-    fn height_mm(&self, _x_mm: f64, _y_mm: f64, _radius_mm: f64) -> f64 {
-        0.0
-    }
-    /// Counts the construction of the tables of the shape as a call of its effects.
-    fn shape_built(&mut self) {}
-    /// True if there is a [`Memory`].
-    fn forgets(&self) -> bool;
-    /// Sum of [`Memory::forgotten_n`].
-    fn forgotten_n(&mut self) -> f64 {
-        0.0
-    }
-    /// See [`Memory::relax`].
-    fn relax(&mut self, _dt_s: f64, _elastic_n: Option<f64>) {}
-    /// Moves the memory of the tip here from the effects of another scene.
-    fn remember(&mut self, _before: &mut Self) {}
-    /// Sum of [`Series`].
-    fn mm_per_n(&mut self) -> f64 {
-        0.0
-    }
-    /// True if there is a [`Strength`].
-    fn breaks(&self) -> bool;
-    /// Product of [`Strength::left`].
-    fn left(&mut self, _force_n: f64) -> f64 {
-        1.0
-    }
-    /// See [`Tangent`].
-    fn grip(&mut self) -> Option<Grip> {
-        None
-    }
-    /// Sum of [`Body`]; none if the object is fixed.
-    fn mass_kg(&mut self) -> Option<f64> {
-        None
-    }
-    /// Adds the state of the effects to the truth.
-    fn tell(&self, _truth: &mut Truth) {}
-}
-
-impl Stages for () {
-    fn none(&self) -> bool {
-        true
-    }
-
-    fn forgets(&self) -> bool {
-        false
-    }
-
-    fn breaks(&self) -> bool {
-        false
-    }
-}
-
 named! {
-    Shape(shape: dyn Shape),
-    Memory(memory: dyn Memory),
-    Series(series: Series),
-    Strength(strength: dyn Strength),
-    Tangent(tangent: Tangent),
-    Body(body: Body),
+    Shape(shape: Surface),
+    Memory(memory: Relaxation),
+    Series(series: f64),
+    Strength(strength: BreakableObject),
+    Tangent(tangent: Grip),
+    Body(body: f64),
 }
 
-impl Stages for Named {
-    fn none(&self) -> bool {
-        !self.any()
+impl Named {
+    /// True if the surface is not a plane.
+    pub fn shaped(&self) -> bool {
+        self.shape.iter().any(|effect| !effect.part().plain)
     }
 
-    fn shaped(&self) -> bool {
-        self.shape.iter().any(|effect| !effect.part().plain())
+    pub fn height_mm(&self, x_mm: f64, y_mm: f64, radius_mm: f64) -> f64 {
+        self.shape.iter().map(|effect| (effect.part().height_mm)(x_mm, y_mm, radius_mm)).sum()
     }
 
-    fn height_mm(&self, x_mm: f64, y_mm: f64, radius_mm: f64) -> f64 {
-        self.shape.iter().map(|effect| effect.part().height_mm(x_mm, y_mm, radius_mm)).sum()
-    }
-
-    fn shape_built(&mut self) {
+    /// Counts the construction of the tables of the shape as a call of its effects.
+    pub fn shape_built(&mut self) {
         self.shape.iter_mut().for_each(|effect| effect.call(|_| ()));
     }
 
-    fn forgets(&self) -> bool {
+    pub fn forgets(&self) -> bool {
         !self.memory.is_empty()
     }
 
-    fn forgotten_n(&mut self) -> f64 {
+    /// Returns the force to subtract from the elastic force.
+    pub fn forgotten_n(&mut self) -> f64 {
         self.memory.iter_mut().map(|effect| effect.call(|part| part.forgotten_n())).sum()
     }
 
-    fn relax(&mut self, dt_s: f64, elastic_n: Option<f64>) {
+    /// Advances in time at a constant elastic force; none while the tip touches nothing.
+    pub fn relax(&mut self, dt_s: f64, elastic_n: Option<f64>) {
         self.memory.iter_mut().for_each(|effect| effect.call(|part| part.relax(dt_s, elastic_n)));
     }
 
-    fn remember(&mut self, before: &mut Self) {
+    /// Moves the memory of the tip here from the effects of another scene.
+    pub fn remember(&mut self, before: &mut Self) {
         self.memory = core::mem::take(&mut before.memory);
     }
 
-    fn mm_per_n(&mut self) -> f64 {
-        self.series.iter_mut().map(|effect| effect.call(|part| part())).sum()
+    /// Compliance of the object behind its surface.
+    pub fn mm_per_n(&mut self) -> f64 {
+        self.series.iter_mut().map(|effect| effect.call(|part| *part)).sum()
     }
 
-    fn breaks(&self) -> bool {
+    pub fn breaks(&self) -> bool {
         !self.strength.is_empty()
     }
 
-    fn left(&mut self, force_n: f64) -> f64 {
+    /// Returns the share of a force that remains after the object was loaded by it.
+    pub fn left(&mut self, force_n: f64) -> f64 {
         self.strength.iter_mut().map(|effect| effect.call(|part| part.left(force_n))).product()
     }
 
-    fn grip(&mut self) -> Option<Grip> {
-        self.tangent.iter_mut().map(|effect| effect.call(|part| part())).last()
+    pub fn grip(&mut self) -> Option<Grip> {
+        self.tangent.iter_mut().map(|effect| effect.call(|part| *part)).last()
     }
 
-    fn mass_kg(&mut self) -> Option<f64> {
-        self.body.iter_mut().map(|effect| effect.call(|part| part())).reduce(|all, more| all + more)
+    /// Mass of the object; none if it is fixed.
+    pub fn mass_kg(&mut self) -> Option<f64> {
+        self.body.iter_mut().map(|effect| effect.call(|part| *part)).reduce(|all, more| all + more)
     }
 
     #[inline]
-    fn tell(&self, truth: &mut Truth) {
-        self.strength.iter().for_each(|effect| effect.part().tell(truth));
+    pub fn tell(&self, truth: &mut Truth) {
+        self.strength.iter().for_each(|effect| truth.broken |= effect.part().broken);
     }
 }
 
@@ -315,7 +238,7 @@ pub const EFFECTS: &[Description] = &[
         zero: &[("yield_mm_per_n", 0.0)],
         build: |build: &Build| {
             let mm_per_n = build.number("yield_mm_per_n");
-            Part::Series(Box::new(move || mm_per_n))
+            Part::Series(Box::new(mm_per_n))
         },
     },
     Description {
@@ -358,7 +281,7 @@ pub const EFFECTS: &[Description] = &[
         build: |build: &Build| {
             let values = build.values;
             let spread = values.number("spread_percent") / 100.0;
-            let drawn = 1.0 + spread * normal_within_3(&mut Rng::with_seed(build.seed));
+            let drawn = 1.0 + spread * normal_within_3(&mut build.rng());
             let grip = Grip {
                 n_per_mm: values.number("n_per_mm"),
                 n_s_per_mm: values.number("damping_n_s_per_mm"),
@@ -367,7 +290,7 @@ pub const EFFECTS: &[Description] = &[
                 drift_mm_per_s: values.number("drift_mm_per_s"),
                 drift_from_s: values.number("drift_from_s"),
             };
-            Part::Tangent(Box::new(move || grip))
+            Part::Tangent(Box::new(grip))
         },
     },
     Description {
@@ -383,7 +306,7 @@ pub const EFFECTS: &[Description] = &[
         zero: &[("mass_g", 0.0)],
         build: |build: &Build| {
             let kg = build.number("mass_g") * 1e-3;
-            Part::Body(Box::new(move || kg))
+            Part::Body(Box::new(kg))
         },
     },
 ];
@@ -391,26 +314,8 @@ pub const EFFECTS: &[Description] = &[
 /// Largest radius of a tip (`[tip]`, `radius_mm`).
 const LARGEST_TIP_MM: f64 = 16.0;
 
-/// Surface by [`Shape::plain`] and by its height at a place, for a radius of the tip.
-struct Surface<F>(bool, F);
-
-impl<F: Fn(f64, f64, f64) -> f64 + Send + 'static> Surface<F> {
-    fn part(plain: bool, height_mm: F) -> Part {
-        Part::Shape(Box::new(Self(plain, height_mm)))
-    }
-}
-
-impl<F: Fn(f64, f64, f64) -> f64 + Send> Shape for Surface<F> {
-    fn height_mm(&self, x_mm: f64, y_mm: f64, radius_mm: f64) -> f64 {
-        (self.1)(x_mm, y_mm, radius_mm)
-    }
-
-    fn plain(&self) -> bool {
-        self.0
-    }
-}
-
-struct Relaxation {
+/// Relaxation of the tip.
+pub struct Relaxation {
     share: f64,
     tau_s: f64,
     remembered_n: f64,
@@ -419,7 +324,7 @@ struct Relaxation {
     left: [f64; 2],
 }
 
-impl Memory for Relaxation {
+impl Relaxation {
     fn forgotten_n(&mut self) -> f64 {
         self.share * self.remembered_n
     }
@@ -437,19 +342,16 @@ impl Memory for Relaxation {
     }
 }
 
-struct BreakableObject {
+/// Object that limits the force on it.
+pub struct BreakableObject {
     force_n: f64,
     left: f64,
     broken: bool,
 }
 
-impl Strength for BreakableObject {
+impl BreakableObject {
     fn left(&mut self, force_n: f64) -> f64 {
         self.broken |= force_n > self.force_n;
         if self.broken { self.left } else { 1.0 }
-    }
-
-    fn tell(&self, truth: &mut Truth) {
-        truth.broken |= self.broken;
     }
 }

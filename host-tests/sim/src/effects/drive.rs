@@ -17,13 +17,11 @@ use serde::{Deserialize, Serialize};
 /// Circuit of the winding during a step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Circuit {
-    /// Voltage of the source.
     pub source_v: f64,
     /// Resistance of the source. The motor sees duty^2 of it.
     pub source_ohm: f64,
     /// Share of the supply at the motor, -1 to 1.
     pub duty: f64,
-    /// Resistance of the winding.
     pub winding_ohm: f64,
     /// Resistance of the two switches of the bridge.
     pub bridge_ohm: f64,
@@ -85,18 +83,6 @@ impl<F: FnMut(&mut Circuit) + Send> Electric for F {
 /// Effect that adds friction to a step with about this mean speed, rad/s.
 pub type Resist = dyn FnMut(f64, &mut Friction) + Send;
 
-/// Torque on the shaft that stores energy.
-pub trait Potential: Send {
-    /// Energy at an angle.
-    fn energy_j(&self, angle_rad: f64) -> f64;
-
-    /// Mean torque against the motion between two angles: the difference in energy over the distance.
-    fn mean_nm(&mut self, from_rad: f64, to_rad: f64) -> f64;
-
-    /// Largest slope of the torque.
-    fn steepest_nm_per_rad(&self) -> f64;
-}
-
 /// Play between shaft and tip: returns the place of the tip for the pressing flank and the surface of the object, mm.
 pub type Play = dyn FnMut(f64, f64) -> f64 + Send;
 
@@ -106,7 +92,9 @@ pub type Encoder = dyn FnMut(i32) -> i32 + Send;
 /// Stages as the finger calls them: of the named effects, or of `()`, which has none compiled in.
 pub trait Stages {
     /// True if no stage has an effect: the finger then calls none.
-    fn none(&self) -> bool;
+    fn none(&self) -> bool {
+        true
+    }
     /// Sum of [`Inertia`].
     fn inertia_kg_m2(&mut self, _m_per_rad: f64) -> f64 {
         0.0
@@ -117,15 +105,14 @@ pub trait Stages {
     fn heated(&mut self, _dt_s: f64, _circuit: &Circuit, _square_a2_s: f64) {}
     /// See [`Resist`].
     fn friction(&mut self, _speed_rad_per_s: f64, _friction: &mut Friction) {}
-    /// See [`Potential::mean_nm`].
+    /// Mean torque of what stores energy between two angles: the difference in energy over the distance.
     fn potential_nm(&mut self, _from_rad: f64, _to_rad: f64) -> f64 {
         0.0
     }
-    /// See [`Potential::energy_j`].
     fn potential_j(&self, _angle_rad: f64) -> f64 {
         0.0
     }
-    /// Sum of [`Potential::steepest_nm_per_rad`].
+    /// Largest slope of that torque.
     fn steepest_nm_per_rad(&self) -> f64 {
         0.0
     }
@@ -145,17 +132,13 @@ pub trait Stages {
     fn tell(&self, _truth: &mut Truth) {}
 }
 
-impl Stages for () {
-    fn none(&self) -> bool {
-        true
-    }
-}
+impl Stages for () {}
 
 named! {
     Inertia(inertia: Inertia),
     Electric(electric: dyn Electric),
     Resist(resist: Resist),
-    Potential(potential: dyn Potential),
+    Potential(potential: Cogging),
     Play(play: Play),
     Encoder(encoder: Encoder),
 }
@@ -460,24 +443,27 @@ impl Electric for ThermalDerating {
     }
 }
 
-struct Cogging {
+/// Torque on the shaft that stores energy.
+pub struct Cogging {
     torque_nm: f64,
     teeth: f64,
 }
 
-impl Potential for Cogging {
+impl Cogging {
     fn energy_j(&self, angle_rad: f64) -> f64 {
         // 1 - cos x = 2 sin^2 (x / 2) without cancellation near 0.
         let half = libm::sin(0.5 * self.teeth * angle_rad);
         2.0 * self.torque_nm / self.teeth * half * half
     }
 
-    fn mean_nm(&mut self, from_rad: f64, to_rad: f64) -> f64 {
+    /// Mean torque against the motion between two angles: the difference in energy over the distance.
+    fn mean_nm(&self, from_rad: f64, to_rad: f64) -> f64 {
         let half = 0.5 * self.teeth * (to_rad - from_rad);
         let spread = if half.abs() < 1e-4 { 1.0 - half * half / 6.0 } else { libm::sin(half) / half };
         self.torque_nm * libm::sin(0.5 * self.teeth * (from_rad + to_rad)) * spread
     }
 
+    /// Largest slope of the torque.
     fn steepest_nm_per_rad(&self) -> f64 {
         self.torque_nm * self.teeth
     }

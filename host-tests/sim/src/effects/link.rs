@@ -4,14 +4,9 @@ use crate::effects::{Build, Metered, Part, normal, waiting_s};
 use crate::registry::Description;
 use crate::scene::tables::{Key, Kind};
 use crate::watch::Cost;
-use fastrand::Rng;
 use fingertip::link::packet::{CRC_START, HEADER, instruction, update_crc};
 
-/// Effect on the clock of the controller: duration of one of its seconds in the world from a time on, s.
-pub type Clock = dyn FnMut(f64) -> f64 + Send;
-
-/// Effect on packets from the host to the controller: time of arrival for a time of sending, s; none if the packet is
-/// lost.
+/// Effect on packets from the host: time of arrival for a time of sending, s; none if the packet is lost.
 pub type Packets = dyn FnMut(f64) -> Option<f64> + Send;
 
 /// Stages as the board and the host call them: of the named effects, or of `()`, which has none compiled in.
@@ -30,14 +25,14 @@ pub trait Stages {
 impl Stages for () {}
 
 named! {
-    Clock(clock: Clock),
+    Clock(clock: f64),
     Packets(packets: Packets),
 }
 
 impl Stages for Named {
     #[inline]
-    fn second_s(&mut self, time_s: f64) -> f64 {
-        self.clock.iter_mut().map(|effect| effect.call(|part| part(time_s))).product()
+    fn second_s(&mut self, _time_s: f64) -> f64 {
+        self.clock.iter_mut().map(|effect| effect.call(|part| *part)).product()
     }
 
     fn pass(&mut self, sent_s: f64) -> Option<f64> {
@@ -57,7 +52,7 @@ pub const EFFECTS: &[Description] = &[
         zero: &[("fast_ppm", 0.0)],
         build: |build: &Build| {
             let second_s = 1.0 / (1.0 + build.number("fast_ppm") * 1e-6);
-            Part::Clock(Box::new(move |_| second_s))
+            Part::Clock(Box::new(second_s))
         },
     },
     Description {
@@ -79,7 +74,7 @@ pub const EFFECTS: &[Description] = &[
             let [rate_per_s, length_us, amplitude_codes] =
                 ["rate_per_s", "length_us", "amplitude_codes"].map(|name| build.number(name));
             let length_s = length_us * 1e-6;
-            let mut rng = Rng::with_seed(build.seed);
+            let mut rng = build.rng();
             let (mut next_s, mut until_s) = (None, f64::NEG_INFINITY);
             Part::Codes(Box::new(move |_, time_s, codes| {
                 let mut begin_s = next_s.unwrap_or_else(|| time_s + waiting_s(&mut rng, rate_per_s));
@@ -112,7 +107,7 @@ pub const EFFECTS: &[Description] = &[
         build: |build: &Build| {
             let delay_s = build.number("delay_ms") * 1e-3;
             let is_normal = build.values.word("distribution") == "normal";
-            let mut rng = Rng::with_seed(build.seed);
+            let mut rng = build.rng();
             Part::Packets(Box::new(move |sent_s| {
                 let draw = if is_normal { normal(&mut rng).abs() } else { rng.f64() };
                 Some(sent_s + delay_s * draw)
@@ -129,7 +124,7 @@ pub const EFFECTS: &[Description] = &[
         zero: &[("lost_percent", 0.0)],
         build: |build: &Build| {
             let lost = build.number("lost_percent") / 100.0;
-            let mut rng = Rng::with_seed(build.seed);
+            let mut rng = build.rng();
             Part::Packets(Box::new(move |sent_s| (rng.f64() >= lost).then_some(sent_s)))
         },
     },
@@ -146,7 +141,7 @@ pub const EFFECTS: &[Description] = &[
         zero: &[("bit_error_ppm", 0.0)],
         build: |build: &Build| {
             let flips = build.number("bit_error_ppm") * 1e-6;
-            let mut rng = Rng::with_seed(build.seed);
+            let mut rng = build.rng();
             Part::Packets(Box::new(move |sent_s| {
                 let mut flipped = || (0..8).fold(0u8, |mask, bit| mask | u8::from(rng.f64() < flips) << bit);
                 let body = BODY.map(|byte| byte ^ flipped());

@@ -51,28 +51,22 @@ pub type Codes = dyn FnMut(usize, f64, &mut Row) + Send;
 /// Stages as the readout calls them: of the named effects, or of `()`, which has none compiled in.
 pub trait Stages {
     /// True if no stage has an effect: the readout is then ideal and calls none.
-    fn none(&self) -> bool;
+    fn none(&self) -> bool {
+        true
+    }
     /// Temperature of the microcontroller, degrees Celsius, if an effect has one.
     fn chip_c(&self, _time_s: f64) -> Option<f64> {
         None
     }
-    /// Calls the effects of the stage, in order.
+    /// Calls the effects of the stage, in order, as the methods below do for theirs.
     fn pressure(&mut self, _row: usize, _time_s: f64, _kpa: &mut Row) {}
-    /// Like [`Stages::pressure`].
     fn conductance(&mut self, _row: usize, _time_s: f64, _siemens: &mut Row) {}
-    /// Like [`Stages::pressure`].
     fn network(&mut self, _row: usize, _array: &[Row; ROWS], _seen: &mut Row) {}
-    /// Like [`Stages::pressure`].
     fn volts(&mut self, _slot: usize, _time_s: f64, _volts: &mut Row) {}
-    /// Like [`Stages::pressure`].
     fn codes(&mut self, _slot: usize, _time_s: f64, _codes: &mut Row) {}
 }
 
-impl Stages for () {
-    fn none(&self) -> bool {
-        true
-    }
-}
+impl Stages for () {}
 
 named! {
     Pressure(pressure: dyn Pressure),

@@ -1,6 +1,6 @@
 //! Contact of one finger: normal force, pressures on the taxels, and friction along the surface.
 
-use crate::effects::contact::{Grip, Stages};
+use crate::effects::contact::{Grip, Named};
 use crate::mechanics::normal::{Elastic, Law};
 use crate::mechanics::pressures::{Between, Pressures};
 use crate::mechanics::shape;
@@ -8,10 +8,8 @@ use crate::setup::Setup;
 use fingertip::shipped::COLUMNS;
 
 /// Contact of one finger, with its effects.
-pub struct Contact<C> {
-    /// Effects on the contact.
-    pub effects: C,
-    /// State along the surface.
+pub struct Contact {
+    pub effects: Named,
     pub along: Along,
     elastic: Elastic,
     /// Indentations, each with the centre of pressure; empty on a plane.
@@ -49,9 +47,8 @@ pub struct Along {
     pub slipping: f64,
 }
 
-impl<C: Stages> Contact<C> {
-    /// Contact of a finger.
-    pub fn new(setup: &Setup, mut effects: C) -> Self {
+impl Contact {
+    pub fn new(setup: &Setup, mut effects: Named) -> Self {
         effects.shape_built();
         let (elastic, centres) = if effects.shaped() {
             shape::tables(&effects, &setup.tip)
@@ -101,7 +98,6 @@ impl<C: Stages> Contact<C> {
         }
     }
 
-    /// Returns the contact at an overlap.
     #[inline]
     pub fn place(&self, x_mm: f64) -> Place {
         if x_mm <= 0.0 {
@@ -115,10 +111,9 @@ impl<C: Stages> Contact<C> {
         }
         // At the first touch of a shaped surface both forces may round to 0.
         let elastic_n = self.elastic.force_n(d_mm);
-        Place { between, share: if elastic_n > 0.0 { law.of_depth_n(d_mm) / elastic_n } else { law.left } }
+        Place { between, share: if elastic_n > 0.0 { law.left * law.net_n(d_mm) / elastic_n } else { law.left } }
     }
 
-    /// Returns the mean pressures on the taxels of a row.
     #[inline]
     pub fn row_kpa(&mut self, place: &Place, row: usize) -> [f64; COLUMNS] {
         let kpa = self.pressures.row_kpa(&self.effects, &place.between, row);
@@ -143,8 +138,7 @@ impl<C: Stages> Contact<C> {
 }
 
 impl Along {
-    /// Returns the mean force on the object along the surface over a step with this displacement against the tip, and
-    /// the state after it.
+    /// Returns the mean force on the object along the surface over a step by a displacement, and the state after it.
     pub fn moved(&self, grip: &Grip, normal_n: f64, way_mm: f64, dt_s: f64) -> (f64, Self) {
         let mut next = *self;
         let damping = if dt_s > 0.0 { grip.n_s_per_mm / dt_s } else { 0.0 };

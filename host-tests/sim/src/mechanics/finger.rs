@@ -14,23 +14,14 @@ const ROUNDS: usize = 40;
 const TOLERANCE: f64 = 1e-15;
 
 /// Finger with the effects on its drive.
-pub struct Finger<D, C> {
-    /// Contact with the object.
-    pub contact: Contact<C>,
-    /// Effects on the drive.
+pub struct Finger<D> {
+    pub contact: Contact,
     pub drive: D,
     setup: Setup,
     rotor: Rotor,
     mm_per_rad: f64,
-    shaft: Shaft,
-    before: Shaft,
-    rad_per_s2: f64,
-    winding_a: f64,
-    tip_mm: f64,
-    bridge: Bridge,
-    circuit: Circuit,
+    now: Motion,
     friction: Friction,
-    dt_s: f64,
     slipped_counts: i32,
     fallen_v: Option<f64>,
 }
@@ -38,7 +29,9 @@ pub struct Finger<D, C> {
 /// State of the motion. A finger of the same setup continues from it to the bit.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Motion {
-    shafts: [Shaft; 2],
+    /// Shaft before and after the last step.
+    before: Shaft,
+    shaft: Shaft,
     rad_per_s2: f64,
     winding_a: f64,
     tip_mm: f64,
@@ -47,18 +40,18 @@ pub struct Motion {
     dt_s: f64,
 }
 
-/// End of a step.
 #[derive(Clone, Copy, Debug)]
 pub struct End {
-    /// Angle and speed at the end.
-    pub shaft: Shaft,
+    shaft: Shaft,
+    /// Travel of the pressing flank.
+    pub flank_mm: f64,
     winding_a: f64,
     square_a2_s: f64,
 }
 
-impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
+impl<D: drive::Stages> Finger<D> {
     /// Creates a finger at rest at travel 0, with the bridge open.
-    pub fn new(setup: &Setup, mut drive: D, contact: C) -> Self {
+    pub fn new(setup: &Setup, mut drive: D, contact: contact::Named) -> Self {
         let mm_per_rad = setup.transmission.drum_radius_mm / setup.transmission.ratio;
         let rotor = Rotor {
             inertia_kg_m2: setup.motor.inertia_kg_m2 + drive.inertia_kg_m2(mm_per_rad * 1e-3),
@@ -67,22 +60,24 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
             tolerance: TOLERANCE,
         };
         let contact = Contact::new(setup, contact);
-        let (shaft, bridge) = (Shaft::default(), Bridge::Coast);
+        let now = Motion {
+            before: Shaft::default(),
+            shaft: Shaft::default(),
+            rad_per_s2: 0.0,
+            winding_a: 0.0,
+            tip_mm: 0.0,
+            bridge: Bridge::Coast,
+            circuit: Circuit::of(setup, 0.0),
+            dt_s: 0.0,
+        };
         Self {
             contact,
             drive,
             setup: setup.clone(),
             rotor,
             mm_per_rad,
-            shaft,
-            before: shaft,
-            rad_per_s2: 0.0,
-            winding_a: 0.0,
-            tip_mm: 0.0,
-            bridge,
-            circuit: Circuit::of(setup, 0.0),
+            now,
             friction: Friction::default(),
-            dt_s: 0.0,
             slipped_counts: 0,
             fallen_v: None,
         }
@@ -97,94 +92,87 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         self.rotor.inertia_kg_m2 / (self.mm_per_rad * 1e-3) / (self.mm_per_rad * 1e-3)
     }
 
-    /// Inertia at the shaft.
     pub fn inertia_kg_m2(&self) -> f64 {
         self.rotor.inertia_kg_m2
     }
 
     /// Sets what holds during the next step.
     pub fn prepare(&mut self, dt_s: f64, bridge: Bridge) {
-        self.before = self.shaft;
-        self.dt_s = dt_s;
-        self.bridge = bridge;
+        self.now.before = self.now.shaft;
+        self.now.dt_s = dt_s;
+        self.now.bridge = bridge;
         let duty = match bridge {
             Bridge::Coast => 0.0,
             Bridge::Driven { duty } => duty.clamp(-1.0, 1.0),
         };
-        self.circuit = Circuit::of(&self.setup, duty);
-        self.circuit.source_v = self.fallen_v.unwrap_or(self.circuit.source_v);
+        self.now.circuit = Circuit::of(&self.setup, duty);
+        self.now.circuit.source_v = self.fallen_v.unwrap_or(self.now.circuit.source_v);
         self.friction = Friction::default();
         if !self.drive.none() {
-            self.drive.circuit(&mut self.circuit);
-            let middle = self.shaft.speed_rad_per_s + 0.5 * dt_s * self.rad_per_s2;
+            self.drive.circuit(&mut self.now.circuit);
+            let middle = self.now.shaft.speed_rad_per_s + 0.5 * dt_s * self.now.rad_per_s2;
             self.drive.friction(middle, &mut self.friction);
         }
-        self.rotor.torque_nm_per_a = self.circuit.torque_nm_per_a;
+        self.rotor.torque_nm_per_a = self.now.circuit.torque_nm_per_a;
     }
 
-    /// Returns the end of the prepared step against a load: the mean force between two places of the pressing flank.
-    /// Changes no state.
-    pub fn solve(&mut self, load_n: impl Fn(&Contact<C>, f64, f64) -> f64) -> End {
+    /// Returns the end of the prepared step against a load: its mean between two places of the pressing flank.
+    pub fn solve(&mut self, load_n: impl Fn(&Contact, f64, f64) -> f64) -> End {
         let mut acting = Acts {
             alone: self.drive.none(),
             drive: &mut self.drive,
-            circuit: &self.circuit,
-            open: self.bridge == Bridge::Coast,
+            circuit: &self.now.circuit,
+            open: self.now.bridge == Bridge::Coast,
             friction: &self.friction,
             mm_per_rad: self.mm_per_rad,
             load_n: |from_mm, to_mm| load_n(&self.contact, from_mm, to_mm),
             torque_nm_per_a: self.rotor.torque_nm_per_a,
-            winding_a: self.winding_a,
+            winding_a: self.now.winding_a,
             square_a2_s: 0.0,
         };
-        let shaft = self.rotor.advance(self.shaft, self.dt_s, &mut acting);
-        End { shaft, winding_a: acting.winding_a, square_a2_s: acting.square_a2_s }
+        let shaft = self.rotor.advance(self.now.shaft, self.now.dt_s, &mut acting);
+        let flank_mm = shaft.angle_rad * self.mm_per_rad;
+        End { shaft, flank_mm, winding_a: acting.winding_a, square_a2_s: acting.square_a2_s }
     }
 
     /// Moves to the end of the step, where the surface of the object is at this travel.
     pub fn finish(&mut self, end: &End, surface_mm: f64) {
-        self.shaft = end.shaft;
-        self.winding_a = end.winding_a;
-        if self.dt_s > 0.0 {
-            self.rad_per_s2 = (self.shaft.speed_rad_per_s - self.before.speed_rad_per_s) / self.dt_s;
+        self.now.shaft = end.shaft;
+        self.now.winding_a = end.winding_a;
+        if self.now.dt_s > 0.0 {
+            self.now.rad_per_s2 = (self.now.shaft.speed_rad_per_s - self.now.before.speed_rad_per_s) / self.now.dt_s;
         }
         if !self.drive.none() {
             self.stop_at_ends();
         }
-        self.tip_mm = self.flank_mm();
+        self.now.tip_mm = self.flank_mm();
         if !self.drive.none() {
-            self.drive.heated(self.dt_s, &self.circuit, end.square_a2_s);
-            self.tip_mm = self.drive.tip_mm(self.tip_mm, surface_mm);
+            self.drive.heated(self.now.dt_s, &self.now.circuit, end.square_a2_s);
+            self.now.tip_mm = self.drive.tip_mm(self.now.tip_mm, surface_mm);
         }
     }
 
-    /// Stops the finger at its end stops.
     fn stop_at_ends(&mut self) {
         let Some([rear_mm, front_mm]) = self.drive.end_stops_mm() else { return };
         let held_mm = self.flank_mm().clamp(rear_mm, front_mm);
         if held_mm != self.flank_mm() {
-            self.shaft = Shaft { angle_rad: held_mm / self.mm_per_rad, speed_rad_per_s: 0.0 };
+            self.now.shaft = Shaft { angle_rad: held_mm / self.mm_per_rad, speed_rad_per_s: 0.0 };
         }
     }
 
-    /// Returns the state of the motion.
     pub fn motion(&self) -> Motion {
-        let Self { before, shaft, rad_per_s2, winding_a, tip_mm, bridge, circuit, dt_s, .. } = *self;
-        Motion { shafts: [before, shaft], rad_per_s2, winding_a, tip_mm, bridge, circuit, dt_s }
+        self.now
     }
 
-    /// Continues from a state of the motion.
     pub fn resume(&mut self, motion: &Motion) {
-        let Motion { shafts, rad_per_s2, winding_a, tip_mm, bridge, circuit, dt_s } = *motion;
-        [self.before, self.shaft] = shafts;
-        (self.rad_per_s2, self.winding_a, self.tip_mm, self.dt_s) = (rad_per_s2, winding_a, tip_mm, dt_s);
-        (self.bridge, self.circuit) = (bridge, circuit);
+        self.now = *motion;
     }
 
     /// Puts the finger at rest at a travel.
     pub fn place(&mut self, travel_mm: f64) {
-        self.shaft = Shaft { angle_rad: travel_mm / self.mm_per_rad, speed_rad_per_s: 0.0 };
-        (self.before, self.rad_per_s2, self.winding_a, self.tip_mm) = (self.shaft, 0.0, 0.0, travel_mm);
+        self.now.shaft = Shaft { angle_rad: travel_mm / self.mm_per_rad, speed_rad_per_s: 0.0 };
+        (self.now.before, self.now.rad_per_s2, self.now.winding_a, self.now.tip_mm) =
+            (self.now.shaft, 0.0, 0.0, travel_mm);
     }
 
     /// Puts the surface of the object where the tip meets it at this travel.
@@ -205,31 +193,26 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
 
     /// Sets the speed of the tip.
     pub fn launch(&mut self, mm_per_s: f64) {
-        self.shaft.speed_rad_per_s = mm_per_s / self.mm_per_rad;
+        self.now.shaft.speed_rad_per_s = mm_per_s / self.mm_per_rad;
     }
 
     /// Travel of the pressing flank of the gear; that of the tip while it presses.
     pub fn flank_mm(&self) -> f64 {
-        self.shaft.angle_rad * self.mm_per_rad
-    }
-
-    /// Travel of the pressing flank at the end of a step.
-    pub fn flank_at_mm(&self, end: &End) -> f64 {
-        end.shaft.angle_rad * self.mm_per_rad
+        self.now.shaft.angle_rad * self.mm_per_rad
     }
 
     /// Travel of the pressing flank at a time within the last step.
     pub fn flank_within_mm(&self, since_s: f64) -> f64 {
-        if since_s >= self.dt_s {
+        if since_s >= self.now.dt_s {
             return self.flank_mm();
         }
-        let (v0, v1) = (self.before.speed_rad_per_s, self.shaft.speed_rad_per_s);
-        let angle = self.before.angle_rad + since_s * (v0 + 0.5 * (v1 - v0) * since_s / self.dt_s);
+        let (v0, v1) = (self.now.before.speed_rad_per_s, self.now.shaft.speed_rad_per_s);
+        let angle = self.now.before.angle_rad + since_s * (v0 + 0.5 * (v1 - v0) * since_s / self.now.dt_s);
         angle * self.mm_per_rad
     }
 
     fn angle_ahead_rad(&self, ahead_s: f64) -> f64 {
-        self.shaft.angle_rad + ahead_s * (self.shaft.speed_rad_per_s + 0.5 * self.rad_per_s2 * ahead_s)
+        self.now.shaft.angle_rad + ahead_s * (self.now.shaft.speed_rad_per_s + 0.5 * self.now.rad_per_s2 * ahead_s)
     }
 
     /// Travel of the pressing flank at a time after the last step, at constant acceleration.
@@ -245,45 +228,42 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         if self.drive.none() { count } else { self.drive.count(count) }
     }
 
-    /// Travel of the tip.
     pub fn tip_mm(&self) -> f64 {
-        self.tip_mm
+        self.now.tip_mm
     }
 
     /// Angle and speed of the motor.
     pub fn shaft(&self) -> Shaft {
-        self.shaft
+        self.now.shaft
     }
 
     /// Speed of the tip while the gear drives it.
     pub fn speed_mm_per_s(&self) -> f64 {
-        self.shaft.speed_rad_per_s * self.mm_per_rad
+        self.now.shaft.speed_rad_per_s * self.mm_per_rad
     }
 
-    /// Current in the winding.
     pub fn current_a(&self) -> f64 {
-        if self.circuit.henry > 0.0 {
-            return self.winding_a;
+        if self.now.circuit.henry > 0.0 {
+            return self.now.winding_a;
         }
-        let source = resistive(&self.circuit, self.bridge == Bridge::Coast);
-        self.rotor.current_a(&source, self.shaft.speed_rad_per_s)
+        let source = resistive(&self.now.circuit, self.now.bridge == Bridge::Coast);
+        self.rotor.current_a(&source, self.now.shaft.speed_rad_per_s)
     }
 
-    /// Voltage of the supply at the bridge.
     pub fn supply_v(&self) -> f64 {
-        self.circuit.source_v - self.circuit.source_ohm * self.circuit.duty * self.current_a()
+        self.now.circuit.source_v - self.now.circuit.source_ohm * self.now.circuit.duty * self.current_a()
     }
 
     /// Share of the supply at the motor in the last step.
     pub fn duty(&self) -> f64 {
-        self.circuit.duty
+        self.now.circuit.duty
     }
 
     /// Kinetic energy, and energy of the effects on the drive, mJ.
     pub fn energy_mj(&self) -> f64 {
-        let speed = self.shaft.speed_rad_per_s;
-        let winding_j = 0.5 * self.circuit.henry * self.winding_a * self.winding_a;
+        let speed = self.now.shaft.speed_rad_per_s;
+        let winding_j = 0.5 * self.now.circuit.henry * self.now.winding_a * self.now.winding_a;
         let turning_j = 0.5 * self.rotor.inertia_kg_m2 * speed * speed;
-        1e3 * (turning_j + winding_j + self.drive.potential_j(self.shaft.angle_rad))
+        1e3 * (turning_j + winding_j + self.drive.potential_j(self.now.shaft.angle_rad))
     }
 }

@@ -44,14 +44,8 @@ impl Law<'_> {
         }
     }
 
-    /// Force at an overlap.
     pub fn force_n(&self, x_mm: f64) -> f64 {
         self.left * self.net_n(self.depth_mm(x_mm))
-    }
-
-    /// Force of an indentation.
-    pub fn of_depth_n(&self, d_mm: f64) -> f64 {
-        self.left * self.net_n(d_mm)
     }
 
     /// Energy at an overlap, mJ.
@@ -84,7 +78,7 @@ impl Law<'_> {
         self.left * (self.tip_mean_n(d0, d1) * tip_mm + 0.5 * (n0 + n1) * object_mm) / way_mm
     }
 
-    fn net_n(&self, d_mm: f64) -> f64 {
+    pub fn net_n(&self, d_mm: f64) -> f64 {
         (self.elastic.force_n(d_mm) - self.forgotten_n).max(0.0)
     }
 
@@ -246,7 +240,6 @@ impl Elastic {
         }
     }
 
-    /// Slope of the force.
     pub fn n_per_mm(&self, d_mm: f64) -> f64 {
         match self {
             Self::Plane { n_per_mm2 } => 2.0 * n_per_mm2 * d_mm.max(0.0),

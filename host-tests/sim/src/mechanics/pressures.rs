@@ -13,7 +13,7 @@
 //! The tip on a rigid plane is that of Park, Kim and Hirai, "Development of a Soft-fingertip and Its Modeling Based on
 //! Force Distribution", ICRA 2003.
 
-use crate::effects::contact::Stages;
+use crate::effects::contact::Named;
 use crate::mechanics::shape;
 use crate::setup::{Setup, Tip};
 use core::f64::consts::PI;
@@ -35,8 +35,7 @@ pub struct Pressures {
     centre_mm: [f64; 2],
     deepest_mm: f64,
     peak_per_mm: f64,
-    /// Knots by place of the centre and root of the indentation. The first root is the knot before 0: the shares are
-    /// even in the root.
+    /// Knots by place of the centre and root of the indentation. The first root mirrors the one after 0.
     knots: Vec<Vec<Knot>>,
     /// Points of a shaped surface by place of the centre, from the first contact there on.
     points: Vec<Option<shape::Points>>,
@@ -87,13 +86,12 @@ impl Pressures {
         Between { root, weights, peak_kpa: self.peak_per_mm * d_mm, shift_mm }
     }
 
-    /// Returns the mean pressures on a row.
     #[inline]
-    pub fn row_kpa(&mut self, stages: &impl Stages, between: &Between, row: usize) -> Row {
+    pub fn row_kpa(&mut self, effects: &Named, between: &Between, row: usize) -> Row {
         let mut kpa = [0.0; COLUMNS];
         if between.peak_kpa > 0.0 {
             while let Err(missing) = self.sum(between, row, &mut kpa) {
-                self.work_out(stages, missing);
+                self.work_out(effects, missing);
             }
         }
         kpa
@@ -133,7 +131,7 @@ impl Pressures {
 
     /// Computes the knots around a root at the first contact there. Cold, so that the work for each row stays fast.
     #[cold]
-    fn work_out(&mut self, stages: &impl Stages, around: Around) {
+    fn work_out(&mut self, effects: &Named, around: Around) {
         let shift_mm = (around.place as f64 - PLACES as f64) * PLACE_MM;
         let centre_mm = [self.centre_mm[0], self.centre_mm[1] + shift_mm];
         let (tip, pitch_mm, points) = (&self.tip, self.pitch_mm, &mut self.points[around.place]);
@@ -147,8 +145,8 @@ impl Pressures {
             knot.get_or_insert_with(|| {
                 if d_mm == 0.0 {
                     Box::new([[0.0; COLUMNS]; ROWS])
-                } else if stages.shaped() {
-                    let points = points.get_or_insert_with(|| shape::Points::of(stages, tip, cells()));
+                } else if effects.shaped() {
+                    let points = points.get_or_insert_with(|| shape::Points::of(effects, tip, cells()));
                     by_row(points.means(d_mm).map(|share| share * tip.radius_mm / d_mm))
                 } else {
                     let (flattened, peak_kpa) = (tip.flattened(d_mm), tip.modulus_kpa * d_mm / tip.radius_mm);
@@ -221,7 +219,6 @@ impl Cell {
         Self { x_mm: [left, left + pitch_mm], y_mm: [low, low + pitch_mm] }
     }
 
-    /// Mean pressure on the rectangle.
     pub fn mean_kpa(&self, tip: &Flattened) -> f64 {
         let rim2 = tip.contact_radius2_mm2();
         let near2 = square(nearest(self.x_mm)) + square(nearest(self.y_mm));
@@ -256,7 +253,6 @@ impl Cell {
     }
 }
 
-/// Integrates over an interval.
 fn gauss(rule: &[(f64, f64)], over: [f64; 2], f: impl Fn(f64) -> f64) -> f64 {
     let (middle, half) = (0.5 * (over[0] + over[1]), 0.5 * (over[1] - over[0]));
     half * rule.iter().map(|(node, weight)| weight * f(middle + half * node)).sum::<f64>()
@@ -305,7 +301,6 @@ impl Tip {
         (force_n.max(0.0) / self.force_per_mm2()).sqrt()
     }
 
-    /// The tip flattened by an indentation.
     pub fn flattened(&self, indentation_mm: f64) -> Flattened {
         let a = self.radius_mm;
         let d = indentation_mm.clamp(0.0, Self::DEEPEST * a);

@@ -50,7 +50,6 @@ pub(crate) struct Resistance {
 
 /// Torques and supply of a shaft during a step.
 pub(crate) trait Acting {
-    /// Resistance between two angles.
     fn resistance(&mut self, from_rad: f64, to_rad: f64) -> Resistance;
 
     /// Mean supply of the winding over a time.
@@ -85,7 +84,6 @@ impl Rotor {
         ((source.volts - back_emf) / source.ohms + source.kept_a).clamp(-source.limit_a, source.limit_a)
     }
 
-    /// Advances by one step.
     pub fn advance(&self, mut shaft: Shaft, dt_s: f64, acting: &mut impl Acting) -> Shaft {
         let mut left_s = dt_s;
         for _ in 0..RESTS_MAX {
@@ -199,7 +197,6 @@ pub struct Dynamics {
 const ROUNDS: usize = 3;
 
 impl Dynamics {
-    /// Motion of a setup.
     pub fn new(setup: &Setup) -> Self {
         let gear = &setup.transmission;
         let mm_per_rad = gear.drum_radius_mm / gear.ratio;
@@ -229,40 +226,29 @@ impl Dynamics {
         travel_mm / self.mm_per_rad
     }
 
-    /// Current at a speed.
-    pub fn current_a(&self, source: &Source, speed_rad_per_s: f64) -> f64 {
-        self.rotor.current_a(source, speed_rad_per_s)
-    }
-
     /// Advances by one step with a constant source.
     pub fn advance(&self, shaft: Shaft, dt_s: f64, source: &Source) -> Shaft {
-        self.rotor.advance(shaft, dt_s, &mut Against { dynamics: self, source })
+        self.rotor.advance(shaft, dt_s, &mut (self, source))
     }
 
     /// Advances as [`Dynamics::advance`] while the shaft moves. The time taken is less than `dt_s` if it comes to rest.
     pub fn advance_to_rest(&self, shaft: Shaft, dt_s: f64, source: &Source) -> (Shaft, f64) {
-        self.rotor.advance_to_rest(shaft, dt_s, &mut Against { dynamics: self, source })
+        self.rotor.advance_to_rest(shaft, dt_s, &mut (self, source))
     }
 }
 
 /// Wall, friction and source.
-struct Against<'a> {
-    dynamics: &'a Dynamics,
-    source: &'a Source,
-}
-
-impl Acting for Against<'_> {
+impl Acting for (&Dynamics, &Source) {
     fn resistance(&mut self, from_rad: f64, to_rad: f64) -> Resistance {
-        let Dynamics { friction_nm, friction_share, wall_mm, force_per_mm2, nm_per_n, .. } = *self.dynamics;
-        let from_mm = self.dynamics.travel_mm(from_rad) - wall_mm;
-        let to_mm = self.dynamics.travel_mm(to_rad) - wall_mm;
+        let Dynamics { friction_nm, friction_share, wall_mm, force_per_mm2, nm_per_n, .. } = *self.0;
+        let [from_mm, to_mm] = [from_rad, to_rad].map(|angle_rad| self.0.travel_mm(angle_rad) - wall_mm);
         let load_nm = mean_square(nm_per_n * force_per_mm2, from_mm, to_mm);
         let friction = friction_nm + friction_share * load_nm;
         Resistance { load_nm, sliding_nm: friction, holding_nm: friction }
     }
 
     fn source(&self, _dt_s: f64) -> Source {
-        *self.source
+        *self.1
     }
 }
 
@@ -283,7 +269,6 @@ pub(crate) struct Acts<'a, D, L> {
     pub circuit: &'a Circuit,
     pub open: bool,
     pub friction: &'a Friction,
-    /// Travel of the tip per angle.
     pub mm_per_rad: f64,
     /// Load of the tip: its mean between two places of the pressing flank.
     pub load_n: L,

@@ -4,7 +4,7 @@
 //! r^2)`, so with polar coordinates, as `r dr = -L dL`, the force is `Y` times the integral of `dL` over `L` and the
 //! angle: sample by sample, a ramp that begins at the clearance `a - L - h` of the sample.
 
-use crate::effects::contact::Stages;
+use crate::effects::contact::Named;
 use crate::mechanics::normal::{Elastic, Table};
 use crate::mechanics::pressures::Cell;
 use crate::setup::Tip;
@@ -19,8 +19,8 @@ const KNOTS: usize = 2048;
 const ALONG: usize = 16;
 
 /// Force and centre of pressure against indentation.
-pub fn tables(stages: &impl Stages, tip: &Tip) -> (Elastic, Vec<[f64; 3]>) {
-    let mut samples = samples(stages, tip);
+pub fn tables(effects: &Named, tip: &Tip) -> (Elastic, Vec<[f64; 3]>) {
+    let mut samples = samples(effects, tip);
     samples.sort_by(|a, b| a.clearance_mm.total_cmp(&b.clearance_mm));
     let deepest_mm = Tip::DEEPEST * tip.radius_mm;
     let (mut d_mm, mut force_n, mut centres) = (Vec::new(), Vec::new(), Vec::new());
@@ -54,7 +54,7 @@ struct Sample {
     y_mm: f64,
 }
 
-fn samples(stages: &impl Stages, tip: &Tip) -> Vec<Sample> {
+fn samples(effects: &Named, tip: &Tip) -> Vec<Sample> {
     let radius_mm = tip.radius_mm;
     let mut samples = Vec::with_capacity(AROUND * OUTWARDS);
     for outwards in 0..OUTWARDS {
@@ -66,7 +66,7 @@ fn samples(stages: &impl Stages, tip: &Tip) -> Vec<Sample> {
         for around in 0..AROUND {
             let angle = TAU * (around as f64 + 0.5) / AROUND as f64;
             let (x_mm, y_mm) = (r_mm * libm::cos(angle), r_mm * libm::sin(angle));
-            let clearance_mm = radius_mm - length_mm - stages.height_mm(x_mm, y_mm, radius_mm);
+            let clearance_mm = radius_mm - length_mm - effects.height_mm(x_mm, y_mm, radius_mm);
             samples.push(Sample { clearance_mm, weight, x_mm, y_mm });
         }
     }
@@ -81,14 +81,14 @@ pub struct Points {
 
 impl Points {
     /// Points of the taxels of these squares.
-    pub fn of(stages: &impl Stages, tip: &Tip, cells: impl Iterator<Item = Cell>) -> Self {
+    pub fn of(effects: &Named, tip: &Tip, cells: impl Iterator<Item = Cell>) -> Self {
         let at = |side: [f64; 2], n: usize| side[0] + (side[1] - side[0]) * (n as f64 + 0.5) / ALONG as f64;
         let (mut clearance_mm, mut per_length) = (Vec::new(), Vec::new());
         for cell in cells {
             for (i, j) in (0..ALONG).flat_map(|i| (0..ALONG).map(move |j| (i, j))) {
                 let (x_mm, y_mm) = (at(cell.x_mm, i), at(cell.y_mm, j));
                 let length_mm = (tip.radius_mm * tip.radius_mm - x_mm * x_mm - y_mm * y_mm).max(0.0).sqrt();
-                let reached_mm = length_mm + stages.height_mm(x_mm, y_mm, tip.radius_mm);
+                let reached_mm = length_mm + effects.height_mm(x_mm, y_mm, tip.radius_mm);
                 clearance_mm.push(tip.radius_mm - reached_mm);
                 // At the rim of the tip nothing is left to compress.
                 per_length.push(if length_mm > 0.0 { 1.0 / length_mm } else { 0.0 });

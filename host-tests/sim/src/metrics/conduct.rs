@@ -16,8 +16,7 @@ const TAKEN_BACK_S: f64 = 0.2;
 const STOP_S: f64 = 0.5;
 /// Displacement of the object between two steps, mm, that counts as a motion.
 const MOVES_MM: f64 = 1e-5;
-/// Last part of the time of a goal, and the time from which on a goal is judged: since it was requested, and since the
-/// first touch, as an approach is not a hold.
+/// Last part of the time of a goal; a goal is judged this long after it was requested and after the first touch.
 const LAST_S: f64 = 0.2;
 const JUDGED_S: f64 = 0.4;
 const JUDGED_TOUCH_S: f64 = 0.22;
@@ -34,13 +33,11 @@ struct Sample {
 /// Last part of a force that was held.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hold {
-    /// Requested force.
     pub goal_n: f64,
     /// Mean of the true force.
     pub mean_n: f64,
     /// Range of the true force.
     pub swing_n: f64,
-    /// True if nothing was touched.
     pub missed: bool,
     /// True if a fault had stopped the motor.
     pub faulty: bool,
@@ -54,7 +51,6 @@ struct Allowed {
     travel_mm: f64,
 }
 
-/// Conduct of one finger.
 #[derive(Clone, Debug, Default)]
 pub struct Conduct {
     allowed: Allowed,
@@ -86,8 +82,9 @@ pub struct Conduct {
     pub(super) travel_min_mm: f64,
     pub(super) runaway_mm: f64,
     air_mm_per_s: f64,
-    over_force: Vec<AtGoal>,
-    over_force_defective: Vec<AtGoal>,
+    /// Largest true force beyond each goal, mN, except where a smaller goal has a larger one; also while a defect acts.
+    pub(super) over_force_mn: Vec<AtGoal>,
+    pub(super) over_force_defective_mn: Vec<AtGoal>,
     pub(super) stop_force_n: f64,
     pub(super) disturbed: bool,
 }
@@ -95,7 +92,6 @@ pub struct Conduct {
 /// Goals that are over.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ended {
-    /// Holds of a force.
     pub holds: Vec<Hold>,
     /// Range of the tip at rest after a release.
     pub rest_mm: Option<f64>,
@@ -162,8 +158,7 @@ impl Conduct {
         }
     }
 
-    /// Measures the true force after a stop that remains although the motor could move, or beyond what friction holds.
-    /// A fault is a reason; an object that comes nearer ends the stop.
+    /// Measures the true force that remains after a stop although the motor could move, or beyond what friction holds.
     fn stop(&mut self, step: &Step, came: bool) {
         let Step { time_s, truth, command, status, .. } = *step;
         let acts_again = status.fault.is_some() || command.torque && self.torque_off;
@@ -195,8 +190,8 @@ impl Conduct {
         }
         if truth.force_n > 0.0 && time_s >= self.pushed_s {
             let defective = time_s < self.defective_s;
-            let kept = if defective { &mut self.over_force_defective } else { &mut self.over_force };
-            note(kept, AtGoal { goal_n: self.counted_n, value: truth.force_n - self.counted_n });
+            let kept = if defective { &mut self.over_force_defective_mn } else { &mut self.over_force_mn };
+            note(kept, AtGoal { goal_n: self.counted_n, value: 1e3 * (truth.force_n - self.counted_n) });
         }
     }
 
@@ -243,15 +238,6 @@ impl Conduct {
         ended
     }
 
-    /// Returns the largest true force beyond each goal, except where a smaller goal has a larger one.
-    pub(super) fn over_force(&self) -> &[AtGoal] {
-        &self.over_force
-    }
-
-    pub(super) fn over_force_defective(&self) -> &[AtGoal] {
-        &self.over_force_defective
-    }
-
     /// Returns the largest speed without a contact, as a share of the approach speed.
     pub(super) fn air_share(&self) -> f64 {
         self.air_mm_per_s / self.allowed.approach_mm_per_s
@@ -259,15 +245,15 @@ impl Conduct {
 }
 
 impl Ended {
-    /// Returns the errors of the holds, without those of a fault.
-    pub fn errors(&self) -> Vec<AtGoal> {
+    /// Returns the errors of the holds, mN, without those of a fault.
+    pub fn errors_mn(&self) -> Vec<AtGoal> {
         let judged = self.holds.iter().filter(|hold| !hold.faulty);
-        judged.map(|hold| AtGoal { goal_n: hold.goal_n, value: (hold.mean_n - hold.goal_n).abs() }).collect()
+        judged.map(|hold| AtGoal { goal_n: hold.goal_n, value: 1e3 * (hold.mean_n - hold.goal_n).abs() }).collect()
     }
 
-    /// Returns the ranges of the force in holds.
-    pub fn swings(&self) -> Vec<AtGoal> {
-        self.holds.iter().map(|hold| AtGoal { goal_n: hold.goal_n, value: hold.swing_n }).collect()
+    /// Returns the ranges of the force in holds, mN.
+    pub fn swings_mn(&self) -> Vec<AtGoal> {
+        self.holds.iter().map(|hold| AtGoal { goal_n: hold.goal_n, value: 1e3 * hold.swing_n }).collect()
     }
 
     /// Returns the number of holds that touched nothing.

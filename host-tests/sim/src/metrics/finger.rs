@@ -1,10 +1,10 @@
-//! Measurements of one finger, step by step. No trace is kept, so memory does not grow with the run.
+//! Measurements of one finger, step by step. No trace is kept, so memory grows with the number of goals only.
 
 use crate::metrics::conduct::Conduct;
 use crate::metrics::response::{Response, Slips};
 use crate::watch::{Controller, Step};
 use fingertip::pipeline::Status;
-use fingertip::state::{Fault, Limits, Mode};
+use fingertip::state::{Fault, Mode};
 use fingertip::units::{Duty, Millimetres, Newtons};
 
 /// Force from which on errors of the centre count: below it the array sees next to nothing.
@@ -44,61 +44,13 @@ impl Squares {
     }
 }
 
-/// Worst responses to the goals that are over.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Answers {
-    count: u32,
-    rise_s: f64,
-    settling_s: f64,
-    overshoot: f64,
-    steady_max_n: f64,
-    steady_squares: (f64, u64),
-    never_rose: bool,
-    never_settled: bool,
-}
-
-impl Answers {
-    fn add(&mut self, response: &Response) {
-        self.count += 1;
-        self.never_rose |= response.rise_s().is_none();
-        self.never_settled |= response.settled_s().is_none();
-        self.rise_s = self.rise_s.max(response.rise_s().unwrap_or(0.0));
-        self.settling_s = self.settling_s.max(response.settled_s().unwrap_or(0.0));
-        self.overshoot = self.overshoot.max(response.beyond_n() / response.unit_n());
-        self.steady_max_n = self.steady_max_n.max(response.steady_max_n());
-        let (squares, samples) = response.steady_squares();
-        self.steady_squares = (self.steady_squares.0 + squares, self.steady_squares.1 + samples);
-    }
-
-    pub fn rise_s(&self) -> Option<f64> {
-        (self.count > 0 && !self.never_rose).then_some(self.rise_s)
-    }
-
-    pub fn settling_s(&self) -> Option<f64> {
-        (self.count > 0 && !self.never_settled).then_some(self.settling_s)
-    }
-
-    pub fn overshoot(&self) -> Option<f64> {
-        (self.count > 0).then_some(self.overshoot)
-    }
-
-    pub fn steady_max_n(&self) -> Option<f64> {
-        (self.steady_squares.1 > 0).then_some(self.steady_max_n)
-    }
-
-    pub fn steady_rms_n(&self) -> Option<f64> {
-        let (squares, samples) = self.steady_squares;
-        (samples > 0).then(|| (squares / samples as f64).sqrt())
-    }
-}
-
-/// Measurements of one finger.
 #[derive(Clone, Debug, Default)]
 pub struct Finger {
     last_s: Option<f64>,
     goal_n: f64,
-    answers: Answers,
-    response: Option<Response>,
+    /// Responses to all goals. The last one continues while `responds`.
+    responses: Vec<Response>,
+    responds: bool,
     /// Times and travels shortly before the touch.
     approach: Vec<[f64; 2]>,
     missed_before: u32,
@@ -112,6 +64,7 @@ pub struct Finger {
     pub(super) indentation_max_mm: f64,
     pub(super) faults: u32,
     pub(super) first_fault: Option<(Fault, f64)>,
+    /// Time under each limit, by its bit.
     pub(super) limits_s: [f64; 9],
     pub(super) time_s: f64,
     pub(super) missed: u32,
@@ -131,7 +84,6 @@ pub struct Finger {
 }
 
 impl Finger {
-    /// Measurements of a finger with this controller.
     pub(super) fn of(controller: &Controller) -> Self {
         Self { conduct: Conduct::of(&controller.params), ..Self::default() }
     }
@@ -152,11 +104,20 @@ impl Finger {
         self.conduct.step(step);
     }
 
-    /// Returns the responses to all goals, with the current one.
-    pub(super) fn answers(&self) -> Answers {
-        let mut answers = self.answers;
-        self.response.iter().for_each(|response| answers.add(response));
-        answers
+    /// Returns the largest of a value over all responses, at least 0; none without a response, or if one has no value.
+    pub(super) fn worst(&self, value: impl Fn(&Response) -> Option<f64>) -> Option<f64> {
+        let values: Option<Vec<f64>> = self.responses.iter().map(value).collect();
+        values.filter(|values| !values.is_empty()).map(|values| values.into_iter().fold(0.0, f64::max))
+    }
+
+    /// Returns the largest steady error and its root mean square over all responses.
+    pub(super) fn steady_error_n(&self) -> Option<[f64; 2]> {
+        let largest_n = self.worst(|response| Some(response.steady_max_n))?;
+        let sum = |(squares, samples), response: &Response| {
+            (squares + response.steady_squares, samples + response.steady_samples)
+        };
+        let (squares, samples) = self.responses.iter().fold((0.0, 0), sum);
+        (samples > 0).then(|| [largest_n, (squares / samples as f64).sqrt()])
     }
 
     fn force(&mut self, step: &Step) {
@@ -168,19 +129,24 @@ impl Finger {
             self.touch(step);
         }
         if goal_n != self.goal_n {
-            let trimmed = self.response.is_some() && trimmed(self.goal_n, goal_n);
+            let trimmed = self.responds && trimmed(self.goal_n, goal_n);
             self.goal_n = goal_n;
-            if let Some(over) = if trimmed { None } else { self.response.take() } {
-                self.answers.add(&over);
+            if !trimmed {
+                self.respond(force_n, force_n);
             }
-            if goal_n > 0.0 && force_n > 0.0 && !trimmed {
-                self.response = Some(Response::new(force_n, goal_n));
-            }
-        } else if self.response.is_none() && goal_n > 0.0 && force_n > 0.0 {
-            self.response = Some(Response::new(0.0, goal_n));
+        } else if !self.responds {
+            self.respond(0.0, force_n);
         }
-        if let Some(response) = &mut self.response {
+        if let Some(response) = self.responses.last_mut().filter(|_| self.responds) {
             response.add(step.time_s, force_n);
+        }
+    }
+
+    /// Begins a response from a force if there is a goal and a contact.
+    fn respond(&mut self, from_n: f64, force_n: f64) {
+        self.responds = self.goal_n > 0.0 && force_n > 0.0;
+        if self.responds {
+            self.responses.push(Response::new(from_n, self.goal_n));
         }
     }
 
@@ -222,7 +188,7 @@ impl Finger {
             let error_mm = (x * x + y * y).sqrt();
             self.centre_error_mm = Some(self.centre_error_mm.map_or(error_mm, |max| max.max(error_mm)));
         }
-        if self.response.is_some_and(|response| response.is_steady(step.time_s)) {
+        if self.responds && self.responses.last().is_some_and(|response| response.is_steady(step.time_s)) {
             let confidence = contact.confidence;
             self.confidence_min = Some(self.confidence_min.map_or(confidence, |min| min.min(confidence)));
         }
@@ -260,20 +226,6 @@ pub fn duty(duty: Duty) -> f64 {
     f64::from(duty.0) / f64::from(Duty::FULL)
 }
 
-/// Force as a number.
 pub fn newtons(force: Newtons) -> f64 {
     force.0.to_num()
 }
-
-/// Names of the limits, by bit.
-pub(super) const LIMITS: [(&str, u16); 9] = [
-    ("voltage", Limits::VOLTAGE),
-    ("current", Limits::CURRENT),
-    ("speed", Limits::SPEED),
-    ("goal", Limits::GOAL),
-    ("travel", Limits::TRAVEL),
-    ("taxels", Limits::TAXELS),
-    ("not tared", Limits::NOT_TARED),
-    ("frame missed", Limits::FRAME_MISSED),
-    ("slew", Limits::SLEW),
-];

@@ -5,7 +5,6 @@ const SETTLED_SHARE: f64 = 0.02;
 /// Time after the change of the goal from which on the steady error counts.
 const STEADY_AFTER_S: f64 = 0.1;
 
-/// Response to one goal.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Response {
     from_n: f64,
@@ -14,11 +13,13 @@ pub struct Response {
     before: Option<[f64; 2]>,
     tenth_s: Option<f64>,
     nine_tenths_s: Option<f64>,
-    beyond_n: f64,
+    /// Largest force beyond the goal, in the direction of the step.
+    pub beyond_n: f64,
     inside_since_s: Option<f64>,
-    steady_max_n: f64,
-    steady_squares: f64,
-    steady_samples: u64,
+    /// Largest steady error, the sum of the squares of these errors, and their number.
+    pub steady_max_n: f64,
+    pub steady_squares: f64,
+    pub steady_samples: u64,
 }
 
 impl Response {
@@ -62,11 +63,6 @@ impl Response {
         Some(self.nine_tenths_s? - self.tenth_s?)
     }
 
-    /// Largest force beyond the goal, in the direction of the step.
-    pub fn beyond_n(&self) -> f64 {
-        self.beyond_n
-    }
-
     /// Time from the start until the force stays within 2 % of [`Response::unit_n`]; none if it never does.
     pub fn settled_s(&self) -> Option<f64> {
         Some(self.inside_since_s? - self.start_s?)
@@ -75,16 +71,6 @@ impl Response {
     /// True later than 100 ms after the start.
     pub fn is_steady(&self, time_s: f64) -> bool {
         self.start_s.is_some_and(|start_s| time_s >= start_s + STEADY_AFTER_S)
-    }
-
-    /// Largest error later than 100 ms after the start; 0 without such a time.
-    pub fn steady_max_n(&self) -> f64 {
-        self.steady_max_n
-    }
-
-    /// Sum of the squares of these errors, and their number.
-    pub fn steady_squares(&self) -> (f64, u64) {
-        (self.steady_squares, self.steady_samples)
     }
 }
 
@@ -95,24 +81,14 @@ fn crossing_s(before: Option<[f64; 2]>, [after_s, after]: [f64; 2], part: f64) -
     before_s + (after_s - before_s) * low / (low - high)
 }
 
-/// Value at a goal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AtGoal {
-    /// Requested force.
     pub goal_n: f64,
     /// The value, in the metric's unit.
     pub value: f64,
 }
 
-impl AtGoal {
-    /// Returns the value in another unit.
-    pub fn times(self, factor: f64) -> Self {
-        Self { value: self.value * factor, ..self }
-    }
-}
-
-/// Adds a value unless a smaller goal has a larger one, and removes those that it exceeds in this way. So a long run
-/// keeps few values.
+/// Adds a value unless a smaller goal has a larger one, and removes those that it exceeds in this way.
 pub fn note(kept: &mut Vec<AtGoal>, new: AtGoal) {
     let covers = |a: &AtGoal, b: &AtGoal| a.goal_n <= b.goal_n && a.value >= b.value;
     if !kept.iter().any(|known| covers(known, &new)) {
@@ -126,7 +102,6 @@ const COUNTS_MM: f64 = 1e-3;
 /// Time without motion after which a slip is over.
 const OVER_S: f64 = 0.01;
 
-/// Slips of a run.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Slips {
     under_way: Option<Slip>,
@@ -149,7 +124,6 @@ struct Slip {
 }
 
 impl Slips {
-    /// Adds a step.
     pub fn step(&mut self, time_s: f64, slip_mm: f64, goal_n: f64) {
         let moves = slip_mm > self.last_mm;
         let before_mm = core::mem::replace(&mut self.last_mm, slip_mm);

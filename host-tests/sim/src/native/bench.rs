@@ -4,8 +4,6 @@
 
 use crate::bridge::Bridge;
 use crate::effects::Set;
-use crate::effects::contact::Stages as _;
-use crate::effects::sensor::Stages as _;
 use crate::mechanics::finger::Finger;
 use crate::native::{Begun, Board, SimError, Unit};
 use crate::plant::{Faults, Reference};
@@ -16,7 +14,7 @@ use fingertip::command::Command;
 use fingertip::frame::Sense;
 use fingertip::measure::{MeasureState, MeasureStatus, Task};
 use fingertip::pipeline::Status;
-use fingertip::shipped::{COLUMNS, Capture, Config, Frame, Pipeline, ROWS, TARE_FRAMES};
+use fingertip::shipped::{Capture, Config, Frame, Pipeline, TARE_FRAMES};
 use images::record::Record;
 
 /// First finger of a scene, or the finger of the plant.
@@ -37,8 +35,7 @@ impl<E: Set> Bench<E> {
         Ok(Self::around(Board::new(&scene.without_events(), Begun::default())?))
     }
 
-    /// Replaces the world around the finger. Controller, tip and array are kept with the memory of their effects, and
-    /// time continues.
+    /// Replaces the world around the finger. Controller, tip and array keep the memory of their effects.
     pub fn exchange(&mut self, scene: &Scene) -> Result<(), SimError> {
         let mut before = core::mem::replace(&mut self.board, Board::new(&scene.without_events(), Begun::default())?);
         let now = &mut self.board;
@@ -54,8 +51,7 @@ impl<E: Set> Bench<E> {
         Ok(())
     }
 
-    /// Copies the bench, so that several futures can begin at one instant. `scene` is the scene of this bench. The copy
-    /// is exact where no effect of the scene has a memory: noise, hysteresis and creep begin again.
+    /// Copies the bench of `scene`, exactly where no effect has a memory: noise, hysteresis and creep begin again.
     pub fn fork(&self, scene: &Scene) -> Result<Self, SimError> {
         let mut fork = Self::new(scene)?;
         let (from, to) = (&self.board, &mut fork.board);
@@ -78,21 +74,18 @@ impl<E: Set> Bench<E> {
         &self.board.units[0]
     }
 
-    fn finger_mut(&mut self) -> &mut Finger<E::Drive, E::Contact> {
+    fn finger_mut(&mut self) -> &mut Finger<E::Drive> {
         &mut self.board.world.fingers_mut()[0]
     }
 
-    /// Command of the host.
     pub fn command(&mut self) -> &mut Command {
         &mut self.board.units[0].command
     }
 
-    /// Controller of the finger.
     pub fn pipeline(&mut self) -> &mut Pipeline {
         &mut self.board.units[0].pipeline
     }
 
-    /// Status of the controller.
     pub fn status(&self) -> &Status {
         self.unit().pipeline.status()
     }
@@ -102,7 +95,6 @@ impl<E: Set> Bench<E> {
         Record { frame: self.unit().frame, sense: self.sense, command: self.unit().command }
     }
 
-    /// Last frame.
     pub fn frame(&self) -> &Frame {
         &self.unit().frame
     }
@@ -138,8 +130,7 @@ impl<E: Set> Bench<E> {
         largest_n
     }
 
-    /// Lets time pass over a finger that touches nothing, with few frames: tip and array recover, the temperature of
-    /// the array changes. Torque must be off.
+    /// Lets time pass over a finger that touches nothing, with few frames. Torque must be off.
     pub fn rest(&mut self, seconds: f64) {
         for _ in 0..(seconds / REST_STEP_S).ceil() as usize {
             self.finger_mut().contact.effects.relax(REST_STEP_S, None);
@@ -149,9 +140,6 @@ impl<E: Set> Bench<E> {
     }
 
     /// Makes a measuring motion and calls `each` after every frame. Returns how the motion ended.
-    ///
-    /// # Panics
-    /// The motion does not end within 30 s.
     pub fn measure(&mut self, task: Task, mut each: impl FnMut(&mut Self)) -> MeasureStatus {
         self.request(task);
         let request = self.command().measure_request;
@@ -187,12 +175,10 @@ impl<E: Set> Bench<E> {
         self.command().torque = true;
     }
 
-    /// Virtual time.
     pub fn time_s(&self) -> f64 {
         self.board.time_s()
     }
 
-    /// Returns the true state of the finger.
     pub fn truth(&mut self) -> Truth {
         self.board.world.truth(0, false)
     }
@@ -218,16 +204,6 @@ impl<E: Set> Bench<E> {
         }
         self.place_object(to_mm);
     }
-
-    /// Returns the reading of each taxel under 100 kPa, as a share of it: its gain, if no effect has a memory.
-    pub fn sensitivities(&mut self) -> [[f64; COLUMNS]; ROWS] {
-        let unit = &mut self.board.units[0];
-        core::array::from_fn(|row| {
-            let mut kpa = [100.0; COLUMNS];
-            unit.sensor.pressure(row, 0.0, &mut kpa);
-            kpa.map(|kpa| kpa / 100.0)
-        })
-    }
 }
 
 impl Default for Bench {
@@ -242,9 +218,6 @@ const SCENE: &str = "about = \"the plant\"\nduration_s = 1.0\n[world]\nstep_us =
 
 impl Bench {
     /// Creates the finger of the plant under a controller: at rest, torque off, not tared.
-    ///
-    /// # Panics
-    /// The contact is too stiff for steps of 10 us.
     pub fn of(setup: &Setup, config: &Config) -> Self {
         let scene = read("plant", SCENE, &[]).expect("the plant's scene is one");
         let parts = core::iter::once(Reference::parts(setup));

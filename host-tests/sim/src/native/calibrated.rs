@@ -63,7 +63,6 @@ const RELEASE_S: f64 = 0.4;
 pub struct Calibrated {
     /// Parameters with modulus and scale.
     pub params: Params,
-    /// Gains of the taxels.
     pub gains: Gains,
     /// Steps of the procedure that failed, each with its reason. The finger keeps its values there.
     pub refused: Vec<String>,
@@ -95,9 +94,6 @@ pub fn board(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, RunError> 
 }
 
 /// Calibrates a finger in front of the plate of its scene. The finger has the result in the end.
-///
-/// # Errors
-/// The scene cannot be simulated, or the parameters found are not valid.
 pub fn calibrate(bench: &mut Bench<Named>, scene: &Scene) -> Result<Calibrated, RunError> {
     let mut params = scene.params();
     let (mut presses, mut refused) = (Vec::new(), Vec::new());
@@ -134,7 +130,7 @@ pub fn calibrate(bench: &mut Bench<Named>, scene: &Scene) -> Result<Calibrated, 
         for share in SWINGS {
             hold(bench, goal_n * share, SWING_S);
         }
-        let Hold { true_n, read_n } = hold(bench, goal_n, HOLD_S);
+        let [true_n, read_n] = hold(bench, goal_n, HOLD_S);
         let Status { mode, fault, .. } = *bench.status();
         if mode == Mode::Force {
             held.push(Held { shown_n: (true_n / SCALE_STEP_N).round() * SCALE_STEP_N, read_n });
@@ -158,7 +154,7 @@ pub fn calibrate(bench: &mut Bench<Named>, scene: &Scene) -> Result<Calibrated, 
 
 /// The scene's finger before a level or inclined plate, with the contact at a place.
 pub fn plate(scene: &Scene, place: Place) -> Result<Scene, RunError> {
-    let Place { centre_mm: [x, y], tilt_deg: [along_columns, along_rows] } = place;
+    let ([x, y], [along_columns, along_rows]) = (place.centre_mm, place.tilt_deg);
     let number = |path, value: f64| (path, format!("{value:?}"));
     changed(
         scene,
@@ -181,14 +177,8 @@ pub fn changed(scene: &Scene, changes: &[(&str, String)]) -> Result<Scene, RunEr
     Ok(Scene { bounds: scene.bounds.clone(), ..read("finger.toml", &text, &[])? })
 }
 
-/// Means over the end of a hold, N.
-struct Hold {
-    true_n: f64,
-    read_n: f64,
-}
-
-/// Holds a force, starting from any state.
-fn hold(bench: &mut Bench<Named>, goal_n: f64, seconds: f64) -> Hold {
+/// Holds a force, starting from any state. Returns the means of the true force and of the reading over the end, N.
+fn hold(bench: &mut Bench<Named>, goal_n: f64, seconds: f64) -> [f64; 2] {
     bench.command().goal = newtons((goal_n * 1e3) as i32);
     bench.run(seconds - READ_S);
     let until_s = bench.time_s() + READ_S;
@@ -200,7 +190,7 @@ fn hold(bench: &mut Bench<Named>, goal_n: f64, seconds: f64) -> Hold {
         read_n += f64::from(status.contact.force.0) - f64::from(status.creep.0) - f64::from(status.drift.0);
         count += 1.0;
     }
-    Hold { true_n: true_n / count, read_n: read_n / count }
+    [true_n / count, read_n / count]
 }
 
 /// Releases the object, then torque off.
@@ -231,10 +221,8 @@ const TEST_HOLD_S: f64 = 1.5;
 const TESTS: [(&str, f64, bool); 3] =
     [("1 N", 1.0, false), ("5 N, centred", 5.0, false), ("5 N, off the centre", 5.0, true)];
 
-/// Finger before and after its calibration.
 #[derive(Clone, Debug)]
 pub struct Unlike {
-    /// Result of the calibration.
     pub calibrated: Calibrated,
     /// Errors of the true force in the order of the tests, as shares of the goal: before and after calibration.
     pub errors: [[f64; 3]; 2],
@@ -256,7 +244,7 @@ fn finger(seed: u64, number: usize) -> Result<Unlike, RunError> {
         for (error, (_, goal_n, is_off)) in errors.iter_mut().zip(TESTS) {
             bench.exchange(&plate(&scene, if is_off { off } else { Place::default() })?)?;
             bench.tare();
-            *error = hold(bench, goal_n, TEST_HOLD_S).true_n / goal_n - 1.0;
+            *error = hold(bench, goal_n, TEST_HOLD_S)[0] / goal_n - 1.0;
             release(bench);
             bench.rest(PAUSE_S);
         }
@@ -281,10 +269,7 @@ pub fn percentiles(fingers: &[Unlike]) -> [[[f64; 2]; 3]; 2] {
 
 /// Draws and calibrates fingers on all cores.
 pub fn fingers(seed: u64, count: usize) -> Result<Vec<Unlike>, RunError> {
-    cores::map(0..count, |number| finger(seed, number).map_err(|error| error.to_string()))
-        .into_iter()
-        .map(|finger| Ok(finger?))
-        .collect()
+    cores::map(0..count, |number| finger(seed, number)).into_iter().collect()
 }
 
 /// The errors as a text: worst fingers first, then percentiles.

@@ -44,11 +44,9 @@ pub struct Bus<E: Set> {
 /// Firmware of a finger around its pipeline.
 struct Device {
     server: Server,
-    /// Contents of the flash.
     flash: Record,
     started_s: f64,
     reset: ResetCause,
-    /// Count of the encoder at the start.
     encoder_start: i32,
     /// Number of good packets, and the time of its last change.
     packets: (u32, f64),
@@ -72,12 +70,10 @@ impl<E: Set> Bus<E> {
         Ok(Self { board, devices, object, answers: VecDeque::new() })
     }
 
-    /// Virtual time.
     pub fn now_s(&self) -> f64 {
         self.board.time_s()
     }
 
-    /// Duration of a frame.
     pub fn frame_s(&self) -> f64 {
         self.board.slot_s * SLOTS as f64
     }
@@ -104,7 +100,8 @@ impl<E: Set> Bus<E> {
             let board = &mut self.board;
             if device.reboot_s.is_some_and(|at_s| at_s <= now_s) {
                 let encoder = board.sense(finger, 0).encoder;
-                *device = Device { encoder_start: encoder, broken: device.broken.take(), ..device.rebooted(now_s) };
+                let rebooted = Device::new(device.flash, ResetCause::Software, now_s);
+                *device = Device { encoder_start: encoder, broken: device.broken.take(), ..rebooted };
                 board.units[finger].pipeline = device.pipeline();
                 board.units[finger].frame.sequence = 0;
             }
@@ -218,10 +215,6 @@ impl Device {
         }
     }
 
-    fn rebooted(&self, now_s: f64) -> Self {
-        Self::new(self.flash, ResetCause::Software, now_s)
-    }
-
     /// Builds the pipeline from the stored values, as the firmware does.
     fn pipeline(&self) -> Pipeline {
         let (mut params, mut sound) = (self.flash.params, true);
@@ -303,7 +296,6 @@ const GAP_MM: f64 = 0.2;
 
 /// Place and goal of the object.
 struct Object {
-    /// Place in the scene.
     scene_mm: f64,
     now_mm: f64,
     goal_mm: f64,
@@ -347,10 +339,7 @@ help                 says this
 ";
 
 impl<E: Set> Bus<E> {
-    /// Carries out a line of text and returns what was done.
-    ///
-    /// # Errors
-    /// The line is not a command or cannot be carried out. The text is for people.
+    /// Carries out a line of text and returns what was done. The error is for people.
     pub fn command(&mut self, text: &str) -> Result<String, String> {
         let words: Vec<&str> = text.split_whitespace().collect();
         match words[..] {
@@ -464,7 +453,6 @@ impl Kind {
         ("leads-swapped", Self::LeadsSwapped),
     ];
 
-    /// Lists the names for people.
     pub fn names() -> String {
         Self::ALL.map(|(name, _)| name).join(", ")
     }
@@ -496,7 +484,6 @@ impl Broken {
         Self { kind, then: None }
     }
 
-    /// Returns the state of the bridge at the motor.
     fn at_motor(&self, bridge: Bridge) -> Bridge {
         match (self.kind, bridge) {
             (Kind::LeadsSwapped, Bridge::Driven { duty }) => Bridge::Driven { duty: -duty },

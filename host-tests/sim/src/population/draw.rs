@@ -3,21 +3,16 @@
 use crate::effects::normal_within_3;
 use fastrand::Rng;
 use serde::Serialize;
-use serde_json::{Value, json};
 
-/// Drawn value.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Drawn {
-    /// A number.
     Number(f64),
-    /// A word of a choice.
     Word(String),
 }
 
 #[derive(Clone, Debug, PartialEq)]
 pub enum Draw {
-    /// Constant.
     Always(Drawn),
     /// Uniform distribution between two values.
     Uniform([f64; 2]),
@@ -28,9 +23,9 @@ pub enum Draw {
     /// Choice of a draw by weights.
     Choice(Vec<(f64, Draw)>),
     /// Expression of variables.
-    Is(Expression),
-    /// Draw by the value of a variable that is a word; the last one for any other word.
-    By(String, Vec<(String, Draw)>, Option<Box<Draw>>),
+    Is(String),
+    /// Draw by the value of a variable that is a word.
+    By(String, Vec<(String, Draw)>),
     /// Draw, multiplied by a factor.
     Times(f64, Box<Draw>),
 }
@@ -51,11 +46,11 @@ impl Draw {
                 });
                 return chosen.or(choices.last())?.1.draw(rng, variable);
             }
-            Self::Is(expression) => expression.value(&|name| variable(name)?.number())?,
-            Self::By(name, cases, otherwise) => {
-                let Drawn::Word(word) = variable(name)? else { return None };
-                let case = cases.iter().find(|(case, _)| *case == word).map(|(_, draw)| draw);
-                return case.or(otherwise.as_deref())?.draw(rng, variable);
+            Self::Is(text) => range(text, &mut |name| Some([variable(name)?.number()?; 2])).ok()?[0],
+            Self::By(name, cases) => {
+                let value = variable(name)?;
+                let case = cases.iter().find(|(case, _)| value == Drawn::Word(case.clone()))?;
+                return case.1.draw(rng, variable);
             }
             Self::Times(factor, draw) => factor * draw.draw(rng, variable)?.number()?,
         };
@@ -68,55 +63,46 @@ impl Draw {
             Self::Always(value) => value.number().map(|number| [number; 2]),
             Self::Uniform(ends) | Self::LogUniform(ends) => Some(*ends),
             Self::Normal([mean, deviation]) => Some([mean - 3.0 * deviation, mean + 3.0 * deviation]),
-            Self::Choice(choices) => around(choices.iter().map(|(_, draw)| draw), variable),
-            Self::Is(expression) => expression.range(variable),
-            Self::By(_, cases, otherwise) => {
-                around(cases.iter().map(|(_, draw)| draw).chain(otherwise.as_deref()), variable)
+            Self::Is(text) => range(text, &mut |name| variable(name)).ok(),
+            Self::Choice(_) | Self::By(..) => {
+                let ranges: Option<Vec<[f64; 2]>> = self.parts().into_iter().map(|draw| draw.range(variable)).collect();
+                ranges?.into_iter().reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
             }
             Self::Times(factor, draw) => draw.range(variable).map(|[low, high]| [factor * low, factor * high]),
         }
     }
 
-    /// Possible final draws: constants, and draws of numbers.
-    pub fn ends(&self) -> Vec<&Self> {
+    fn parts(&self) -> Vec<&Self> {
         match self {
-            Self::Choice(choices) => choices.iter().flat_map(|(_, draw)| draw.ends()).collect(),
-            Self::By(_, cases, otherwise) => {
-                cases.iter().map(|(_, draw)| draw).chain(otherwise.as_deref()).flat_map(Self::ends).collect()
-            }
-            Self::Times(_, draw) => draw.ends(),
-            end => vec![end],
+            Self::Choice(choices) => choices.iter().map(|(_, draw)| draw).collect(),
+            Self::By(_, cases) => cases.iter().map(|(_, draw)| draw).collect(),
+            Self::Times(_, draw) => vec![draw],
+            _ => Vec::new(),
         }
     }
 
-    /// Words that it may draw.
+    /// Possible final draws: constants, and draws of numbers.
+    pub fn ends(&self) -> Vec<&Self> {
+        let parts = self.parts();
+        if parts.is_empty() { vec![self] } else { parts.into_iter().flat_map(Self::ends).collect() }
+    }
+
     pub fn words(&self) -> Vec<&str> {
         let word = |end| if let &Self::Always(Drawn::Word(ref word)) = end { Some(word.as_str()) } else { None };
         self.ends().into_iter().filter_map(word).collect()
     }
 
-    /// Variables that it uses.
     pub fn uses(&self) -> Vec<&str> {
-        match self {
-            Self::Choice(choices) => choices.iter().flat_map(|(_, draw)| draw.uses()).collect(),
-            Self::By(name, cases, otherwise) => {
-                let draws = cases.iter().map(|(_, draw)| draw).chain(otherwise.as_deref());
-                core::iter::once(name.as_str()).chain(draws.flat_map(Self::uses)).collect()
-            }
-            Self::Times(_, draw) => draw.uses(),
-            Self::Is(expression) => expression.variables(),
+        let own = match self {
+            Self::By(name, _) => vec![name.as_str()],
+            Self::Is(text) => variables(text),
             _ => Vec::new(),
-        }
+        };
+        own.into_iter().chain(self.parts().into_iter().flat_map(Self::uses)).collect()
     }
 }
 
-fn around<'a>(draws: impl Iterator<Item = &'a Draw>, variable: &dyn Fn(&str) -> Option<[f64; 2]>) -> Option<[f64; 2]> {
-    let ranges: Option<Vec<[f64; 2]>> = draws.map(|draw| draw.range(variable)).collect();
-    ranges?.into_iter().reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
-}
-
 impl Drawn {
-    /// Number, if it is one.
     pub fn number(&self) -> Option<f64> {
         if let Self::Number(number) = self { Some(*number) } else { None }
     }
@@ -131,13 +117,12 @@ impl Drawn {
     }
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Spread {
     pub count: usize,
     pub median: Option<f64>,
-    /// 95th percentile.
+    #[serde(rename = "percentile_95")]
     pub most: Option<f64>,
-    /// Largest value.
     pub worst: Option<f64>,
 }
 
@@ -148,165 +133,120 @@ impl Spread {
         let rank = |share: f64| values.get(((values.len() as f64 * share).ceil() as usize).max(1) - 1).copied();
         Self { count: values.len(), median: rank(0.5), most: rank(0.95), worst: values.last().copied() }
     }
+}
 
-    /// Returns the spread for scripts.
-    pub fn json(&self) -> Value {
-        json!({ "count": self.count, "median": self.median, "percentile_95": self.most, "worst": self.worst })
+/// Range of an expression for the ranges of its variables. A number is a range without a width. Correlations between two
+/// terms are ignored.
+///
+/// # Errors
+/// The text is no expression, or `variable` has no range for a name.
+pub fn range<'a>(text: &'a str, variable: &mut dyn FnMut(&'a str) -> Option<[f64; 2]>) -> Result<[f64; 2], String> {
+    let mut parser = Parser { rest: text, variable };
+    let range = parser.sum()?;
+    match parser.rest.trim() {
+        "" => Ok(range),
+        rest => Err(format!("`{rest}` is not understood")),
     }
 }
 
-/// Parsed expression.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Expression {
-    Number(f64),
-    /// A drawn variable.
-    Variable(String),
-    Two(Box<Expression>, Operator, Box<Expression>),
+pub fn variables(text: &str) -> Vec<&str> {
+    let mut names = Vec::new();
+    let _ = range(text, &mut |name| {
+        names.push(name);
+        Some([1.0; 2])
+    });
+    names
 }
 
-/// Operator between two expressions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Operator {
-    /// a + b
-    Add,
-    /// a - b
-    Subtract,
-    /// a * b
-    Multiply,
-    /// a / b
-    Divide,
+struct Parser<'a, 'v> {
+    rest: &'a str,
+    variable: &'v mut dyn FnMut(&'a str) -> Option<[f64; 2]>,
 }
 
-impl Operator {
-    fn of(letter: u8) -> Option<Self> {
-        Some(match letter {
-            b'+' => Self::Add,
-            b'-' => Self::Subtract,
-            b'*' => Self::Multiply,
-            b'/' => Self::Divide,
-            _ => return None,
-        })
+impl Parser<'_, '_> {
+    fn sum(&mut self) -> Result<[f64; 2], String> {
+        self.chain(['+', '-'], Self::product)
     }
 
-    fn apply(self, a: f64, b: f64) -> f64 {
-        match self {
-            Self::Add => a + b,
-            Self::Subtract => a - b,
-            Self::Multiply => a * b,
-            Self::Divide => a / b,
-        }
-    }
-}
-
-impl Expression {
-    /// Parses an expression.
-    pub fn read(text: &str) -> Result<Self, String> {
-        let mut rest = text;
-        let read = sum(&mut rest)?;
-        if rest.trim().is_empty() { Ok(read) } else { Err(format!("`{}` is not understood", rest.trim())) }
+    fn product(&mut self) -> Result<[f64; 2], String> {
+        self.chain(['*', '/'], Self::term)
     }
 
-    pub fn variables(&self) -> Vec<&str> {
-        match self {
-            Self::Number(_) => Vec::new(),
-            Self::Variable(name) => vec![name],
-            Self::Two(a, _, b) => [a.variables(), b.variables()].concat(),
+    /// Parses terms with operators of the same rank between them, from the left.
+    fn chain(
+        &mut self,
+        operators: [char; 2],
+        part: fn(&mut Self) -> Result<[f64; 2], String>,
+    ) -> Result<[f64; 2], String> {
+        let mut all = part(self)?;
+        loop {
+            self.rest = self.rest.trim_start();
+            let Some(operator) = operators.into_iter().find(|letter| self.rest.starts_with(*letter)) else {
+                return Ok(all);
+            };
+            self.rest = &self.rest[1..];
+            all = apply(operator, all, part(self)?);
         }
     }
 
-    /// Value, if every variable has one.
-    pub fn value(&self, variable: &dyn Fn(&str) -> Option<f64>) -> Option<f64> {
-        match self {
-            Self::Number(number) => Some(*number),
-            Self::Variable(name) => variable(name),
-            Self::Two(a, operator, b) => Some(operator.apply(a.value(variable)?, b.value(variable)?)),
+    fn term(&mut self) -> Result<[f64; 2], String> {
+        self.rest = self.rest.trim_start();
+        if let Some(inner) = self.rest.strip_prefix('(') {
+            self.rest = inner;
+            let inside = self.sum()?;
+            self.rest = self.rest.trim_start().strip_prefix(')').ok_or("a `)` is missing")?;
+            return Ok(inside);
         }
-    }
-
-    /// Range of the value, if every variable has a range. Correlations between two terms are ignored.
-    pub fn range(&self, variable: &dyn Fn(&str) -> Option<[f64; 2]>) -> Option<[f64; 2]> {
-        match self {
-            Self::Number(number) => Some([*number; 2]),
-            Self::Variable(name) => variable(name),
-            Self::Two(a, operator, b) => {
-                let (a, b) = (a.range(variable)?, b.range(variable)?);
-                if *operator == Operator::Divide && b[0] <= 0.0 && b[1] >= 0.0 {
-                    return Some([f64::NEG_INFINITY, f64::INFINITY]);
-                }
-                let all = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(i, j)| operator.apply(a[i], b[j]));
-                Some([all.into_iter().fold(f64::INFINITY, f64::min), all.into_iter().fold(f64::NEG_INFINITY, f64::max)])
+        let end = |c: char| !(c.is_ascii_alphanumeric() || c == '_' || c == '.');
+        let (word, after) = self.rest.split_at(self.rest.find(end).unwrap_or(self.rest.len()));
+        self.rest = after;
+        match word.chars().next() {
+            Some(first) if first.is_ascii_digit() => {
+                word.parse().map(|number| [number; 2]).map_err(|_| format!("`{word}` is no number"))
             }
+            Some(first) if first.is_ascii_alphabetic() => {
+                (self.variable)(word).ok_or_else(|| format!("`{word}` is unknown"))
+            }
+            _ => Err(format!("a number or a variable is missing before `{}`", after.trim())),
         }
     }
 }
 
-fn sum(rest: &mut &str) -> Result<Expression, String> {
-    chain(rest, b"+-", product)
-}
-
-fn product(rest: &mut &str) -> Result<Expression, String> {
-    chain(rest, b"*/", term)
-}
-
-/// Parses terms with operators of the same rank between them, from the left.
-fn chain(
-    rest: &mut &str,
-    operators: &[u8],
-    part: fn(&mut &str) -> Result<Expression, String>,
-) -> Result<Expression, String> {
-    let mut all = part(rest)?;
-    loop {
-        *rest = rest.trim_start();
-        let Some(letter) = rest.bytes().next().filter(|letter| operators.contains(letter)) else { return Ok(all) };
-        let Some(operator) = Operator::of(letter) else { return Ok(all) };
-        *rest = &rest[1..];
-        all = Expression::Two(Box::new(all), operator, Box::new(part(rest)?));
-    }
-}
-
-fn term(rest: &mut &str) -> Result<Expression, String> {
-    *rest = rest.trim_start();
-    if let Some(inner) = rest.strip_prefix('(') {
-        *rest = inner;
-        let inside = sum(rest)?;
-        *rest = rest.trim_start().strip_prefix(')').ok_or("a `)` is missing")?;
-        return Ok(inside);
-    }
-    let end = rest.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_' || c == '.')).unwrap_or(rest.len());
-    let (word, after) = rest.split_at(end);
-    *rest = after;
-    match word.chars().next() {
-        Some(first) if first.is_ascii_digit() => {
-            word.parse().map(Expression::Number).map_err(|_| format!("`{word}` is no number"))
-        }
-        Some(first) if first.is_ascii_alphabetic() => Ok(Expression::Variable(word.into())),
-        _ => Err(format!("a number or a variable is missing before `{}`", after.trim())),
-    }
+fn apply(operator: char, a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    let of: fn(f64, f64) -> f64 = match operator {
+        '+' => |a, b| a + b,
+        '-' => |a, b| a - b,
+        '*' => |a, b| a * b,
+        _ if b[0] <= 0.0 && b[1] >= 0.0 => return [f64::NEG_INFINITY, f64::INFINITY],
+        _ => |a, b| a / b,
+    };
+    let all = [of(a[0], b[0]), of(a[0], b[1]), of(a[1], b[0]), of(a[1], b[1])];
+    [all.into_iter().fold(f64::INFINITY, f64::min), all.into_iter().fold(f64::NEG_INFINITY, f64::max)]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn value(text: &str) -> Result<Option<f64>, String> {
-        let variable = |name: &str| [("a", 3.0), ("b_mm", 0.5)].into_iter().find(|(n, _)| *n == name).map(|(_, v)| v);
-        Expression::read(text).map(|expression| expression.value(&variable))
+    fn value(text: &str) -> Option<f64> {
+        let known = [("a", 3.0), ("b_mm", 0.5)];
+        let variable = |name: &str| known.into_iter().find(|(n, _)| *n == name).map(|(_, value)| [value; 2]);
+        range(text, &mut |name| variable(name)).ok().map(|[value, _]| value)
     }
 
     #[test]
     fn products_come_before_sums_and_all_goes_from_the_left() {
-        assert_eq!(value("1 + 2 * a - 4 / 2 / 2"), Ok(Some(6.0)));
-        assert_eq!(value(" 10 * (1 + b_mm)*a "), Ok(Some(45.0)));
-        assert_eq!(value("a - b_mm - 1"), Ok(Some(1.5)));
-        assert_eq!(value("a * c"), Ok(None));
-        for wrong in ["", "1 +", "(1", "1)", "1 a", "* 2", "1.2.3", "-1"] {
-            assert!(value(wrong).is_err(), "{wrong}");
+        assert_eq!(value("1 + 2 * a - 4 / 2 / 2"), Some(6.0));
+        assert_eq!(value(" 10 * (1 + b_mm)*a "), Some(45.0));
+        assert_eq!(value("a - b_mm - 1"), Some(1.5));
+        for wrong in ["a * c", "", "1 +", "(1", "1)", "1 a", "* 2", "1.2.3", "-1"] {
+            assert_eq!(value(wrong), None, "{wrong}");
         }
     }
 
     #[test]
     fn the_range_holds_every_value() {
-        let range = |text: &str| Expression::read(text).ok()?.range(&|_| Some([-1.0, 2.0]));
+        let range = |text: &'static str| range(text, &mut |_| Some([-1.0, 2.0])).ok();
         assert_eq!(range("3 * a + 1"), Some([-2.0, 7.0]));
         assert_eq!(range("a * a"), Some([-2.0, 4.0]));
         assert_eq!(range("1 - a"), Some([-1.0, 2.0]));

@@ -1,10 +1,10 @@
 //! Reader of populations and of their draws, such as `{ uniform = [1, 10] }`.
 
 use crate::events::{EVENT, KINDS, own_keys};
-use crate::population::draw::{Draw, Drawn, Expression};
+use crate::population::draw::{self, Draw, Drawn};
 use crate::population::{Counted, Events, Place, Population};
 use crate::scene::library;
-use crate::scene::reader::{SceneError, SceneErrors, did_you_mean, item_span, key_span};
+use crate::scene::reader::{SceneError, SceneErrors, did_you_mean, item_span, key_span, not_toml};
 use crate::scene::tables::{EXPECT, Key, Kind, ROOT, SCRIPT, TABLES};
 use crate::{metrics, registry};
 use std::fs;
@@ -21,15 +21,7 @@ const EXAMPLES: &str = "{ uniform = [1, 10] }, { log_uniform = [0.3, 3] }, { nor
     { choice = [256, 512], weights = [1, 2] }, { is = \"1000 * modulus_kpa\" }, { by = \"thing\", ball = 0.05, otherwise = 0 }; \
     with follows = \"magnitude\" or \"1 / magnitude\"";
 
-/// Reader of draws: at one magnitude, with the variables that were read before.
-pub struct DrawReader<'a> {
-    /// Number by which `follows` multiplies or divides.
-    pub magnitude: f64,
-    /// Variables that may be used.
-    pub variables: &'a [(String, Draw)],
-}
-
-impl DrawReader<'_> {
+impl Parts {
     /// Reads a draw or a constant.
     pub fn draw(&self, value: &Value) -> Result<Draw, Wrong> {
         let number = number(value).map(Drawn::Number);
@@ -49,9 +41,19 @@ impl DrawReader<'_> {
             return Err((place, format!("a draw has one way to be drawn{meant}"), EXAMPLES.into()));
         };
         let draw = match way {
-            "uniform" => Draw::Uniform(self.ends(value)?),
-            "log_uniform" => Draw::LogUniform(self.positive(value)?),
-            "normal" => Draw::Normal(self.mean(value)?),
+            "uniform" => Draw::Uniform(ends(value)?),
+            "log_uniform" => {
+                let ends = ends(value)?;
+                let allowed = "[least, largest], both above 0; or `uniform`";
+                check(ends[0] > 0.0, value, "a ratio needs ends above 0", allowed)?;
+                Draw::LogUniform(ends)
+            }
+            "normal" => {
+                let [mean, deviation] = pair(value)?;
+                let message = format!("a deviation of {deviation}");
+                check(deviation >= 0.0, value, &message, "[mean, deviation], the deviation 0 or more")?;
+                Draw::Normal([mean, deviation])
+            }
             "choice" => self.choice(value, table.get("weights"))?,
             "is" => Draw::Is(self.expression(value)?),
             _ => self.by(table, value)?,
@@ -76,40 +78,9 @@ impl DrawReader<'_> {
         })
     }
 
-    fn pair(&self, value: &Value) -> Result<[f64; 2], Wrong> {
-        let numbers: Option<Vec<f64>> = value.as_array().map(|array| array.iter().filter_map(number).collect());
-        numbers.and_then(|numbers| numbers.try_into().ok()).ok_or_else(|| wrong(value, "needs two numbers", EXAMPLES))
-    }
-
-    fn ends(&self, value: &Value) -> Result<[f64; 2], Wrong> {
-        let [low, high] = self.pair(value)?;
-        if low <= high {
-            return Ok([low, high]);
-        }
-        Err(wrong(value, &format!("the least, {low}, is above the largest, {high}"), "[least, largest]"))
-    }
-
-    fn positive(&self, value: &Value) -> Result<[f64; 2], Wrong> {
-        let ends = self.ends(value)?;
-        if ends[0] > 0.0 {
-            return Ok(ends);
-        }
-        Err(wrong(value, "a ratio needs ends above 0", "[least, largest], both above 0; or `uniform`"))
-    }
-
-    fn mean(&self, value: &Value) -> Result<[f64; 2], Wrong> {
-        let [mean, deviation] = self.pair(value)?;
-        if deviation >= 0.0 {
-            return Ok([mean, deviation]);
-        }
-        Err(wrong(value, &format!("a deviation of {deviation}"), "[mean, deviation], the deviation 0 or more"))
-    }
-
     fn choice(&self, value: &Value, weights: Option<&Value>) -> Result<Draw, Wrong> {
         let given: Vec<&Value> = value.as_array().map(|array| array.iter().collect()).unwrap_or_default();
-        if given.is_empty() {
-            return Err(wrong(value, "there is nothing to choose from", "choice = [256, 512, 1024]"));
-        }
+        check(!given.is_empty(), value, "there is nothing to choose from", "choice = [256, 512, 1024]")?;
         let draws = given.into_iter().map(|value| self.draw(value)).collect::<Result<Vec<_>, _>>()?;
         let shares = match weights {
             None => vec![1.0; draws.len()],
@@ -117,54 +88,47 @@ impl DrawReader<'_> {
                 let all: Vec<f64> =
                     weights.as_array().map(|array| array.iter().filter_map(number).collect()).unwrap_or_default();
                 let sound = all.len() == draws.len() && all.iter().all(|w| *w >= 0.0) && all.iter().any(|w| *w > 0.0);
-                if !sound {
-                    let allowed = format!("{} numbers, none below 0 and one above", draws.len());
-                    return Err(wrong(weights, "these are no weights of the choice", &allowed));
-                }
+                let allowed = format!("{} numbers, none below 0 and one above", draws.len());
+                check(sound, weights, "these are no weights of the choice", &allowed)?;
                 all
             }
         };
         Ok(Draw::Choice(shares.into_iter().zip(draws).collect()))
     }
 
-    fn expression(&self, value: &Value) -> Result<Expression, Wrong> {
+    fn expression(&self, value: &Value) -> Result<String, Wrong> {
         let allowed = "+ - * / and ( ) with numbers and variables of [draw], such as \"1000 * modulus_kpa\"";
         let text = value.as_str().ok_or_else(|| wrong(value, "an expression is a text", allowed))?;
-        let expression = Expression::read(text).map_err(|error| wrong(value, &error, allowed))?;
-        for name in expression.variables() {
-            if !self.known(name, value)?.words().is_empty() {
-                return Err(wrong(value, &format!("`{name}` is a word, and cannot be reckoned with"), allowed));
-            }
+        draw::range(text, &mut |_| Some([1.0; 2])).map_err(|error| wrong(value, &error, allowed))?;
+        for name in draw::variables(text) {
+            let message = format!("`{name}` is a word, and cannot be reckoned with");
+            check(self.known(name, value)?.words().is_empty(), value, &message, allowed)?;
         }
-        Ok(expression)
+        Ok(text.to_owned())
     }
 
     fn by(&self, table: &InlineTable, value: &Value) -> Result<Draw, Wrong> {
         let name = value.as_str().ok_or_else(|| wrong(value, "`by` names a variable", EXAMPLES))?;
         let words = self.known(name, value)?.words();
-        if words.is_empty() {
-            return Err(wrong(value, &format!("`{name}` is a number"), "a variable that is a choice of words"));
-        }
-        let (mut cases, mut otherwise) = (Vec::new(), None);
+        let allowed = "a variable that is a choice of words";
+        check(!words.is_empty(), value, &format!("`{name}` is a number"), allowed)?;
+        let (mut given, mut otherwise) = (Vec::new(), None);
         for (case, value) in table.iter().filter(|(case, _)| !["by", "follows"].contains(case)) {
             let draw = self.draw(value)?;
             if case == "otherwise" {
-                otherwise = Some(Box::new(draw));
-            } else if words.contains(&case) {
-                cases.push((case.to_owned(), draw));
+                otherwise = Some(draw);
             } else {
-                return Err(wrong(value, &format!("`{name}` is never \"{case}\""), &words.join(", ")));
+                check(words.contains(&case), value, &format!("`{name}` is never \"{case}\""), &words.join(", "))?;
+                given.push((case, draw));
             }
         }
-        let missing = words.iter().find(|word| otherwise.is_none() && cases.iter().all(|(case, _)| case != *word));
-        if let Some(missing) = missing {
-            return Err(wrong(
-                value,
-                &format!("nothing is said for \"{missing}\""),
-                "a value for each, or `otherwise`",
-            ));
-        }
-        Ok(Draw::By(name.into(), cases, otherwise))
+        let case = |word: &&str| {
+            let draw = given.iter().find(|(case, _)| case == word).map(|(_, draw)| draw).or(otherwise.as_ref());
+            let message = format!("nothing is said for \"{word}\"");
+            let missing = || wrong(value, &message, "a value for each, or `otherwise`");
+            Ok((word.to_string(), draw.ok_or_else(missing)?.clone()))
+        };
+        Ok(Draw::By(name.into(), words.iter().map(case).collect::<Result<_, Wrong>>()?))
     }
 
     fn known(&self, name: &str, value: &Value) -> Result<&Draw, Wrong> {
@@ -175,6 +139,18 @@ impl DrawReader<'_> {
             wrong(value, &format!("no earlier variable `{name}` in [draw]{meant}"), &names.join(", "))
         })
     }
+}
+
+fn pair(value: &Value) -> Result<[f64; 2], Wrong> {
+    let numbers: Option<Vec<f64>> = value.as_array().map(|array| array.iter().filter_map(number).collect());
+    numbers.and_then(|numbers| numbers.try_into().ok()).ok_or_else(|| wrong(value, "needs two numbers", EXAMPLES))
+}
+
+fn ends(value: &Value) -> Result<[f64; 2], Wrong> {
+    let [low, high] = pair(value)?;
+    let message = format!("the least, {low}, is above the largest, {high}");
+    check(low <= high, value, &message, "[least, largest]")?;
+    Ok([low, high])
 }
 
 /// Reads a finite number.
@@ -190,15 +166,16 @@ fn wrong(value: &Value, message: &str, allowed: &str) -> Wrong {
     (at(value), message.into(), allowed.into())
 }
 
+fn check(sound: bool, value: &Value, message: &str, allowed: &str) -> Result<(), Wrong> {
+    if sound { Ok(()) } else { Err(wrong(value, message, allowed)) }
+}
+
 /// Folder of the populations of the project.
 pub fn folder() -> PathBuf {
     Path::new(env!("FINGERTIP_ROOT")).join("host-tests/sim/populations")
 }
 
-/// Loads a population by its path, or by its name in the project.
-///
-/// # Errors
-/// No such population, or a mistake in its file. The text is for people.
+/// Loads a population by its path, or by its name in the project. The error is for people.
 pub fn load(name: &str) -> Result<Population, String> {
     let (path, text) = library::find(&folder(), "population", name)?;
     let file = path.to_string_lossy();
@@ -224,8 +201,7 @@ pub fn load(name: &str) -> Result<Population, String> {
     Ok(Population { name: stem(&file), ..population })
 }
 
-/// Puts the contents of a file over those of the file it extends: value by value, bounds by their metric, a script as a
-/// whole. Counts are added.
+/// Puts a file over the one it extends: value by value, bounds by metric, a script as a whole. Counts are added.
 fn overlay(base: &mut Table, over: &Table) {
     for (name, item) in over.iter().filter(|(name, _)| *name != "extends") {
         match (base.get_mut(name), item) {
@@ -266,10 +242,7 @@ const OWN: [&str; 4] = ["magnitude", "draw", "events", "count"];
 /// Reads the text of a population without `extends`.
 pub fn read(file: &str, text: &str) -> Result<Population, SceneErrors> {
     let error = |(at, message, allowed): Wrong| SceneError::new(file, text, at, message, allowed);
-    let document = Document::parse(text).map_err(|failure| {
-        let message = format!("this is not TOML: {}", failure.message().trim().replace('\n', "; "));
-        SceneErrors(vec![error((failure.span().unwrap_or(0..0), message, String::new()))])
-    })?;
+    let document = Document::parse(text).map_err(|failure| SceneErrors(vec![not_toml(file, text, &failure)]))?;
     let root = document.as_table();
     let mut wrong: Vec<Wrong> = Vec::new();
     let magnitude =
@@ -337,7 +310,7 @@ impl Parts {
                 self.wrong.push((key_span(table, name), format!("`{name}` is no draw"), "a value or a draw".into()));
                 continue;
             };
-            match (DrawReader { magnitude: self.magnitude, variables: &self.variables }).draw(value) {
+            match self.draw(value) {
                 Ok(draw) => self.variables.push((name.into(), draw)),
                 Err(wrong) => self.wrong.push(wrong),
             }
@@ -366,7 +339,7 @@ impl Parts {
 
     fn key(&mut self, key: String, value: &toml_edit::Value) {
         let at = value.span().unwrap_or(0..0);
-        let draw = match (DrawReader { magnitude: self.magnitude, variables: &self.variables }).draw(value) {
+        let draw = match self.draw(value) {
             Ok(draw) => draw,
             Err(wrong) => return self.wrong.push(wrong),
         };
@@ -387,8 +360,7 @@ impl Parts {
         self.keys.push(Place { at, key, whole, draw: Some(draw) });
     }
 
-    /// Reads the draws of events: `[events]` with `count` and `at_s`, `[events.KIND]` with `weight` and the keys of the
-    /// kind.
+    /// Reads the draws of events: `count` and `at_s`, and for each kind a table with `weight` and its keys.
     fn events(&mut self, root: &Table) -> Option<Events> {
         let table = root.get("events")?.as_table()?;
         let own = ["count", "at_s"];

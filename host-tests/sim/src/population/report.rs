@@ -5,7 +5,7 @@ use super::{Counted, Finger, Population};
 use crate::metrics::{Hold, shown};
 use crate::part::{cannot_write, check};
 use crate::run::{Outcome, RunError, asked};
-use crate::sweep::first_missing;
+use crate::sweep::complete;
 use output::kept;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -17,15 +17,11 @@ use std::path::{Path, PathBuf};
 /// All fingers of a population or of a shard, in order.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Report {
-    /// The population's name.
     pub population: String,
-    /// Description of the population.
     pub about: String,
     /// Always true.
     pub simulated: bool,
-    /// Name of the board.
     pub board: String,
-    /// Seed of the draws.
     pub seed: u64,
     /// Number of fingers of the whole.
     pub of_fingers: usize,
@@ -35,7 +31,6 @@ pub struct Report {
     pub counted: Vec<Counted>,
     /// Summary for scripts.
     pub summary: Value,
-    /// Results of the fingers.
     pub fingers: Vec<Ran>,
 }
 
@@ -44,34 +39,24 @@ pub struct Report {
 pub struct Ran {
     /// Number of the finger, from 1.
     pub finger: usize,
-    /// Seed of the scene.
     pub seed: u64,
-    /// True if it kept all promises.
     pub inside: bool,
-    /// Drawn values.
     pub drawn: Map<String, Value>,
-    /// Promises with their results.
     pub promises: Vec<Promise>,
     /// Forces that were held.
     pub holds: Vec<Hold>,
     /// All metrics; null if the run has none.
     pub metrics: Map<String, Value>,
-    /// Digest of the run.
     pub digest: String,
 }
 
-/// Promise of the envelope.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Promise {
-    /// Metric of the promise.
     pub metric: String,
     /// Measured value: for a metric with a value for each goal, the worst against its limit.
     pub value: Option<f64>,
-    /// Lower bound.
     pub min: Option<f64>,
-    /// Upper bound.
     pub max: Option<f64>,
-    /// True if it is kept.
     pub held: bool,
 }
 
@@ -90,7 +75,6 @@ impl Promise {
 }
 
 impl Ran {
-    /// Result of a finger.
     pub fn new(number: usize, finger: &Finger, outcome: &Outcome) -> Self {
         let promises = outcome.verdicts.iter().map(|verdict| Promise {
             metric: verdict.bound.metric.clone(),
@@ -111,7 +95,6 @@ impl Ran {
         }
     }
 
-    /// Promises that were broken.
     pub fn broken(&self) -> impl Iterator<Item = &Promise> {
         self.promises.iter().filter(|promise| !promise.held)
     }
@@ -134,7 +117,7 @@ pub(super) fn id(population: &Population, board: &str, seed: u64, of_fingers: us
 }
 
 impl Report {
-    /// Report of these fingers, in any order.
+    /// Report of these fingers, in order.
     pub fn new(population: &Population, board: &str, seed: u64, of_fingers: usize, fingers: Vec<Ran>) -> Self {
         let id = id(population, board, seed, of_fingers);
         let mut report = Self {
@@ -154,9 +137,6 @@ impl Report {
     }
 
     /// Merges shards. The result is the same, byte for byte, as that of the whole.
-    ///
-    /// # Errors
-    /// The shards are not of one population, a finger is missing or duplicate, or a file cannot be read.
     pub fn merge(files: &[PathBuf]) -> Result<Self, RunError> {
         let mut whole: Option<Self> = None;
         let mut fingers = BTreeMap::new();
@@ -181,29 +161,20 @@ impl Report {
         if let Some(number) = fingers.keys().find(|number| !(1..=all).contains(*number)) {
             return Err(format!("there is a finger {number}, where there are {all} in all").into());
         }
-        if let Some(first) = first_missing(fingers.keys(), all) {
-            let missing = all - fingers.len();
-            return Err(format!(
-                "{missing} of {all} fingers are missing, finger {first} the first: is a shard missing?"
-            )
-            .into());
-        }
-        whole.fingers = fingers.into_values().collect();
+        whole.fingers = complete(fingers, all, "finger")?;
         whole.finish();
         Ok(whole)
     }
 
     fn finish(&mut self) {
-        self.fingers.sort_by_key(|ran| ran.finger);
-        let promises: Vec<Value> = self.promises().iter().map(Row::json).collect();
-        let [percent, mn] = self.errors().map(|spread| spread.json());
+        let [percent, mn] = self.errors();
         let counted = self.counted().map(
             |(Counted { metric, above }, fingers)| json!({ "metric": metric, "above": above, "fingers": fingers }),
         );
         self.summary = json!({
             "fingers": self.fingers.len(),
             "inside": self.inside(),
-            "promises": promises,
+            "promises": self.promises(),
             "hold_error_percent": percent,
             "hold_error_mn": mn,
             "counted": counted.collect::<Vec<_>>(),
@@ -257,33 +228,19 @@ impl Report {
         Ok(serde_json::to_string_pretty(self)? + "\n")
     }
 
-    /// Writes the report for scripts.
-    ///
-    /// # Errors
-    /// The file cannot be written. An earlier file remains.
+    /// Writes the report for scripts. After a failure an earlier file remains.
     pub fn write(&self, path: &Path) -> Result<(), RunError> {
         Ok(kept::write(path, self.json()?).map_err(|error| cannot_write(path, &error))?)
     }
 }
 
 /// A promise over all fingers.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Row {
-    /// Metric of the promise.
-    pub metric: String,
-    /// Fingers that broke it.
-    pub broken: usize,
-    /// Spread of the values.
+    #[serde(flatten)]
     pub spread: Spread,
-}
-
-impl Row {
-    fn json(&self) -> Value {
-        let Value::Object(mut row) = self.spread.json() else { return Value::Null };
-        row.insert("metric".into(), json!(self.metric));
-        row.insert("broken".into(), json!(self.broken));
-        Value::Object(row)
-    }
+    pub metric: String,
+    pub broken: usize,
 }
 
 /// Most fingers that are listed.

@@ -17,9 +17,8 @@ use std::fmt::Write as _;
 /// Settle times of a row that make frames of 10, 5, 2 and 1 kHz, ns.
 const SETTLE_NS: [u32; 4] = [2_400, 11_500, 38_800, 84_200];
 
-/// Returns the results as lines of words: `level L` with the errors of fingers as they come and calibrated, `rate NS`
-/// with settling in ms, duty at rest in %, errors and number of holds without a fault, and what they are of. Errors are
-/// root mean squares over the fingers, mN.
+/// Returns lines of words: `level L` with the errors of fingers as they come and calibrated, mN rms; `rate NS` with
+/// settling in ms, duty at rest in %, errors and the number of holds without a fault.
 pub fn lines(fingers: usize) -> Result<String, RunError> {
     let mut text = String::new();
     levels(fingers, &mut text)?;
@@ -73,7 +72,6 @@ fn each<T: Send>(fingers: usize, of: impl Fn(&Scene) -> Result<T, RunError> + Sy
     cores::map(0..fingers, |number| of(&population.finger(SEED, number)?.scene)).into_iter().collect()
 }
 
-/// Errors of the holds of a run.
 fn holds(scene: &Scene, board: Run) -> Result<Held, RunError> {
     Ok(off_n(&run(scene, board, &mut [])?.holds))
 }

@@ -48,9 +48,6 @@ struct Finger {
 impl Recorder {
     /// Records into a new file, which appears under its name when it is finished, with the scalars of each `every`-th
     /// step.
-    ///
-    /// # Errors
-    /// The file cannot be created, or another process records there.
     pub fn new(path: &Path, scene: &Scene, every: u64) -> Result<Self, RunError> {
         let file = Whole::create(path).map_err(|error| cannot_write(path, &error))?;
         let library = concat!("fingertip-sim/", env!("CARGO_PKG_VERSION"));
@@ -69,17 +66,13 @@ impl Recorder {
         })
     }
 
-    /// Notes that the steps do not have all inputs of the core, so a replay is impossible. Call it before the run
-    /// begins.
+    /// Notes before the run that the steps lack inputs of the core, so a replay is impossible.
     pub fn seen_from_outside(mut self) -> Self {
         self.whole = false;
         self
     }
 
-    /// Closes the file after the run and moves it to its place.
-    ///
-    /// # Errors
-    /// Something could not be written. An earlier file remains.
+    /// Closes the file after the run and moves it to its place. After a failure an earlier file remains.
     pub fn finish(mut self, digest: &str) -> Result<(), RunError> {
         let path = std::mem::take(&mut self.path);
         if !self.begun {

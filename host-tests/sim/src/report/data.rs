@@ -81,9 +81,6 @@ pub fn embedded(data: &Value) -> String {
 
 impl Over {
     /// Reads the run of another report.
-    ///
-    /// # Errors
-    /// The report cannot be read, or this version cannot draw it over another.
     pub fn read(path: &Path) -> Result<Self, RunError> {
         let page = fs::read_to_string(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
         Self::of(&page).map_err(|why| format!("{}: {why}", path.display()).into())

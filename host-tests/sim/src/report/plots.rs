@@ -10,7 +10,6 @@ use serde::Serialize;
 /// Width and height of a plot without a script: its letters stay readable on a phone.
 const SIZE_PX: (u32, u32) = (400, 200);
 
-/// Style of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Style {
@@ -22,7 +21,6 @@ pub enum Style {
     Goal,
 }
 
-/// A line of a plot.
 #[derive(Clone, Debug)]
 pub struct Line {
     pub label: &'static str,
@@ -44,7 +42,6 @@ pub struct Plot {
     pub lines: Vec<Line>,
 }
 
-/// All plots of a finger.
 pub fn all(tracks: &Tracks) -> Vec<Plot> {
     let Tracks { goal, force, sensed, control_error, held_error, sensing_error, .. } = tracks;
     let Tracks { indentation, duty, current, supply, winding, slip, height, .. } = tracks;

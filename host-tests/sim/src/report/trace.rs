@@ -38,13 +38,9 @@ pub struct Track(Vec<Stretch>);
 /// Values of a quantity in a stretch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kept {
-    /// Least value.
     pub low: f64,
-    /// Largest value.
     pub high: f64,
-    /// Mean value.
     pub mean: f64,
-    /// Last value.
     pub last: f64,
 }
 
@@ -72,7 +68,6 @@ impl Track {
         other.0.iter().map(|stretch| at(stretch.number).map(kept)).collect()
     }
 
-    /// Mean in each stretch.
     pub fn means(&self) -> Vec<f64> {
         self.0.iter().map(|stretch| stretch.sum / stretch.count).collect()
     }
@@ -103,12 +98,9 @@ impl Track {
     }
 }
 
-/// The array at an instant.
 #[derive(Clone, Debug)]
 pub struct Instant {
-    /// Time of the map.
     pub time_s: f64,
-    /// True mean pressures.
     pub true_kpa: Pressures,
     /// Codes of the taxels, less those of the first frame of the scene.
     pub codes: [[i32; COLUMNS]; ROWS],
@@ -149,7 +141,6 @@ pub struct Tracks {
     pub force_difference: Track,
     /// Travel less that of the other board, mm.
     pub travel_difference: Track,
-    /// Pressure maps.
     pub instants: Vec<Instant>,
     states: Vec<States>,
     first: Option<Frame>,
@@ -169,7 +160,8 @@ impl Tracks {
 #[derive(Clone, Debug)]
 pub struct Trace {
     duration_s: f64,
-    other: Option<Path>,
+    /// Path of another board, if the difference from it is drawn too.
+    pub other: Option<Path>,
     /// Fingers in order.
     pub fingers: Vec<Tracks>,
 }
@@ -178,11 +170,6 @@ impl Trace {
     /// Trace of a run of this length.
     pub fn new(duration_s: f64) -> Self {
         Self { duration_s, other: None, fingers: Vec::new() }
-    }
-
-    /// Draws the difference from the path of another board too.
-    pub fn compare_with(&mut self, other: Path) {
-        self.other = Some(other);
     }
 
     fn map_is_due(&self, finger: usize, time_s: f64) -> bool {

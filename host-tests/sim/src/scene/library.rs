@@ -4,7 +4,6 @@ use crate::scene::reader::did_you_mean;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
-/// Folder of the library.
 pub fn folder() -> PathBuf {
     Path::new(env!("FINGERTIP_ROOT")).join("host-tests/sim/scenes")
 }

@@ -10,7 +10,7 @@ use fingertip::shipped::Config;
 use std::fmt;
 use std::ops::Range;
 use std::path::Path;
-use toml_edit::{Document, Item, TableLike};
+use toml_edit::{Document, Item, TableLike, TomlError};
 
 /// Reads a scene. Errors name the file `file`; `[[expect]]` may name `metrics`.
 pub fn read(file: &str, text: &str, metrics: &[&str]) -> Result<Scene, SceneErrors> {
@@ -18,8 +18,7 @@ pub fn read(file: &str, text: &str, metrics: &[&str]) -> Result<Scene, SceneErro
     let scene = match Document::parse(text) {
         Ok(document) => reader.scene(document.as_table(), metrics),
         Err(error) => {
-            let message = format!("this is not TOML: {}", error.message().trim().replace('\n', "; "));
-            reader.error(error.span().unwrap_or(0..0), message, String::new());
+            reader.errors.push(not_toml(file, text, &error));
             None
         }
     };
@@ -30,6 +29,11 @@ pub fn read(file: &str, text: &str, metrics: &[&str]) -> Result<Scene, SceneErro
             Err(SceneErrors(reader.errors))
         }
     }
+}
+
+pub(crate) fn not_toml(file: &str, text: &str, error: &TomlError) -> SceneError {
+    let message = format!("this is not TOML: {}", error.message().trim().replace('\n', "; "));
+    SceneError::new(file, text, error.span().unwrap_or(0..0), message, String::new())
 }
 
 struct Reader<'a> {
@@ -221,7 +225,7 @@ impl Reader<'_> {
                 let message = format!("bounds of `{}` for the second time", bound.metric);
                 self.error(metric(), message, "one [[expect]] a metric, with min, max or both".into());
             }
-            let by_goal = metrics::BY_GOAL.iter().map(|metric| metric.name);
+            let by_goal = metrics::BY_GOAL.iter().map(|(name, _)| *name);
             if bound.max_per_goal_n.is_some() {
                 let name = bound.metric.rsplit('.').next().unwrap_or_default();
                 let message = if by_goal.clone().all(|known| known != name) {
@@ -254,8 +258,7 @@ impl Reader<'_> {
 }
 
 impl Reader<'_> {
-    /// Returns the checked values of a table; none if one is wrong or missing. `open` accepts keys that are not
-    /// described.
+    /// Returns the checked values of a table; none if one is wrong or missing. `open` accepts unknown keys.
     fn values(&mut self, table: &Table, given: &dyn TableLike, place: Range<usize>, open: bool) -> Option<Values> {
         let errors = self.errors.len();
         let strange = |name: &str| !open && table.keys.iter().all(|key| key.name != name);
@@ -372,22 +375,17 @@ pub(crate) fn item_span(table: &dyn TableLike, name: &str) -> Range<usize> {
     table.get(name).and_then(Item::span).unwrap_or_else(|| key_span(table, name))
 }
 
-/// Mistake in a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SceneError {
-    /// File as it was named.
     pub file: String,
     /// Line, from 1.
     pub line: usize,
     /// Column in characters, from 1.
     pub column: usize,
-    /// Description of the mistake.
     pub message: String,
-    /// Allowed values.
     pub allowed: String,
     /// Word that was probably meant.
     pub suggestion: Option<String>,
-    /// Line of the mistake.
     pub source_line: String,
     /// Number of marked characters.
     pub width: usize,

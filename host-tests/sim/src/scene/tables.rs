@@ -5,14 +5,10 @@ use crate::events::{EVENT, KINDS};
 use fingertip::params::Params;
 use std::fmt;
 
-/// Table of a scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Table {
-    /// Name of the table.
     pub name: &'static str,
-    /// Description in one line.
     pub about: &'static str,
-    /// Keys of the table.
     pub keys: &'static [Key],
 }
 
@@ -190,14 +186,11 @@ const CONTROLLER: [Key; Params::COUNT] = {
     keys
 };
 
-/// Key of a table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Key {
     /// Name, with its unit as a suffix if it has one: `rms_codes`, `radius_mm`.
     pub name: &'static str,
-    /// Description in one line.
     pub about: &'static str,
-    /// Allowed values.
     pub kind: Kind,
 }
 
@@ -206,34 +199,23 @@ pub struct Key {
 pub enum Kind {
     /// A number within bounds.
     Number {
-        /// Lower limit.
         min: f64,
-        /// Upper limit.
         max: f64,
-        /// Value of a missing key.
         default: Option<f64>,
     },
     /// A whole number within bounds.
     Whole {
-        /// Lower limit.
         min: i64,
-        /// Upper limit.
         max: i64,
-        /// Value of a missing key.
         default: Option<i64>,
     },
-    /// One of these words.
     Word {
-        /// Allowed words.
         words: &'static [&'static str],
-        /// Value of a missing key.
         default: Option<&'static str>,
     },
     /// A number within bounds, which may be left out: [`Values::optional`].
     Optional {
-        /// Lower limit.
         min: f64,
-        /// Upper limit.
         max: f64,
         /// True if only whole numbers are allowed.
         whole: bool,
@@ -309,18 +291,12 @@ impl Key {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Values(Vec<(&'static str, Value)>);
 
-/// Checked value.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
-    /// Value of [`Kind::Number`] and [`Kind::Optional`].
     Number(f64),
-    /// Value of [`Kind::Whole`].
     Whole(i64),
-    /// Value of [`Kind::Word`].
     Word(&'static str),
-    /// Value of [`Kind::Text`].
     Text(String),
-    /// Value of [`Kind::Pairs`].
     Pairs(Vec<[i64; 2]>),
 }
 
@@ -363,7 +339,6 @@ impl Values {
         }
     }
 
-    /// Returns a whole number.
     pub fn whole(&self, name: &str) -> i64 {
         match self.get(name) {
             Value::Whole(number) => *number,
@@ -371,7 +346,6 @@ impl Values {
         }
     }
 
-    /// Returns a word.
     pub fn word(&self, name: &str) -> &'static str {
         match self.get(name) {
             Value::Word(word) => word,
@@ -379,7 +353,6 @@ impl Values {
         }
     }
 
-    /// Returns pairs.
     pub fn pairs(&self, name: &str) -> &[[i64; 2]] {
         match self.get(name) {
             Value::Pairs(pairs) => pairs,
@@ -392,7 +365,6 @@ impl Values {
         self.0.iter().any(|(known, _)| *known == name).then(|| self.number(name))
     }
 
-    /// Returns a text.
     pub fn text(&self, name: &str) -> &str {
         match self.get(name) {
             Value::Text(text) => text,

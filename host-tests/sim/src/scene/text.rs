@@ -7,9 +7,6 @@ use toml_edit::{DocumentMut, Item, Table, Value as TomlValue};
 
 /// Sets `table.key` (`effects.noise.rms_codes`, `script.0.goal_n`, `seed`) of a text to a value in TOML. Comments
 /// remain. The reader checks the value later.
-///
-/// # Errors
-/// The text or the value is not TOML, or there is no such place.
 pub fn set(text: &str, path: &str, value: &str) -> Result<String, String> {
     let mut document: DocumentMut = text.parse().map_err(|error: toml_edit::TomlError| error.message().to_owned())?;
     let mut value: TomlValue = value.parse().map_err(|_| format!("{path}={value}: `{value}` is not a TOML value"))?;
@@ -17,7 +14,11 @@ pub fn set(text: &str, path: &str, value: &str) -> Result<String, String> {
     let key = names.pop().filter(|key| !key.is_empty()).ok_or_else(|| format!("`{path}` names no key"))?;
     let mut table: &mut dyn toml_edit::TableLike = document.as_table_mut();
     for (place, name) in names.iter().enumerate().filter(|(_, name)| name.parse::<usize>().is_err()) {
-        let item = table.entry(name).or_insert_with(|| Item::Table(new_table(*name == "effects")));
+        let item = table.entry(name).or_insert_with(|| {
+            let mut table = Table::new();
+            table.set_implicit(*name == "effects");
+            Item::Table(table)
+        });
         let index = names.get(place + 1).and_then(|next| next.parse::<usize>().ok());
         table = match (item, index) {
             (Item::ArrayOfTables(tables), Some(index)) => {
@@ -40,12 +41,6 @@ pub fn set(text: &str, path: &str, value: &str) -> Result<String, String> {
         }
     }
     Ok(document.to_string())
-}
-
-fn new_table(implicit: bool) -> Table {
-    let mut table = Table::new();
-    table.set_implicit(implicit);
-    table
 }
 
 /// Writes the scene as a text with every key and without comments, which reads as the same scene.

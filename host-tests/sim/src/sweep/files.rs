@@ -35,7 +35,6 @@ pub(super) struct Head {
     expected: Vec<String>,
 }
 
-/// Returns the form of the rows of the plan.
 pub(super) fn head(plan: &Plan, scene: &Scene, runs: usize) -> Head {
     let mut columns: Vec<String> = [ID, RUN, RUNS].map(String::from).into();
     columns.extend(plan.vary.iter().map(|vary| vary.key.clone()));
@@ -86,7 +85,6 @@ impl Rows {
         self.rows.len()
     }
 
-    /// Adds a run.
     pub fn add(&mut self, number: usize, values: Vec<String>) -> Result<(), RunError> {
         let Head { id, runs, expected, .. } = &self.head;
         let first = [id.clone(), number.to_string(), runs.to_string()];
@@ -130,9 +128,6 @@ fn refuse_others(file: &Path, id: &str) -> Result<(), RunError> {
 }
 
 /// Merges shards.
-///
-/// # Errors
-/// The shards are not of one sweep, a run is missing or duplicate, or a file cannot be read or written.
 pub fn merge(files: &[PathBuf], out: &Path) -> Result<Table, RunError> {
     let table = table(files)?;
     make_folder(out)?;
@@ -149,7 +144,6 @@ pub fn merge(files: &[PathBuf], out: &Path) -> Result<Table, RunError> {
 pub struct Shard {
     /// Number of the share, from 1.
     pub number: usize,
-    /// Number of shares.
     pub of: usize,
 }
 
@@ -162,17 +156,18 @@ impl Shard {
         run % self.of == self.number - 1
     }
 
-    /// True if the share is the whole.
     pub const fn is_whole(self) -> bool {
         self.of == 1
     }
 }
 
-/// Returns the first number from 1 to `all` that is missing among these, which are in order.
-pub(crate) fn first_missing<'a>(numbers: impl Iterator<Item = &'a usize>, all: usize) -> Option<usize> {
-    // The first place whose number differs is missing.
-    let mut numbers = numbers.copied();
-    (1..=all).find(|place| numbers.next() != Some(*place))
+/// Returns the rows of merged shards, which must have every number from 1 to `all`.
+pub(crate) fn complete<T>(rows: BTreeMap<usize, T>, all: usize, thing: &str) -> Result<Vec<T>, String> {
+    if let Some(first) = (1..=all).find(|number| !rows.contains_key(number)) {
+        let missing = all - rows.len();
+        return Err(format!("{missing} of {all} {thing}s are missing, {thing} {first} the first: is a shard missing?"));
+    }
+    Ok(rows.into_values().collect())
 }
 
 impl fmt::Display for Shard {
@@ -198,7 +193,7 @@ const LARGEST: f64 = 1e15;
 
 /// Reads all runs of a sweep from the files of its shards.
 pub fn table(files: &[PathBuf]) -> Result<Table, RunError> {
-    let mut known: Option<Columns> = None;
+    let mut known: Option<Table> = None;
     let mut rows = BTreeMap::new();
     let mut sweep: Option<(String, usize)> = None;
     for file in files {
@@ -209,15 +204,14 @@ pub fn table(files: &[PathBuf]) -> Result<Table, RunError> {
         }
         let mut reader = Reader::from_reader(&bytes[..]);
         let head = words(reader.headers().map_err(|error| format!("{name}: {error}"))?);
-        let columns = Columns::of(head).map_err(|why| format!("{name} is no shard of a sweep: {why}"))?;
-        let columns = match &known {
-            Some(known) if *known == columns => known,
-            Some(_) => return Err(format!("{name} is no shard of the same sweep: its columns are others").into()),
-            None => known.insert(columns),
-        };
+        check_head(&head).map_err(|why| format!("{name} is no shard of a sweep: {why}"))?;
+        let table = known.get_or_insert_with(|| Table { head: head.clone(), rows: Vec::new() });
+        if table.head != head {
+            return Err(format!("{name} is no shard of the same sweep: its columns are others").into());
+        }
         for row in reader.records() {
             let row = words(&row.map_err(|error| format!("{name}: {error}"))?);
-            let (number, runs) = columns.check(&row).map_err(|why| format!("{name}: {why}"))?;
+            let (number, runs) = check_row(table, &row).map_err(|why| format!("{name}: {why}"))?;
             let (id, all) = sweep.get_or_insert_with(|| (row[0].clone(), runs));
             if *id != row[0] || *all != runs {
                 return Err(format!("{name} is of the sweep {} of {runs} runs and not of {id} of {all}", row[0]).into());
@@ -227,65 +221,53 @@ pub fn table(files: &[PathBuf]) -> Result<Table, RunError> {
             }
         }
     }
-    let (_, all) = sweep.ok_or("there are no runs in these files")?;
-    if let Some(first) = first_missing(rows.keys(), all) {
-        let missing = all - rows.len();
-        return Err(format!("{missing} of {all} runs are missing, run {first} the first: is a shard missing?").into());
-    }
-    Ok(Table { head: known.map(|columns| columns.head).unwrap_or_default(), rows: rows.into_values().collect() })
+    let ((_, all), Table { head, .. }) = sweep.zip(known).ok_or("there are no runs in these files")?;
+    Ok(Table { head, rows: complete(rows, all, "run")? })
 }
 
-/// Columns of a sweep and their places.
-#[derive(PartialEq)]
-struct Columns {
-    head: Vec<String>,
-    seed: usize,
-    expected: usize,
+/// Checks the names of the columns.
+fn check_head(head: &[String]) -> Result<(), String> {
+    let seed =
+        head.iter().position(|column| column == SEED).filter(|_| head.starts_with(&[ID, RUN, RUNS].map(String::from)));
+    let seed = seed.filter(|seed| head[*seed..].starts_with(&[SEED, PASSED, DIGEST].map(String::from)));
+    let seed = seed.ok_or_else(|| {
+        format!("its first line has to begin with {ID},{RUN},{RUNS} and to have {SEED},{PASSED},{DIGEST}")
+    })?;
+    let expected = head.iter().position(|name| name.starts_with(EXPECT)).unwrap_or(head.len());
+    if expected < seed || head[expected..].iter().any(|name| !name.starts_with(EXPECT)) {
+        return Err(format!("its columns `{EXPECT}...` have to be the last"));
+    }
+    if head.iter().collect::<BTreeSet<_>>().len() < head.len() {
+        return Err("two of its columns have the same name".into());
+    }
+    Ok(())
 }
 
-impl Columns {
-    fn of(head: Vec<String>) -> Result<Self, String> {
-        let place = |name: &str| head.iter().position(|column| column == name);
-        let seed = place(SEED).filter(|_| head.starts_with(&[ID, RUN, RUNS].map(String::from)));
-        let seed = seed.filter(|seed| head[*seed..].starts_with(&[SEED, PASSED, DIGEST].map(String::from)));
-        let seed = seed.ok_or_else(|| {
-            format!("its first line has to begin with {ID},{RUN},{RUNS} and to have {SEED},{PASSED},{DIGEST}")
-        })?;
-        let expected = head.iter().position(|name| name.starts_with(EXPECT)).unwrap_or(head.len());
-        if expected < seed || head[expected..].iter().any(|name| !name.starts_with(EXPECT)) {
-            return Err(format!("its columns `{EXPECT}...` have to be the last"));
-        }
-        if head.iter().collect::<BTreeSet<_>>().len() < head.len() {
-            return Err("two of its columns have the same name".into());
-        }
-        Ok(Self { seed, expected, head })
+/// Returns the number of the run and the count of runs of a row, if every value fits its column.
+fn check_row(table: &Table, row: &[String]) -> Result<(usize, usize), String> {
+    let wrong = |column: usize, what: &str| {
+        format!("run {}: `{}` under {} is no {what}", row[1], row[column], table.head[column])
+    };
+    let count = |column: usize| row[column].parse::<usize>().ok().filter(|count| *count > 0);
+    let number = count(1).ok_or_else(|| wrong(1, "run's number"))?;
+    let runs = count(2).filter(|runs| number <= *runs).ok_or_else(|| wrong(2, "count of runs"))?;
+    let numeric = |text: &str| text.parse::<f64>().is_ok_and(|value| value.abs() <= LARGEST);
+    let any = |text: &str| text.is_empty() || numeric(text);
+    if let Some(column) = table.varied().find(|column| !numeric(&row[*column])) {
+        return Err(wrong(column, "number"));
     }
-
-    /// Returns the number of the run and the count of runs of a row, if every value fits its column.
-    fn check(&self, row: &[String]) -> Result<(usize, usize), String> {
-        let wrong = |column: usize, what: &str| {
-            format!("run {}: `{}` under {} is no {what}", row[1], row[column], self.head[column])
-        };
-        let count = |column: usize| row[column].parse::<usize>().ok().filter(|count| *count > 0);
-        let number = count(1).ok_or_else(|| wrong(1, "run's number"))?;
-        let runs = count(2).filter(|runs| number <= *runs).ok_or_else(|| wrong(2, "count of runs"))?;
-        let numeric = |text: &str| text.parse::<f64>().is_ok_and(|value| value.abs() <= LARGEST);
-        let any = |text: &str| text.is_empty() || numeric(text);
-        if let Some(column) = (3..self.seed).find(|column| !numeric(&row[*column])) {
-            return Err(wrong(column, "number"));
-        }
-        row[self.seed].parse::<u64>().map_err(|_| wrong(self.seed, "seed"))?;
-        if !["0", "1"].contains(&row[self.seed + 1].as_str()) {
-            return Err(wrong(self.seed + 1, "verdict (0 or 1)"));
-        }
-        if let Some(column) = (self.seed + 3..self.expected).find(|column| !any(&row[*column])) {
-            return Err(wrong(column, "number, and not empty"));
-        }
-        let sides = |text: &str| text.split_once("..").is_some_and(|(min, max)| any(min) && any(max));
-        match (self.expected..row.len()).find(|column| !sides(&row[*column])) {
-            Some(column) => Err(wrong(column, "range LEAST..LARGEST")),
-            None => Ok((number, runs)),
-        }
+    let seed = table.varied().end;
+    row[seed].parse::<u64>().map_err(|_| wrong(seed, "seed"))?;
+    if !["0", "1"].contains(&row[seed + 1].as_str()) {
+        return Err(wrong(seed + 1, "verdict (0 or 1)"));
+    }
+    if let Some(column) = table.metrics().find(|column| !any(&row[*column])) {
+        return Err(wrong(column, "number, and not empty"));
+    }
+    let sides = |text: &str| text.split_once("..").is_some_and(|(min, max)| any(min) && any(max));
+    match (table.metrics().end..row.len()).find(|column| !sides(&row[*column])) {
+        Some(column) => Err(wrong(column, "range LEAST..LARGEST")),
+        None => Ok((number, runs)),
     }
 }
 

@@ -59,51 +59,13 @@ pub fn rows(table: &Table) -> Vec<Vec<String>> {
     lines
 }
 
-/// Text for people: pass rate by point, and spread of each metric over all runs.
-pub fn text(table: &Table) -> String {
-    let mut text = String::new();
-    let keys = &table.head[table.varied()];
-    if !keys.is_empty() {
-        for (at, rows) in points(table) {
-            let point: Vec<String> = keys.iter().zip(at).map(|(key, value)| format!("{key} = {value}")).collect();
-            let _ = writeln!(
-                text,
-                "  {}: {} of {} runs passed",
-                point.join(", "),
-                table.passes(rows.iter().copied()),
-                rows.len()
-            );
-        }
-        text.push('\n');
-    }
-    let width = table.metrics().map(|column| table.head[column].len()).max().unwrap_or(0);
-    let _ = writeln!(text, "  {:width$} {:>11} {:>11} {:>11}", "metric", "min", "median", "max");
-    for column in table.metrics() {
-        let name = &table.head[column];
-        let Some(spread) = spread(values(table.rows.iter(), column)) else { continue };
-        let [low, median, high] = spread.map(|value| shown(Some(value)));
-        let side = |side: Option<f64>| side.map_or(String::new(), |side| side.to_string());
-        let expected = table
-            .expected(name)
-            .map_or(String::new(), |[min, max]| format!("   expected {}..{}", side(min), side(max)));
-        let _ = writeln!(text, "  {name:width$} {low:>11} {median:>11} {high:>11}{expected}");
-    }
-    let (passed, all) = (table.passes(table.rows.iter()), table.rows.len());
-    let seeds: BTreeSet<&String> = table.rows.iter().map(|row| &row[table.varied().end]).collect();
-    let _ = writeln!(text, "\n{passed} of {all} runs passed ({} seeds)", seeds.len());
-    text
-}
-
 /// All rows of a sweep or of a shard, in order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
-    /// Names of the columns.
     pub head: Vec<String>,
-    /// Rows, one per run.
     pub rows: Vec<Vec<String>>,
 }
 
-/// Formats rows as CSV.
 pub(super) fn csv<'a>(rows: impl IntoIterator<Item = &'a Vec<String>>) -> Result<Vec<u8>, RunError> {
     let mut writer = Writer::from_writer(Vec::new());
     rows.into_iter().try_for_each(|row| writer.write_record(row))?;
@@ -127,9 +89,39 @@ impl Table {
         Ok(())
     }
 
-    /// Returns the table for people.
+    /// Text for people: pass rate by point, and spread of each metric over all runs.
     pub fn text(&self) -> String {
-        text(self)
+        let mut text = String::new();
+        let keys = &self.head[self.varied()];
+        if !keys.is_empty() {
+            for (at, rows) in points(self) {
+                let point: Vec<String> = keys.iter().zip(at).map(|(key, value)| format!("{key} = {value}")).collect();
+                let _ = writeln!(
+                    text,
+                    "  {}: {} of {} runs passed",
+                    point.join(", "),
+                    self.passes(rows.iter().copied()),
+                    rows.len()
+                );
+            }
+            text.push('\n');
+        }
+        let width = self.metrics().map(|column| self.head[column].len()).max().unwrap_or(0);
+        let _ = writeln!(text, "  {:width$} {:>11} {:>11} {:>11}", "metric", "min", "median", "max");
+        for column in self.metrics() {
+            let name = &self.head[column];
+            let Some(spread) = spread(values(self.rows.iter(), column)) else { continue };
+            let [low, median, high] = spread.map(|value| shown(Some(value)));
+            let side = |side: Option<f64>| side.map_or(String::new(), |side| side.to_string());
+            let expected = self
+                .expected(name)
+                .map_or(String::new(), |[min, max]| format!("   expected {}..{}", side(min), side(max)));
+            let _ = writeln!(text, "  {name:width$} {low:>11} {median:>11} {high:>11}{expected}");
+        }
+        let (passed, all) = (self.passes(self.rows.iter()), self.rows.len());
+        let seeds: BTreeSet<&String> = self.rows.iter().map(|row| &row[self.varied().end]).collect();
+        let _ = writeln!(text, "\n{passed} of {all} runs passed ({} seeds)", seeds.len());
+        text
     }
 
     /// True if every run held its bounds.
@@ -147,7 +139,6 @@ impl Table {
         3..self.place(SEED)
     }
 
-    /// Columns of the metrics.
     pub(super) fn metrics(&self) -> core::ops::Range<usize> {
         let end = self.head.iter().position(|name| name.starts_with(EXPECT)).unwrap_or(self.head.len());
         self.place(DIGEST) + 1..end

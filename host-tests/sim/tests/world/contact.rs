@@ -7,6 +7,7 @@ use core::f64::consts::PI;
 use fingertip::shipped::{COLUMNS, ROWS};
 use fingertip::state::Mode;
 use sim::bridge::Bridge;
+use sim::effects::contact::Named;
 use sim::mechanics::pressures::{Cell, Pressures};
 use sim::setup::Tip;
 use sim::watch::{Step, Watch};
@@ -196,7 +197,7 @@ fn means_are_within_a_thousandth_of_the_peak_and_add_up() {
         let mut sum = 0.0;
         for row in 0..ROWS {
             let between = table.between(d_mm, shift_mm);
-            let means = table.row_kpa(&(), &between, row);
+            let means = table.row_kpa(&Named::default(), &between, row);
             sum += means.iter().sum::<f64>();
             // Every taxel of some rows: the fine integral is slow.
             if (row + case) % 3 == 0 {
@@ -216,7 +217,7 @@ fn means_are_within_a_thousandth_of_the_peak_and_add_up() {
 
 fn row_kpa(table: &mut Pressures, d_mm: f64) -> [f64; COLUMNS] {
     let between = table.between(d_mm, 0.0);
-    table.row_kpa(&(), &between, 4)
+    table.row_kpa(&Named::default(), &between, 4)
 }
 
 #[test]

@@ -6,7 +6,6 @@ use crate::mechanics::decay;
 use crate::registry::Description;
 use crate::scene::tables::{Key, Kind};
 use crate::setup::Array;
-use fastrand::Rng;
 use fingertip::shipped::{COLUMNS, ROWS, SLOTS};
 
 /// Effects of this family, in the order in which they act within a stage.
@@ -77,7 +76,7 @@ pub const EFFECTS: &[Description] = &[
         keys: &[Key::number("rms_percent", "Deviation of the taxels' gains.", 0.0, 50.0, 6.0)],
         zero: &[("rms_percent", 0.0)],
         build: |build: &Build| {
-            let mut rng = Rng::with_seed(build.seed);
+            let mut rng = build.rng();
             let share = build.values.number("rms_percent") / 100.0;
             let gains: [Row; ROWS] =
                 [(); ROWS].map(|()| Row::default().map(|_| (1.0 + share * normal_within_3(&mut rng)).max(0.0)));
@@ -251,7 +250,7 @@ pub const EFFECTS: &[Description] = &[
         zero: &[("rms_codes", 0.0)],
         build: |build: &Build| {
             let rms_codes = build.values.number("rms_codes");
-            let mut rng = Rng::with_seed(build.seed);
+            let mut rng = build.rng();
             Part::Codes(Box::new(move |_, _, codes| {
                 let noise: Row = normals(&mut rng);
                 codes.iter_mut().zip(noise).for_each(|(code, noise)| *code += rms_codes * noise);
@@ -267,7 +266,7 @@ pub const EFFECTS: &[Description] = &[
         keys: &[Key::number("rms_codes", "Deviation of the levels, 12-bit codes.", 0.0, 200.0, 5.0)],
         zero: &[("rms_codes", 0.0)],
         build: |build: &Build| {
-            let mut rng = Rng::with_seed(build.seed);
+            let mut rng = build.rng();
             let rms_codes = build.values.number("rms_codes");
             let offsets = [(); SLOTS].map(|()| Row::default().map(|_| rms_codes * normal_within_3(&mut rng)));
             Part::Codes(Box::new(move |slot, _, codes| {
@@ -345,7 +344,6 @@ fn short_circuit(driven: usize, array: &[Row; ROWS], hold: f64) -> Row {
     core::array::from_fn(|j| (open[j] / diagonal[j]).max(0.0))
 }
 
-/// Settling of the columns.
 pub struct Settling {
     tau_s: f64,
     /// Share of a difference that remains at the sample.
@@ -395,8 +393,7 @@ impl Since {
 const TERMS: usize = 9;
 const TAUS_S: [f64; TERMS] = [1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4, 1e5];
 
-/// 1 - exp(-x) without cancellation at small x: a frame is 1e-8 of the slowest term. The series end at 4e-14 of the
-/// result.
+/// 1 - exp(-x) without cancellation at small x: a frame is 1e-8 of the slowest term. The series are exact to 4e-14.
 fn gone(x: f64) -> f64 {
     const SHARES: [f64; 9] =
         [1.0 / 10.0, 1.0 / 9.0, 1.0 / 8.0, 1.0 / 7.0, 1.0 / 6.0, 1.0 / 5.0, 1.0 / 4.0, 1.0 / 3.0, 1.0 / 2.0];

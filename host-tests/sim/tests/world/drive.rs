@@ -92,26 +92,6 @@ fn stribeck_friction_breaks_away_higher_than_it_slides() {
 }
 
 #[test]
-fn the_gear_lets_its_share_through_and_holds_on_the_way_back() {
-    // A stalled motor presses until eta k i = T: F = eta k i / r.
-    let mut world =
-        world("[effects.gear_efficiency]\nefficiency = 0.7\n[effects.viscous_friction]\ntorque_unm_s = 20.0\n");
-    run(&mut world, 20e-6, 100_000, Bridge::Driven { duty: 0.1 });
-    let torque_nm = 5.35e-3 * 0.6 / 3.53;
-    close(world.force_n(0), 0.7 * torque_nm / (12e-3 / 43.0), 1e-4);
-    // From there the motor torque may fall to T (2 - 1/eta) = 0.571 T before the gear moves back.
-    let held = world.force_n(0);
-    for (share, holds) in [(0.41, true), (0.39, false)] {
-        let mut duty = 0.1 * share;
-        if holds {
-            duty = 0.1 * 0.7 * (2.0 - 1.0 / 0.7) * 1.01;
-        }
-        run(&mut world, 20e-6, 1_000, Bridge::Driven { duty });
-        assert_eq!(world.force_n(0) > 0.999 * held, holds, "at {duty}");
-    }
-}
-
-#[test]
 fn cogging_swings_at_its_own_frequency_and_keeps_its_energy() {
     let mut world = world(&format!("{FAR}[effects.cogging]\ntorque_mnm = 0.05\nteeth = 12\n"));
     let still = (0.05e-3 * 12.0 / 0.71e-7_f64).sqrt();

@@ -19,9 +19,7 @@ pub const SWEEP: &str = env!("CARGO_BIN_EXE_sweep");
 const POPULATION: &str = env!("CARGO_BIN_EXE_population");
 
 /// Fingers that are done within milliseconds.
-const BALLS: &str = "about = \"Walls here and there\"\nduration_s = 0.03\n[object]\ndistance_mm = { uniform = [0.1, 0.6] }\n\
-    [effects.noise]\nrms_codes = { log_uniform = [0.3, 3] }\n[[script]]\nat_s = 0.0\ngoal_n = { uniform = [0.5, 2] }\n\
-    [[expect]]\nmetric = \"peak_force_n\"\nmax = 1.2\n";
+const TOUCHING: &str = concat!(env!("FINGERTIP_ROOT"), "/host-tests/sim/tests/files/touching.toml");
 
 /// A command that runs in a folder and writes to another one in it.
 struct Job {
@@ -41,27 +39,23 @@ struct Job {
 
 impl Job {
     /// All three kinds.
-    #[rustfmt::skip]
     fn all(campaign: &str) -> [Self; 3] {
         let place = folder(&format!("interrupted/{campaign}"));
-        fs::write(place.join("balls.toml"), BALLS).unwrap();
-        let near = "object.distance_mm=0.2";
-        let sweep = [
-            SWEEP, WALL, "--set", "duration_s=0.02", "--set", near, "--set", "effects.noise.rms_codes=1.5",
-            "--vary", "tip.modulus_kpa=240..260:3", "--seeds", "4", "--out", "sweep",
-        ];
-        let run = [SIM, WALL, "--set", "duration_s=0.03", "--set", near, "--out", "run", "--json", "run/run.json"];
-        let population = [POPULATION, "balls.toml", "--fingers", "12", "--json", "population/all.json"];
+        let sweep = "--set duration_s=0.02 --set object.distance_mm=0.2 --set effects.noise.rms_codes=1.5 \
+            --vary tip.modulus_kpa=240..260:3 --seeds 4 --out sweep";
+        let run = "--set duration_s=0.03 --set object.distance_mm=0.2 --out run --json run/run.json";
+        let population = "--fingers 12 --json population/all.json";
         [
-            Self::new("sweep", &place, "runs.csv.part", &sweep),
-            Self::new("run", &place, "run.mcap.new", &run),
-            Self::new("population", &place, "all.json.part", &population),
+            Self::new("sweep", &place, "runs.csv.part", [SWEEP, WALL], sweep),
+            Self::new("run", &place, "run.mcap.new", [SIM, WALL], run),
+            Self::new("population", &place, "all.json.part", [POPULATION, TOUCHING], population),
         ]
     }
 
     /// Records the output of an undisturbed run, and clears the folder.
-    fn new(name: &'static str, place: &Path, growing: &str, words: &[&'static str]) -> Self {
-        let (place, out, words) = (place.to_owned(), place.join(name), words.to_vec());
+    fn new(name: &'static str, place: &Path, growing: &str, first: [&'static str; 2], more: &'static str) -> Self {
+        let words = first.into_iter().chain(more.split(' ')).collect();
+        let (place, out) = (place.to_owned(), place.join(name));
         let (growing, expected) = (out.join(growing), BTreeMap::new());
         let mut job = Self { name, place, words, out, growing, bytes: 0, expected, lines: Vec::new() };
         let status = quiet(job.command()).status().unwrap();

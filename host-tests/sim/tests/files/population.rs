@@ -16,32 +16,8 @@ pub fn population(lines: &str) -> Population {
 
 const FINGERS: usize = 7;
 
-/// Touches within 20 ms; some break a bound, some keep it.
 fn touching() -> Population {
-    population(
-        r#"
-        [object]
-        distance_mm = { uniform = [0.1, 0.6] }
-        [effects.noise]
-        rms_codes = { log_uniform = [0.3, 3] }
-        [[script]]
-        at_s = 0.0
-        goal_n = { uniform = [0.5, 2] }
-        [[expect]]
-        metric = "peak_force_n"
-        max = 1.2
-        [[expect]]
-        metric = "over_force_mn"
-        max = 0.5
-        max_per_goal_n = 1.0
-        [[count]]
-        metric = "travel_max_mm"
-        above = 1.0
-        [[count]]
-        metric = "travel_max_mm"
-        above = 2.0
-        "#,
-    )
+    population::read("touching.toml", include_str!("touching.toml")).unwrap_or_else(|errors| panic!("{errors}"))
 }
 
 fn report(population: &Population, shard: Shard) -> Report {

@@ -11,6 +11,7 @@ use sim::metrics::Meter;
 use sim::population::load;
 use sim::watch::Truth;
 use std::collections::BTreeSet;
+use std::ops::Range;
 
 /// Travel at the touch, mm, and indentation per force.
 const TOUCH_MM: f64 = 5.0;
@@ -81,35 +82,20 @@ fn sign(made: &Made) -> f64 {
 }
 
 #[test]
-fn a_perfect_finger_keeps_all() {
-    assert_eq!(broken(|_| ()), BTreeSet::new());
-}
-
-#[test]
 fn over_force() {
-    let once = |made: &mut Made, force_n: f64| {
-        if made.goal_n == 4.0 && made.since_s < 0.00005 {
-            made.force_n = force_n;
-        }
-    };
-    two_sided(once, 1.3 * 4.0 + 0.149, 1.3 * 4.0 + 0.151, &["over_force_mn"]);
-    // A goal that is taken back counts for 200 ms.
-    let after = |made: &mut Made, late_s: f64| {
-        if made.goal_n == 2.0 && made.since_s < late_s {
-            made.force_n = 4.0;
-        }
-    };
-    two_sided(after, 0.199, 0.202, &["over_force_mn"]);
-    // At the least goal, and with none.
-    let at = |goal_n: f64| {
+    let at = |goal_n: f64, since_s: Range<f64>| {
         move |made: &mut Made, force_n: f64| {
-            if made.goal_n == goal_n && (0.45..0.4501).contains(&made.since_s) {
+            if made.goal_n == goal_n && since_s.contains(&made.since_s) {
                 made.force_n = force_n;
             }
         }
     };
-    two_sided(at(1.0), 1.449, 1.451, &["over_force_mn"]);
-    two_sided(at(0.0), 0.149, 0.151, &["over_force_mn"]);
+    two_sided(at(4.0, 0.0..0.00005), 1.3 * 4.0 + 0.149, 1.3 * 4.0 + 0.151, &["over_force_mn"]);
+    // At the least goal, and with none.
+    two_sided(at(1.0, 0.45..0.4501), 1.449, 1.451, &["over_force_mn"]);
+    two_sided(at(0.0, 0.45..0.4501), 0.149, 0.151, &["over_force_mn"]);
+    // A goal that is taken back counts for 200 ms.
+    two_sided(|made, late_s| at(2.0, 0.0..late_s)(made, 4.0), 0.199, 0.202, &["over_force_mn"]);
 }
 
 #[test]
@@ -123,18 +109,14 @@ fn running_away() {
         }
     };
     two_sided(back, 0.999, 1.001, &["runaway_mm"]);
-    let before = |made: &mut Made, behind_mm: f64| {
-        if made.time_s < 0.1 {
-            made.travel_mm = -clearance_mm - behind_mm;
-        }
-    };
-    two_sided(before, 0.999, 1.001, &["runaway_mm"]);
-    let ahead = |made: &mut Made, beyond_mm: f64| {
-        if made.time_s < 0.1 {
-            made.travel_mm = f64::from(Params::DEFAULT.travel_max_um) * 1e-3 + beyond_mm;
-        }
-    };
-    two_sided(ahead, 0.999, 1.001, &["runaway_mm"]);
+    for (limit_mm, way) in [(-clearance_mm, -1.0), (f64::from(Params::DEFAULT.travel_max_um) * 1e-3, 1.0)] {
+        let before = |made: &mut Made, beyond_mm: f64| {
+            if made.time_s < 0.1 {
+                made.travel_mm = limit_mm + way * beyond_mm;
+            }
+        };
+        two_sided(before, 0.999, 1.001, &["runaway_mm"]);
+    }
 }
 
 #[test]

@@ -112,35 +112,33 @@ fn a_recording_holds_what_viewers_look_for() {
     assert_eq!((attachment.name.as_str(), &attachment.data[..]), ("wall.toml", wall().text.as_bytes()));
 }
 
-/// Changes messages of the core in a recording, which stays whole with valid checksums.
-fn rewritten(bytes: &[u8], change: impl Fn(u32, &mut Value)) -> Vec<u8> {
-    rewritten_with(bytes, |_| (), |_| (), change)
+/// A part of a recording.
+enum Part<'a> {
+    Metadata(&'a mut Metadata),
+    Scene(&'a mut Vec<u8>),
+    /// Number and content of a message of the core.
+    Core(u32, &'a mut Value),
 }
 
-/// Changes metadata, scene and messages of the core.
-fn rewritten_with(
-    bytes: &[u8],
-    change_metadata: impl Fn(&mut Metadata),
-    change_scene: impl Fn(&mut Vec<u8>),
-    change: impl Fn(u32, &mut Value),
-) -> Vec<u8> {
+/// Changes parts of a recording, which stays whole with valid checksums.
+fn rewritten(bytes: &[u8], change: impl Fn(Part)) -> Vec<u8> {
     let summary = mcap::Summary::read(bytes).unwrap().unwrap();
     let mut out = Writer::new(Cursor::new(Vec::new())).unwrap();
     for index in &summary.attachment_indexes {
         let mut scene = mcap::read::attachment(bytes, index).unwrap();
-        change_scene(scene.data.to_mut());
+        change(Part::Scene(scene.data.to_mut()));
         out.attach(&scene).unwrap();
     }
     for index in &summary.metadata_indexes {
         let mut metadata = mcap::read::metadata(bytes, index).unwrap();
-        change_metadata(&mut metadata);
+        change(Part::Metadata(&mut metadata));
         out.write_metadata(&metadata).unwrap();
     }
     for message in MessageStream::new(bytes).unwrap() {
         let mut message = message.unwrap();
         if message.channel.topic == "/finger0/core" {
             let mut core = serde_json::from_slice(&message.data).unwrap();
-            change(message.sequence, &mut core);
+            change(Part::Core(message.sequence, &mut core));
             message.data = core.to_string().into_bytes().into();
         }
         out.write(&message).unwrap();
@@ -153,12 +151,12 @@ fn rewritten_with(
 fn one_flipped_bit_is_found_at_its_frame() {
     let path = record("flipped");
     let bytes = fs::read(&path).unwrap();
-    fs::write(&path, rewritten(&bytes, |_, _| ())).unwrap();
+    fs::write(&path, rewritten(&bytes, |_| ())).unwrap();
     assert_eq!(replay(&path).unwrap().difference, None);
 
     // The lowest bit of the encoder's count in frame 300.
-    let changed = rewritten(&bytes, |frame, core| {
-        if frame == 300 {
+    let changed = rewritten(&bytes, |part| {
+        if let Part::Core(300, core) = part {
             let mut record = BASE64_STANDARD.decode(core["record"].as_str().unwrap()).unwrap();
             record[2 * 110 + 4] ^= 1;
             core["record"] = BASE64_STANDARD.encode(record).into();
@@ -170,8 +168,8 @@ fn one_flipped_bit_is_found_at_its_frame() {
     assert!(difference.to_string().contains("differs first at frame 300"), "{difference}");
 
     // A duty that was not answered.
-    let changed = rewritten(&bytes, |frame, core| {
-        if frame == 200 {
+    let changed = rewritten(&bytes, |part| {
+        if let Part::Core(200, core) = part {
             core["duty"] = (core["duty"].as_i64().unwrap() ^ 1).into();
         }
     });
@@ -183,18 +181,23 @@ fn one_flipped_bit_is_found_at_its_frame() {
 fn what_was_changed_after_the_run_is_named_and_not_the_core() {
     let path = record("changed");
     let bytes = fs::read(&path).unwrap();
-    let told = |changed: Vec<u8>| {
-        fs::write(&path, changed).unwrap();
+    let told = |change: fn(Part)| {
+        fs::write(&path, rewritten(&bytes, change)).unwrap();
         replay(&path).unwrap_err().to_string()
     };
-    let other = |metadata: &mut Metadata| {
-        if let Some(finger) = metadata.metadata.get_mut("finger0") {
+    let error = told(|part| {
+        if let Part::Metadata(metadata) = part
+            && let Some(finger) = metadata.metadata.get_mut("finger0")
+        {
             *finger = finger.replacen("\"params\":{", "\"params\":{\"more\":1,", 1);
         }
-    };
-    let error = told(rewritten_with(&bytes, other, |_| (), |_, _| ()));
+    });
     assert!(error.contains("fingertip.setup") && error.contains("was changed"), "{error}");
-    let error = told(rewritten_with(&bytes, |_| (), |scene| scene.push(b'#'), |_, _| ()));
+    let error = told(|part| {
+        if let Part::Scene(scene) = part {
+            scene.push(b'#');
+        }
+    });
     assert!(error.contains("the attached scene was changed"), "{error}");
 }
 

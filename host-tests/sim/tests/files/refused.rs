@@ -6,11 +6,11 @@ use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// A sweep of four runs with noise.
-fn sweep(out: &Path) -> Command {
+/// A sweep of four runs with noise, or with other arguments.
+fn sweep(out: &Path, more: &[&str]) -> Command {
     let mut command = Command::new(SWEEP);
     command.args([WALL, "--seeds", "4", "--set", "duration_s=0.02", "--set", "object.distance_mm=0.2"]);
-    command.args(["--set", "effects.noise.rms_codes=1.5", "--out"]).arg(out);
+    command.args(["--set", "effects.noise.rms_codes=1.5", "--out"]).arg(out).args(more);
     command
 }
 
@@ -35,7 +35,7 @@ fn refused(command: &mut Command, what: &str) {
 /// Folder and table of a whole sweep, and its lines before the end.
 fn swept(name: &str) -> (PathBuf, String, String) {
     let out = folder(&format!("refused/{name}"));
-    assert_eq!(told(&mut sweep(&out)).0, Some(1));
+    assert_eq!(told(&mut sweep(&out, &[])).0, Some(1));
     let runs = fs::read_to_string(out.join("runs.csv")).unwrap();
     let id = runs.lines().nth(1).unwrap().split(',').next().unwrap();
     let head = format!("the sweep {id} of 4 runs");
@@ -52,7 +52,7 @@ fn a_row_is_whole_or_it_is_run_again() {
     // Cut anywhere in the last row and its number, in the head, and right behind a row.
     for cut in (ends[3] - 1..ends[4]).step_by(29).chain([ends[4] - 2, ends[4] - 1, 0, 1, ends[0] - 1, ends[1]]) {
         fs::write(&file, &part[..cut]).unwrap();
-        let (_, told) = told(&mut sweep(&out));
+        let (_, told) = told(&mut sweep(&out, &[]));
         let whole = ends.iter().filter(|end| **end <= cut).count().saturating_sub(1);
         assert!(whole == 0 || told.contains(&format!("where {whole} runs are done")), "{cut}: {told}");
         assert_eq!(fs::read_to_string(out.join("runs.csv")).unwrap(), runs, "cut at {cut}");
@@ -62,25 +62,24 @@ fn a_row_is_whole_or_it_is_run_again() {
     let mut changed = part.clone().into_bytes();
     changed[ends[2] - 3] ^= 1;
     fs::write(&file, changed).unwrap();
-    assert!(told(&mut sweep(&out)).1.contains("where 3 runs are done"));
+    assert!(told(&mut sweep(&out, &[])).1.contains("where 3 runs are done"));
     assert_eq!(fs::read_to_string(out.join("runs.csv")).unwrap(), runs);
 }
 
 #[test]
 fn the_results_of_another_sweep_stay() {
     let (out, runs, part) = swept("others");
-    let mut other = sweep(&out);
-    refused(other.args(["--vary", "tip.radius_mm=9..10:2"]), "holds the sweep wall-");
+    let other = ["--vary", "tip.radius_mm=9..10:2"];
+    refused(&mut sweep(&out, &other), "holds the sweep wall-");
     fs::remove_file(out.join("runs.csv")).unwrap();
     fs::write(out.join("runs.csv.part"), &part).unwrap();
-    let mut other = sweep(&out);
-    refused(other.args(["--vary", "tip.radius_mm=9..10:2"]), "holds what is done of the sweep wall-");
+    refused(&mut sweep(&out, &other), "holds what is done of the sweep wall-");
     assert_eq!(fs::read_to_string(out.join("runs.csv.part")).unwrap(), part);
     fs::write(out.join("runs.csv.part"), &runs).unwrap();
-    refused(&mut sweep(&out), "something that cannot be read");
+    refused(&mut sweep(&out, &[]), "something that cannot be read");
     fs::remove_file(out.join("runs.csv.part")).unwrap();
     fs::write(out.join("runs.csv"), "my own notes\n").unwrap();
-    refused(&mut sweep(&out), "holds something else");
+    refused(&mut sweep(&out, &[]), "holds something else");
     assert_eq!(fs::read_to_string(out.join("runs.csv")).unwrap(), "my own notes\n");
 }
 
@@ -102,10 +101,9 @@ fn seeds_that_change_nothing_are_refused() {
     let out = folder("refused/seeds");
     let mut same = Command::new(SWEEP);
     refused(same.args([WALL, "--seeds", "3", "--out"]).arg(&out), "nothing in wall is random");
-    let mut idle = sweep(&out);
-    refused(idle.args(["--set", "effects.noise.rms_codes=0"]), "nothing in wall is random");
-    let mut many = sweep(&out);
-    refused(many.args(["--vary", "tip.radius_mm=9..10:99999"]).arg("--vary=tip.modulus_kpa=200..300:999"), "more than");
+    refused(&mut sweep(&out, &["--set", "effects.noise.rms_codes=0"]), "nothing in wall is random");
+    let many = ["--vary", "tip.radius_mm=9..10:99999", "--vary", "tip.modulus_kpa=200..300:999"];
+    refused(&mut sweep(&out, &many), "more than");
     assert_eq!(fs::read_dir(&out).unwrap().count(), 0);
 }
 
@@ -159,15 +157,15 @@ fn a_lock_of_a_dead_process_stands_in_nobodys_way() {
     for left in ["runs.csv.lock", "runs.csv.new", "summary.csv.new", "runs.csv.part.new"] {
         fs::write(out.join(left), "4194304 0\n").unwrap();
     }
-    assert_eq!(told(&mut sweep(&out)).0, Some(1));
+    assert_eq!(told(&mut sweep(&out, &[])).0, Some(1));
     assert_eq!(fs::read_to_string(out.join("runs.csv")).unwrap(), runs);
     assert!(!out.join("runs.csv.lock").exists() && !out.join("runs.csv.new").exists());
 
     // A running process is named, and its file is kept.
     let lock = output::kept::Lock::take(&out.join("runs.csv")).unwrap();
-    refused(&mut sweep(&out), &format!("is being written by process {}", std::process::id()));
+    refused(&mut sweep(&out, &[]), &format!("is being written by process {}", std::process::id()));
     drop(lock);
-    assert_eq!(told(&mut sweep(&out)).0, Some(1));
+    assert_eq!(told(&mut sweep(&out, &[])).0, Some(1));
 }
 
 #[test]

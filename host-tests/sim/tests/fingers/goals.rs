@@ -1,8 +1,8 @@
 //! A goal of 0 must release the object after any other request. Also torque off and on while the tip moves.
 
 use crate::{
-    CONTACT_ON_N, Case, Finger, LOSSES, fault, finger, interrupt_torque, judge, log_uniform, mode, most_n, object,
-    press, set_goal, touch, uniform,
+    CONTACT_ON_N, Case, Finger, LOSSES, finger, interrupt_torque, judge, log_uniform, most_n, object, press, set_goal,
+    touch, uniform,
 };
 use fastrand::Rng;
 use fingertip::measure::Task;
@@ -86,10 +86,10 @@ fn goal_zero_releases_a_soft_object_after_a_press_that_measures() {
         finger.request(Task::Press);
         finger.step();
         let until_s = finger.time_s() + 12.0;
-        while mode(&finger) == Mode::Press && finger.time_s() < until_s {
+        while finger.status().mode == Mode::Press && finger.time_s() < until_s {
             finger.step();
         }
-        let what = format!("{yield_mm_per_n} mm/N, then {:?} {:?}", mode(&finger), fault(&finger));
+        let what = format!("{yield_mm_per_n} mm/N, then {:?} {:?}", finger.status().mode, finger.status().fault);
         case(&mut finger, yield_mm_per_n, what)
     });
     judge("soft objects, after a press that measures", "N", &cases);
@@ -106,7 +106,7 @@ fn goal_zero_releases_a_soft_object_that_moved_while_it_was_held() {
         press(&mut finger, 3.0, 1.0);
         finger.carry_object(5.0, 5.0 + by_mm, 40.0, |_| {});
         finger.run(0.3);
-        let what = format!("{yield_mm_per_n} mm/N, moved by {by_mm} mm, {:?}", fault(&finger));
+        let what = format!("{yield_mm_per_n} mm/N, moved by {by_mm} mm, {:?}", finger.status().fault);
         case(&mut finger, yield_mm_per_n, what)
     });
     judge("soft objects that moved", "N", &cases);
@@ -182,7 +182,7 @@ fn restarted(seed: u64) -> Case {
     interrupt_torque(&mut finger, off_s);
     let again_n = if rng.bool() { goal_n } else { uniform(&mut rng, 0.5, 7.0) };
     press(&mut finger, again_n, 0.5);
-    let fault = fault(&finger);
+    let fault = finger.status().fault;
     let stopped = matches!(fault, Some(Fault::EncoderFrozen | Fault::Runaway | Fault::Reversed));
     let what = format!(
         "{seed}: goal {goal_n:.2} N, off {moment} at {speed:.0} mm/s for {off_s:.4} s, then {again_n:.2} N: {fault:?}"

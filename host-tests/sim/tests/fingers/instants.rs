@@ -3,8 +3,7 @@
 //! `INSTANTS_STEP=1 cargo test -p sim --profile host --test fingers instants -- --ignored --nocapture`
 
 use crate::{
-    CONTACT_ON_N, Case, Finger, LOSSES, begun, force_n, judge, most_n, number, object, run_with, scene, set_goal, show,
-    touch_s,
+    CONTACT_ON_N, Case, Finger, LOSSES, begun, judge, most_n, number, object, run_with, scene, set_goal, show, touch_s,
 };
 use fingertip::shipped::Frame;
 use sim::cores;
@@ -62,7 +61,7 @@ impl Event {
         if self == Self::SilentBus {
             assert_eq!(finger.status().fault, Some(fingertip::state::Fault::BusSilent));
         }
-        (peak_n, force_n(&mut finger))
+        (peak_n, finger.truth().force_n)
     }
 }
 
@@ -82,7 +81,7 @@ fn press(goal_n: f64, yield_mm_per_n: f64, first: u64, every: u64) -> [(f64, f64
         }
         for (event, worst) in Event::ALL.into_iter().zip(&mut worst) {
             let (peak_n, left_n) = event.happens(&finger, &scene, &blank);
-            let peak_n = peak_n.max(force_n(&mut finger));
+            let peak_n = peak_n.max(finger.truth().force_n);
             worst.2 = worst.2.max(left_n);
             if peak_n > worst.0 {
                 (worst.0, worst.1) = (peak_n, at_s - approach_s);
@@ -138,5 +137,5 @@ fn a_copy_of_a_finger_goes_on_to_the_bit() {
         assert_eq!(finger.step(), copy.step(), "frame {frame}");
         assert!(finger.record() == copy.record() && finger.truth() == copy.truth(), "frame {frame}");
     }
-    assert!(force_n(&mut finger) > 2.5);
+    assert!(finger.truth().force_n > 2.5);
 }

@@ -18,7 +18,6 @@ use fastrand::Rng;
 use fingertip::config::newtons;
 use fingertip::params::Params;
 use fingertip::shipped::Frame;
-use fingertip::state::{Fault, Mode};
 use images::record::Record;
 use sim::effects::Named;
 use sim::native::bench::Bench;
@@ -66,18 +65,6 @@ fn object(distance_mm: f64, yield_mm_per_n: f64) -> String {
     )
 }
 
-fn force_n(finger: &mut Finger) -> f64 {
-    finger.truth().force_n
-}
-
-fn mode(finger: &Finger) -> Mode {
-    finger.status().mode
-}
-
-fn fault(finger: &Finger) -> Option<Fault> {
-    finger.status().fault
-}
-
 fn set_goal(finger: &mut Finger, goal_n: f64) {
     finger.command().goal = newtons((goal_n * 1e3).round() as i32);
 }
@@ -102,7 +89,7 @@ fn run_with(finger: &mut Finger, seconds: f64, change: impl Fn(&mut Record)) -> 
     let mut largest_n: f64 = 0.0;
     while finger.time_s() < until_s {
         finger.step_with(&change);
-        largest_n = largest_n.max(force_n(finger));
+        largest_n = largest_n.max(finger.truth().force_n);
     }
     largest_n
 }
@@ -115,8 +102,13 @@ fn show(record: &mut Record, codes: &Frame) {
 /// Steps until the tip touches.
 fn touch(finger: &mut Finger) {
     let until_s = finger.time_s() + 2.0;
-    while force_n(finger) == 0.0 {
-        assert!(finger.time_s() < until_s, "nothing is touched: {:?} {:?}", mode(finger), fault(finger));
+    while finger.truth().force_n == 0.0 {
+        assert!(
+            finger.time_s() < until_s,
+            "nothing is touched: {:?} {:?}",
+            finger.status().mode,
+            finger.status().fault
+        );
         finger.step();
     }
 }

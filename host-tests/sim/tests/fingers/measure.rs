@@ -1,6 +1,6 @@
 //! Measuring motions on drawn fingers: completion, early ends, and bounds of travel, force and time.
 
-use crate::{number, replaced};
+use crate::replaced;
 use fingertip::measure::press::ROWS_MAX;
 use fingertip::measure::series::HEAD;
 use fingertip::measure::{Ended, MeasureState, MeasureStatus, Task};
@@ -14,6 +14,16 @@ use sim::plant::Faults;
 use sim::population::{Finger, read};
 use sim::setup::Setup;
 use solve::record;
+
+/// The tests below with more fingers.
+#[test]
+#[ignore = "long: cargo xtask test --long"]
+fn long_measuring_motions_of_more_fingers() {
+    presses_complete(30);
+    presses_end_within_limits(12);
+    strokes_complete(40);
+    strokes_stop_at_an_object(20);
+}
 
 /// A measuring motion, and the largest true values during it.
 struct Made {
@@ -107,12 +117,6 @@ fn valid_presses_complete() {
     presses_complete(10);
 }
 
-#[test]
-#[ignore = "long: cargo xtask test --long"]
-fn long_valid_presses_complete() {
-    presses_complete(number("FINGERS", 30) as usize);
-}
-
 /// Every press completes and gives a modulus: most within two reported sigmas, and with errors that are not smaller
 /// than noise allows.
 fn presses_complete(count: usize) {
@@ -193,12 +197,6 @@ fn what_moves_yields_or_vanishes_ends_a_press_within_its_limits() {
     presses_end_within_limits(3);
 }
 
-#[test]
-#[ignore = "long: cargo xtask test --long"]
-fn long_what_moves_yields_or_vanishes_ends_a_press_within_its_limits() {
-    presses_end_within_limits(number("FINGERS", 12) as usize);
-}
-
 fn presses_end_within_limits(count: usize) {
     let mut broken = Vec::new();
     for (name, changes, place_mm, ends) in TROUBLES {
@@ -248,12 +246,6 @@ fn strokes_in_free_air_stay_near_the_origin_and_complete() {
     strokes_complete(8);
 }
 
-#[test]
-#[ignore = "long: cargo xtask test --long"]
-fn long_strokes_in_free_air_stay_near_the_origin_and_complete() {
-    strokes_complete(number("FINGERS", 40) as usize);
-}
-
 fn strokes_complete(count: usize) {
     let done = driven("free air", count, Task::Strokes, &[]);
     assert!(10 * done >= 9 * count, "{done}");
@@ -268,12 +260,6 @@ fn jogs_complete() {
 #[test]
 fn an_object_in_the_way_is_pressed_with_no_more_than_300_mn() {
     strokes_stop_at_an_object(4);
-}
-
-#[test]
-#[ignore = "long: cargo xtask test --long"]
-fn long_an_object_in_the_way_is_pressed_with_no_more_than_300_mn() {
-    strokes_stop_at_an_object(number("FINGERS", 20) as usize);
 }
 
 /// An object from 0.1 to 1.2 mm ahead, on the array or off it.

@@ -1,8 +1,7 @@
 //! Earlier presses do not change later ones: residual readings, pushes, tares under load.
 
 use crate::{
-    APPROACH_MM_PER_S, CONTACT_ON_N, Case, Finger, LOSSES, fault, finger, force_n, judge, mode, object, press, scene,
-    set_goal, uniform,
+    APPROACH_MM_PER_S, CONTACT_ON_N, Case, Finger, LOSSES, finger, judge, object, press, scene, set_goal, uniform,
 };
 use fastrand::Rng;
 use fingertip::state::{Fault, Mode};
@@ -21,11 +20,11 @@ fn a_push_against_a_released_tip_does_not_change_the_next_goal() {
             let travel_mm = finger.truth().travel_mm;
             finger.carry_object(5.0, (travel_mm - depth_mm).min(5.0), 100.0, |_| {});
             finger.run(1.0);
-            let pushed_n = force_n(&mut finger);
+            let pushed_n = finger.truth().force_n;
             finger.place_object(8.0);
             finger.run(0.05);
             press(&mut finger, 1.0, 1.5);
-            let off_n = (force_n(&mut finger) - 1.0).abs();
+            let off_n = (finger.truth().force_n - 1.0).abs();
             let what = format!("{depth_mm} mm, {wait_s} s after the release began ({pushed_n:.2} N at last)");
             cases.push(Case::new(what, off_n, 0.15));
         }
@@ -60,7 +59,7 @@ fn a_residual_reading_does_not_drive_the_tip_through_the_air() {
                 }
                 let what = format!(
                     "{goal_n} N for {hold_s} s, goal 0 {away_s} s after the object is away, {:?}",
-                    fault(&finger)
+                    finger.status().fault
                 );
                 cases.push(Case::new(what, fastest, 1.5 * APPROACH_MM_PER_S));
             }
@@ -87,12 +86,12 @@ fn a_tare_while_something_presses_does_not_change_the_force() {
             // The friction of the drive then holds the tip at its place of rest.
             finger.run(0.3);
             finger.tare();
-            let before_n = force_n(&mut finger);
+            let before_n = finger.truth().force_n;
             assert!(before_n > CONTACT_ON_N, "nothing presses during the tare");
             let peak_n = press(&mut finger, goal_n, 1.0);
-            let state = format!("{:?} {:?}", mode(&finger), fault(&finger));
+            let state = format!("{:?} {:?}", finger.status().mode, finger.status().fault);
             let what = format!("{before_n:.2} N during the tare, the first one {first}, goal {goal_n} N, {state}");
-            let drives = mode(&finger) != Mode::Off;
+            let drives = finger.status().mode != Mode::Off;
             // A first tare is not to be trusted; a later one leaves the zero that is known to be right.
             cases.push(Case::new(format!("driven, {what}"), f64::from(u8::from(drives == first)), 0.0));
             let most_n = if first { before_n + 0.01 } else { before_n.max(1.05 * goal_n + 0.05) };
@@ -105,7 +104,11 @@ fn a_tare_while_something_presses_does_not_change_the_force() {
     finger.command().tare_forced = true;
     finger.tare();
     finger.run(0.1);
-    cases.push(Case::new("not driven though forced".into(), f64::from(u8::from(mode(&finger) == Mode::Off)), 0.0));
+    cases.push(Case::new(
+        "not driven though forced".into(),
+        f64::from(u8::from(finger.status().mode == Mode::Off)),
+        0.0,
+    ));
     judge("torque after a tare while something presses: the largest force", "N", &cases);
 }
 
@@ -122,7 +125,7 @@ fn hysteresis_on_a_moving_object_is_no_frozen_array() {
         let mut stopped = None;
         let mut place_mm = 6.0;
         for to_mm in [6.0 + way_mm, 6.0, 6.0 - way_mm, 6.0] {
-            finger.carry_object(place_mm, to_mm, mm_per_s, |finger| stopped = stopped.or(fault(finger)));
+            finger.carry_object(place_mm, to_mm, mm_per_s, |finger| stopped = stopped.or(finger.status().fault));
             place_mm = to_mm;
         }
         let what =

@@ -200,36 +200,11 @@ fn an_offset_in_the_air_is_no_fault() {
     }
 }
 
-/// Fingers that hold one force each. Noise, friction, encoder and place are those of `ordinary`.
-const HOLDS: &str = r#"
-about = "A force is held"
-duration_s = 0.9
-[motor]
-encoder_counts_per_turn = { log_uniform = [256, 4096] }
-[object]
-distance_mm = { uniform = [1, 5] }
-centre_x_mm = { uniform = [-3.5, 3.5] }
-centre_y_mm = { uniform = [-3.5, 3.5] }
-[tip]
-modulus_kpa = { log_uniform = [150, 400] }
-[effects.noise]
-rms_codes = { log_uniform = [0.3, 3] }
-[effects.dry_friction]
-torque_mnm = { uniform = [0, 0.25] }
-[effects.gain_spread]
-rms_percent = { uniform = [0, 10] }
-[[script]]
-at_s = 0.0
-goal_n = { log_uniform = [0.3, 5] }
-[[expect]]
-metric = "rest_duty_percent"
-max = 2.0
-"#;
-
 /// 99 of 100 hunted with 30 to 50 % of the duty.
 #[test]
 fn the_duty_rests_in_a_hundred_of_a_hundred_holds() {
-    let population = population::read("holds.toml", HOLDS).unwrap_or_else(|errors| panic!("{errors}"));
+    let population =
+        population::read("holds.toml", include_str!("holds.toml")).unwrap_or_else(|errors| panic!("{errors}"));
     let mut quiet = 0;
     for number in 0..100 {
         let finger = population.finger(1, number).unwrap_or_else(|errors| panic!("{errors}"));

@@ -4,9 +4,7 @@
 //! `--ignored`. Without `--profile host` the core also checks its arithmetic for overflow:
 //! `SEQUENCES=2000 cargo test -p sim --test fingers sequences -- --ignored --nocapture`
 
-use crate::{
-    CONTACT_ON_N, Finger, fault, finger, force_n, log_uniform, mode, most_n, number, object, set_goal, uniform,
-};
+use crate::{CONTACT_ON_N, Finger, finger, log_uniform, most_n, number, object, set_goal, uniform};
 use core::ops::Range;
 use fastrand::Rng;
 use fingertip::command::Command;
@@ -36,12 +34,12 @@ struct Run<'a> {
 impl Run<'_> {
     fn frame(&mut self, approaching: bool) {
         let (time_s, command) = (self.finger.time_s(), *self.finger.command());
-        let force_n = force_n(&mut self.finger);
-        let now = mode(&self.finger);
+        let force_n = self.finger.truth().force_n;
+        let now = self.finger.status().mode;
         self.forces.observe(time_s, force_n, &command, now, approaching);
         let broken = self.forces.broken(force_n).or_else(|| check_mode(self.before, now, &command));
         if let (None, Some(reason)) = (&self.broken, broken) {
-            self.broken = Some(format!("{time_s:.4} s, {now:?} {:?}: {reason}", fault(&self.finger)));
+            self.broken = Some(format!("{time_s:.4} s, {now:?} {:?}: {reason}", self.finger.status().fault));
         }
         self.before = now;
     }
@@ -95,16 +93,16 @@ impl Run<'_> {
         // The last event is acknowledged in the next frame; a press that measures ends by itself.
         self.wait(0.002);
         let until_s = self.finger.time_s() + 10.0;
-        while mode(&self.finger) == Mode::Press && self.finger.time_s() < until_s {
+        while self.finger.status().mode == Mode::Press && self.finger.time_s() < until_s {
             self.wait(0.1);
         }
-        let driven = drives(mode(&self.finger));
+        let driven = drives(self.finger.status().mode);
         let (stop_s, held_n) = self.sequence.stops(driven);
         self.wait(stop_s);
-        let left_n = force_n(&mut self.finger);
+        let left_n = self.finger.truth().force_n;
         if left_n > CONTACT_ON_N + held_n && self.forces.pushed_n == 0.0 {
             let reason = format!("{left_n:.3} N are left {stop_s} s after the end, {held_n:.3} N allowed for friction");
-            let state = format!("{:?} {:?}", mode(&self.finger), fault(&self.finger));
+            let state = format!("{:?} {:?}", self.finger.status().mode, self.finger.status().fault);
             self.broken.get_or_insert(format!("at the end, {state}: {reason}"));
         }
     }
@@ -115,7 +113,7 @@ fn broken(sequence: &Sequence) -> Option<String> {
     let run = || {
         let mut finger = finger(&sequence.tables);
         finger.command().torque = false;
-        let (object_mm, before) = (sequence.distance_mm, mode(&finger));
+        let (object_mm, before) = (sequence.distance_mm, finger.status().mode);
         let mut run = Run { finger, sequence, forces: Forces::default(), object_mm, before, broken: None };
         for (after_s, event) in &sequence.events {
             run.wait(*after_s);

@@ -68,6 +68,15 @@ impl Host {
         (0..count).for_each(|_| self.0.frame());
     }
 
+    /// Ends a fault by this register, and presses with 0.5 N.
+    fn resume(&mut self, register: u16) {
+        self.write(register, &[1]);
+        self.wait(address::FAULT, 0);
+        self.write(address::TORQUE_ENABLE, &[1]);
+        self.write(address::GOAL_FORCE_MN, &500_i32.to_le_bytes());
+        self.wait(MODE, Mode::Force as u8);
+    }
+
     fn hold(&mut self, force_mn: i32) {
         // Whatever touches the tip, as after a reboot on a contact.
         assert_eq!(self.write(address::TARE, &[2]), 0);
@@ -125,11 +134,7 @@ fn what_breaks_is_a_fault_until_it_is_mended_and_cleared() {
         assert_eq!(host.write(address::RECOVER, &[1]), if supply { 0x81 } else { 0x80 }, "{kind}");
         host.0.command("mend").expect("a command");
         host.frames(10);
-        host.write(address::RECOVER, &[1]);
-        host.wait(address::FAULT, 0);
-        host.write(address::TORQUE_ENABLE, &[1]);
-        host.write(address::GOAL_FORCE_MN, &500_i32.to_le_bytes());
-        host.wait(MODE, Mode::Force as u8);
+        host.resume(address::RECOVER);
     }
     // These show once the tip moves.
     for (kind, faults) in [
@@ -142,11 +147,7 @@ fn what_breaks_is_a_fault_until_it_is_mended_and_cleared() {
         let found = host.read(address::FAULT, 1)[0];
         assert!(faults.iter().any(|fault| *fault as u8 == found), "{kind}: {found}");
         host.0.command("mend").expect("a command");
-        host.write(address::CLEAR_FAULT, &[1]);
-        host.wait(address::FAULT, 0);
-        host.write(address::TORQUE_ENABLE, &[1]);
-        host.write(address::GOAL_FORCE_MN, &500_i32.to_le_bytes());
-        host.wait(MODE, Mode::Force as u8);
+        host.resume(address::CLEAR_FAULT);
     }
 }
 

@@ -1,8 +1,8 @@
 //! The array's signal is lost, freezes or fades while the motor is driven: the force stays bounded.
 
 use crate::{
-    Case, LOSSES, fault, finger, force_n, judge, log_uniform, most_n, object, press, run_with, scene, set_goal, show,
-    touch, touch_s, uniform,
+    Case, LOSSES, finger, judge, log_uniform, most_n, object, press, run_with, scene, set_goal, show, touch, touch_s,
+    uniform,
 };
 use fastrand::Rng;
 use fingertip::params::Params;
@@ -12,65 +12,32 @@ use sim::run::run;
 use sim::scene::{Goal, Scene, library, read};
 use sim::{cores, metrics, native};
 
-/// Defect of the signal.
-#[derive(Clone, Copy, Debug)]
-enum Signal {
-    /// All codes equal those of the tare: the connector is unplugged.
-    Blank,
-    /// All codes keep their last values.
-    Frozen,
-}
-
-/// Time at which the signal is lost.
-#[derive(Clone, Copy, Debug)]
-enum Moment {
-    Hold,
-    /// Time before the touch, s.
-    Before(f64),
-}
-
-/// Largest true force of a run in which the signal is lost at this time.
-fn lost(modulus_kpa: f64, goal_n: f64, signal: Signal, moment: Moment) -> Case {
+/// Largest true force of a run in which all codes keep their last values, or go back to those of the tare as when the
+/// connector is unplugged: during a hold, or some time before the touch.
+fn lost(modulus_kpa: f64, goal_n: f64, freezes: bool, before_touch_s: Option<f64>) -> Case {
     let tables = format!("[tip]\nmodulus_kpa = {modulus_kpa:?}\n{}{LOSSES}", object(3.0, 0.0));
     let mut finger = finger(&tables);
     let blank = *finger.frame();
-    let mut peak_n = match moment {
-        Moment::Hold => press(&mut finger, goal_n, 1.0),
-        Moment::Before(seconds) => press(&mut finger, goal_n, touch_s(&tables, goal_n) - seconds),
-    };
-    let codes = match signal {
-        Signal::Blank => blank,
-        Signal::Frozen => *finger.frame(),
-    };
-    peak_n = peak_n.max(run_with(&mut finger, 1.5, |record| show(record, &codes)));
-    let what = format!("{signal:?} {moment:?}, {modulus_kpa} kPa, goal {goal_n} N: {:?}", fault(&finger));
-    Case::new(what, peak_n, most_n(goal_n))
+    let pressed_s = before_touch_s.map_or(1.0, |before_s| touch_s(&tables, goal_n) - before_s);
+    let before_n = press(&mut finger, goal_n, pressed_s);
+    let codes = if freezes { *finger.frame() } else { blank };
+    let peak_n = before_n.max(run_with(&mut finger, 1.5, |record| show(record, &codes)));
+    let what = format!("freezes: {freezes}, {before_touch_s:?} s before the touch, {modulus_kpa} kPa, goal {goal_n} N");
+    Case::new(format!("{what}: {:?}", finger.status().fault), peak_n, most_n(goal_n))
 }
 
-/// All moduli and goals.
-fn all(signal: Signal, moments: &[Moment]) -> Vec<Case> {
+#[test]
+fn a_signal_that_is_lost_stops_the_motor_in_time() {
+    let ways = [(false, None), (false, Some(0.002)), (false, Some(0.03)), (true, Some(0.002)), (true, Some(0.03))];
     let mut tasks = Vec::new();
     for modulus_kpa in [150.0, 250.0, 400.0] {
         for goal_n in [0.5, 1.0, 3.0, 7.0] {
-            tasks.extend(moments.iter().map(|moment| (modulus_kpa, goal_n, *moment)));
+            tasks.extend(ways.map(|(freezes, before_touch_s)| (modulus_kpa, goal_n, freezes, before_touch_s)));
         }
     }
-    cores::map(tasks, |(modulus_kpa, goal_n, moment)| lost(modulus_kpa, goal_n, signal, moment))
-}
-
-#[test]
-fn a_signal_that_is_lost_during_a_hold_stops_the_motor_in_time() {
-    judge("signal lost during a hold", "N", &all(Signal::Blank, &[Moment::Hold]));
-}
-
-#[test]
-fn a_signal_that_is_lost_before_the_touch_stops_the_motor_in_time() {
-    judge("signal lost before the touch", "N", &all(Signal::Blank, &[Moment::Before(0.002), Moment::Before(0.03)]));
-}
-
-#[test]
-fn a_signal_that_stands_still_before_the_touch_stops_the_motor_in_time() {
-    judge("signal frozen before the touch", "N", &all(Signal::Frozen, &[Moment::Before(0.002), Moment::Before(0.03)]));
+    let cases =
+        cores::map(tasks, |(modulus_kpa, goal_n, freezes, before_s)| lost(modulus_kpa, goal_n, freezes, before_s));
+    judge("signal lost", "N", &cases);
 }
 
 /// Halves all codes relative to the level of an undriven column.
@@ -100,8 +67,8 @@ fn gains_that_halve_during_a_press_do_not_double_the_force() {
             let peak_n = run_with(&mut finger, 1.5, halve);
             let what = format!(
                 "goal {goal_n} N, {after_s} s after the touch, {:.2} N at last: {:?}",
-                force_n(&mut finger),
-                fault(&finger)
+                finger.truth().force_n,
+                finger.status().fault
             );
             cases.push(Case::new(what, peak_n, most_n(goal_n)));
         }

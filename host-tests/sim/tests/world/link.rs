@@ -1,5 +1,6 @@
 //! Each effect of clock, bus and host against its closed form, and the host that repeats its command.
 
+use crate::part;
 use fingertip::shipped::{COLUMNS, SLOTS};
 use sim::effects::link::{Named, Stages};
 use sim::effects::{Part, stream};
@@ -70,8 +71,8 @@ fn hosts_are_late_by_their_distribution() {
 
 #[test]
 fn bursts_come_and_last_as_asked() {
-    let scene = scene("[effects.burst]\nrate_per_s = 50\nlength_us = 2000\namplitude_codes = 100");
-    let Some((_, Part::Codes(mut burst))) = registry::build(&scene.effects, 9, 0).next() else { panic!() };
+    let burst = "[effects.burst]\nrate_per_s = 50\nlength_us = 2000\namplitude_codes = 100";
+    let Part::Codes(mut burst) = part(burst, 9) else { panic!() };
     let (mut noisy, mut begun, mut was) = (0, 0, false);
     let steps = 2_000_000;
     for step in 0..steps {

@@ -14,7 +14,7 @@ mod sensor;
 
 use fingertip::state::Mode;
 use sim::bridge::Bridge;
-use sim::effects::{Named, Set};
+use sim::effects::{Named, Part, Set};
 use sim::native::simulate_with;
 use sim::registry;
 use sim::scene::{Scene, read, text};
@@ -185,6 +185,11 @@ fn every_effect_by_its_default_runs_to_the_end_and_alike_each_time() {
 /// Reads a scene from its text without `about`.
 fn scene(text: &str) -> Scene {
     read("test.toml", &format!("about = \"a test\"\n{text}"), &[]).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The first effect of these tables.
+fn part(tables: &str, seed: u64) -> Part {
+    registry::build(&scene(&format!("duration_s = 1.0\n{tables}")).effects, seed, 0).next().expect("an effect").1
 }
 
 /// Keeps the last step.

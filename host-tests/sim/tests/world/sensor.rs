@@ -11,10 +11,9 @@ use sim::registry;
 use sim::scene::text;
 use sim::setup::Array;
 
-/// An effect, built from the text of its table.
+/// An effect by its keys.
 fn part(name: &str, keys: &str, seed: u64) -> Part {
-    let scene = scene(&format!("duration_s = 1\n[effects.{name}]\n{keys}\n"));
-    registry::build(&scene.effects, seed, 0).next().expect("one is named").1
+    crate::part(&format!("[effects.{name}]\n{keys}\n"), seed)
 }
 
 fn pressure(name: &str, keys: &str) -> Box<dyn Pressure> {

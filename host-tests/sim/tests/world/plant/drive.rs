@@ -133,43 +133,19 @@ fn mm_per_s2(setup: &Setup, torque_nm: f64) -> f64 {
 }
 
 #[test]
-fn a_pushed_mass_takes_twice_the_root_of_way_over_acceleration() {
-    let setup = double_integrator();
-    for (way, current) in [(0.1, 2.0), (1.0, 2.0), (1.0, 0.5), (-2.0, 1.0)] {
-        let a = mm_per_s2(&setup, setup.motor.torque_nm_per_a * current);
-        let expected = 2.0 * (f64::abs(way) / a).sqrt();
-        let got = minimum_time_s(&setup, 3.0, 3.0 + way, 1e9, current).unwrap();
-        assert!((got / expected - 1.0).abs() < 1e-6, "{got} s for {expected} s over {way} mm");
-    }
-}
-
-#[test]
-fn friction_helps_the_brake() {
+fn a_pushed_mass_takes_its_closed_form_and_friction_helps_the_brake() {
     let mut setup = double_integrator();
-    setup.motor.friction_nm = 2e-3;
-    let torque = setup.motor.torque_nm_per_a * 1.0;
-    let (speeding, braking) = (mm_per_s2(&setup, torque - 2e-3), mm_per_s2(&setup, torque + 2e-3));
-    let expected = (2.0 * 1.5 * (1.0 / speeding + 1.0 / braking)).sqrt();
-    let got = profile(&setup, 0.5, 2.0, 1e9, 1.0).unwrap();
-    assert!((got.total_s / expected - 1.0).abs() < 1e-6, "{} s for {expected} s", got.total_s);
-    assert!((got.switch_s * speeding - (got.total_s - got.switch_s) * braking).abs() < 1e-3);
-}
-
-#[test]
-fn a_motor_on_a_voltage_follows_its_exponential() {
-    let mut setup = double_integrator();
-    setup.supply.source_v = 6.0;
-    setup.supply.bridge_ohm = 0.0;
-    let motor = setup.motor;
-    let tau = motor.resistance_ohm * motor.inertia_kg_m2 / motor.torque_nm_per_a.powi(2);
-    let top = 6.0 / motor.torque_nm_per_a * setup.transmission.drum_radius_mm / setup.transmission.ratio;
-    for drive_s in [1e-3, 5e-3, 20e-3] {
-        let speed = top * (1.0 - f64::exp(-drive_s / tau));
-        let brake_s = tau * (speed / top).ln_1p();
-        let way = (top * drive_s - tau * speed) + (tau * speed - top * brake_s);
-        let got = profile(&setup, 0.0, way, 6.0, NO_LIMIT).unwrap();
-        assert!((got.switch_s / drive_s - 1.0).abs() < 1e-5, "{} s for {drive_s} s", got.switch_s);
-        assert!((got.total_s / (drive_s + brake_s) - 1.0).abs() < 1e-5);
+    for friction_nm in [0.0, 2e-3] {
+        setup.motor.friction_nm = friction_nm;
+        for (way_mm, current_a) in [(0.1, 2.0), (1.0, 2.0), (1.5, 1.0), (1.0, 0.5), (-2.0, 1.0)] {
+            let torque_nm = setup.motor.torque_nm_per_a * current_a;
+            let [speeding, braking] =
+                [torque_nm - friction_nm, torque_nm + friction_nm].map(|nm| mm_per_s2(&setup, nm));
+            let expected_s = (2.0 * f64::abs(way_mm) * (1.0 / speeding + 1.0 / braking)).sqrt();
+            let got = profile(&setup, 3.0, 3.0 + way_mm, 1e9, current_a).unwrap();
+            assert!((got.total_s / expected_s - 1.0).abs() < 1e-6, "{} s for {expected_s} s", got.total_s);
+            assert!((got.switch_s * speeding - (got.total_s - got.switch_s) * braking).abs() < 1e-3);
+        }
     }
 }
 

@@ -2,6 +2,7 @@
 //! against creep and temperature and after a calibration.
 
 use crate::{number, replaced};
+use sim::cores;
 use sim::native::calibrated::{Calibrated, errors_text, fingers, percentiles};
 use sim::native::{self, simulate_calibrated};
 use sim::run::{Run, run};
@@ -9,13 +10,16 @@ use sim::scene::{Scene, library, read};
 use sim::watch::Watch;
 use sim::{metrics, population};
 
-/// Permille and ms: of (60, 200), (80, 100), (80, 200), (120, 200), (80, 350), (100, 350) and (100, 500) none left a
-/// smaller median error on six other arrays (seeds 11 to 16) with other forces (2.5, 1.2 and 2.2 N).
+/// Permille and ms.
 const CREEP: (i32, i32) = (100, 200);
 const OFF: (i32, i32) = (0, 500);
 
-fn scene(seed: u64, (permille, time_ms): (i32, i32)) -> Scene {
-    changed(seed, &[], &format!("creep_permille = {permille}\ncreep_time_ms = {time_ms}\n"))
+fn scene(seed: u64, creep: (i32, i32)) -> Scene {
+    changed(seed, &[], &controller(creep))
+}
+
+fn controller((permille, time_ms): (i32, i32)) -> String {
+    format!("creep_permille = {permille}\ncreep_time_ms = {time_ms}\n")
 }
 
 /// Scene of worn sensors with other values, and keys of the controller.
@@ -43,6 +47,27 @@ fn error_of(calibrated: &Calibrated, scene: &Scene) -> f64 {
     error_mn(&calibrated.scene(scene).expect("a scene"), &board, "force_error_rms_mn")
 }
 
+/// The same of a finger that is calibrated first.
+fn calibrated_mn(scene: &Scene) -> f64 {
+    error_of(&Calibrated::of(scene).expect("it ends"), scene)
+}
+
+/// No other term leaves a smaller median error on six other arrays with other forces.
+#[test]
+#[ignore = "long: cargo xtask test --long"]
+fn long_the_creep_term_is_the_best_of_those_tried_on_other_arrays() {
+    let forces = [("goal_n = 1.0", "goal_n = 2.5"), ("goal_n = 3.0", "goal_n = 1.2"), ("goal_n = 1.5", "goal_n = 2.2")];
+    let tried = [OFF, (60, 200), (80, 100), (80, 200), CREEP, (120, 200), (80, 350), (100, 350), (100, 500)];
+    let medians_mn = cores::map(tried, |creep| {
+        let scenes = (11..=16).map(|seed| changed(seed, &forces, &controller(creep)));
+        let mut errors_mn: Vec<f64> = scenes.map(|scene| calibrated_mn(&scene)).collect();
+        errors_mn.sort_by(f64::total_cmp);
+        (errors_mn[2] + errors_mn[3]) / 2.0
+    });
+    let (best, _) = tried.iter().zip(&medians_mn).min_by(|a, b| a.1.total_cmp(b.1)).expect("some were tried");
+    assert_eq!(*best, CREEP, "{tried:?} leave {medians_mn:?}");
+}
+
 #[test]
 fn calibration_and_the_creep_term_leave_a_third_of_a_worn_sensors_error() {
     leave_a_third(1..2);
@@ -57,10 +82,7 @@ fn long_calibration_and_the_creep_term_leave_a_third_of_a_worn_sensors_error() {
 fn leave_a_third(seeds: std::ops::Range<u64>) {
     for seed in seeds {
         let raw = raw_mn(&scene(seed, OFF));
-        let [plain, crept] = [OFF, CREEP].map(|creep| {
-            let scene = scene(seed, creep);
-            error_of(&Calibrated::of(&scene).expect("it ends"), &scene)
-        });
+        let [plain, crept] = [OFF, CREEP].map(|creep| calibrated_mn(&scene(seed, creep)));
         println!("seed {seed}: {raw:.0} mN, calibrated {plain:.0}, with the creep term too {crept:.0}");
         // The rest is mostly hysteresis, whose error changes sign after a step down.
         assert!((150.0..400.0).contains(&raw) && plain < 0.65 * raw && (20.0..90.0).contains(&crept), "seed {seed}");

@@ -34,7 +34,7 @@ fn drawn(rng: &mut Rng) -> Held {
     (log_uniform(rng, 0.1, 2.0), uniform(rng, 0.3, 7.0), if rng.bool() { LOSSES } else { "" })
 }
 
-/// Holds the goal for 1 s, lets `happens` be done, and releases.
+/// Holds the goal for 1 s, lets an interruption happen, and releases.
 fn interrupted((yield_mm_per_n, goal_n, losses): Held, happens: &str, interrupt: impl FnOnce(&mut Finger)) -> Case {
     let mut finger = finger(&(object(2.5, yield_mm_per_n) + losses));
     press(&mut finger, goal_n, 1.0);

@@ -90,7 +90,7 @@ fn drawn(finger: &Finger, name: &str) -> Option<f64> {
     finger.drawn.iter().find(|(known, _)| known == name).and_then(|(_, value)| value.number())
 }
 
-/// The tips, every third one with no, one or two dead taxels near the contact.
+/// The tips, with no, one and two dead taxels near the contact in turn.
 fn tips(count: usize, changes: &[(&str, &str)]) -> Vec<Finger> {
     let text = replaced(include_str!("tips.toml"), changes);
     let dead = ["[]", "[[4, 5]]", "[[5, 4], [2, 6]]"].iter().enumerate();

@@ -19,11 +19,6 @@ Bus.watch = lambda bus, ids, silence_s: watch(bus, ids, 2.54)
 del sys.argv[0]
 runpy.run_path(sys.argv[0], run_name='__main__')";
 
-/// A served finger that complains where the test does.
-fn serve() -> Served {
-    Served::begin(Stdio::inherit(), &[])
-}
-
 /// Output of an example.
 fn example(served: &Served, name: &str, arguments: &[&str]) -> String {
     let example = Path::new(env!("FINGERTIP_ROOT")).join("python/examples").join(name);
@@ -51,17 +46,14 @@ fn said(command: &mut Command) -> String {
 #[test]
 #[ignore = "needs a Python with dynamixel-sdk: `cargo xtask test` runs it"]
 fn the_examples_stream_show_set_and_recover() {
-    let mut served = serve();
+    let mut served = Served::begin(Stdio::inherit(), &[]);
     let file = std::env::temp_dir().join(format!("fingertip-python-{}.csv", std::process::id()));
     let path = file.to_str().expect("a plain path");
     example(&served, "stream_to_csv.py", &["--seconds", "1", "--rate-hz", "200", "--press", "1.5", path]);
     let text = std::fs::read_to_string(&file).expect("it was written");
     std::fs::remove_file(&file).expect("it is there");
-    let rows: Vec<Vec<f64>> = text
-        .lines()
-        .skip(1)
-        .map(|line| line.split(',').map(|cell| cell.parse().expect("a number")).collect())
-        .collect();
+    let row = |line: &str| line.split(',').map(|cell| cell.parse().expect("a number")).collect();
+    let rows: Vec<Vec<f64>> = text.lines().skip(1).map(row).collect();
     for pair in rows.windows(2) {
         // Time is that of the frames: 99.786 us each.
         let (frames, time_s) = (pair[1][1] - pair[0][1], pair[1][0] - pair[0][0]);
@@ -82,29 +74,21 @@ fn the_examples_stream_show_set_and_recover() {
     assert!(recovered.ends_with("times\n"), "{recovered}");
 }
 
-/// Tests of the package, a function for each file: they run side by side.
-macro_rules! files {
-    ($($file:ident)*) => {
-        $(#[test]
-        #[ignore = "needs a Python with dynamixel-sdk: `cargo xtask test` runs it"]
-        fn $file() {
-            let tests = Path::new(env!("FINGERTIP_ROOT")).join("python/tests");
+/// Runs the files side by side, each in a process of its own.
+#[test]
+#[ignore = "needs a Python with dynamixel-sdk: `cargo xtask test` runs it"]
+fn the_tests_of_the_package_pass() {
+    let tests = Path::new(env!("FINGERTIP_ROOT")).join("python/tests");
+    let names = std::fs::read_dir(&tests).expect("the folder is there").map(|file| file.expect("a file").file_name());
+    let mut names: Vec<String> = names.filter_map(|name| name.into_string().ok()).collect();
+    names.retain(|name| name.starts_with("test_") && name.ends_with(".py"));
+    assert!(names.len() >= 5, "{names:?}");
+    std::thread::scope(|scope| {
+        for name in names {
             let mut command = python();
             command.env("FINGERTIP_SERVE", env!("CARGO_BIN_EXE_serve"));
-            let pattern = concat!(stringify!($file), ".py");
-            said(command.args(["-m", "unittest", "discover", "--pattern", pattern]).arg(tests));
-        })*
-
-        #[test]
-        fn every_file_of_tests_is_listed() {
-            let tests = Path::new(env!("FINGERTIP_ROOT")).join("python/tests");
-            let files = std::fs::read_dir(tests).expect("the folder is there").map(|file| file.expect("a file").file_name());
-            let mut names: Vec<_> = files.filter_map(|name| name.into_string().ok()).collect();
-            names.retain(|name| name.starts_with("test_") && name.ends_with(".py"));
-            names.sort();
-            assert_eq!(names, [$(concat!(stringify!($file), ".py")),*]);
+            command.args(["-m", "unittest", "discover", "--pattern", &name]).arg(&tests);
+            scope.spawn(move || said(&mut command));
         }
-    };
+    });
 }
-
-files! { test_bus test_finger test_interrupted test_line test_package }

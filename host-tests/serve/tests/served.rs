@@ -4,10 +4,10 @@ mod common;
 
 use common::{Killed, Served, program};
 use serial2::SerialPort;
-use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::io::{BufRead as _, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 
 /// As patient as it takes on the slowest machine.
 const PATIENCE: std::time::Duration = std::time::Duration::from_secs(3600);
@@ -29,14 +29,16 @@ fn terminal(served: &Served, baud: u32) -> SerialPort {
     port
 }
 
-fn pings(port: &SerialPort) {
+fn pings(port: &mut (impl Read + Write)) {
     port.write_all(&PING).expect("it listens");
     let mut reply = [0; 14];
     port.read_exact(&mut reply).expect("it answers");
     assert_eq!(reply[..12], PONG);
 }
 
-fn refused(output: &Output) -> String {
+/// The complaint of a program that refuses its arguments.
+fn refused(arguments: &[&str]) -> String {
+    let output = program(arguments).output().expect("it starts");
     assert_eq!(output.status.code(), Some(2));
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
@@ -48,12 +50,12 @@ fn a_link_is_served_by_one_and_gone_with_it() {
     std::os::unix::fs::symlink("/dev/null", &path).expect("a link");
     let served = Served::begin(Stdio::piped(), &["--pty", text(&path)]);
     assert_eq!(Path::new(&served.name), path);
-    let second = refused(&program(&["--pty", text(&path)]).output().expect("it starts"));
+    let second = refused(&["--pty", text(&path)]);
     let holder = format!("process {} serves a finger at {}", served.child.0.id(), path.display());
     assert!(second.contains(&holder) && second.contains("name another link"), "{second}");
     // The first one is as it was.
-    pings(&terminal(&served, 1_000_000));
-    pings(&terminal(&served, 1_000_000));
+    pings(&mut terminal(&served, 1_000_000));
+    pings(&mut terminal(&served, 1_000_000));
     let (well, last, complained) = served.interrupt();
     assert!(well, "{complained}");
     assert!(last.starts_with("served ") && last.contains("20 bytes in, 28 out, 2 answers"), "{last}");
@@ -65,7 +67,7 @@ fn a_link_is_served_by_one_and_gone_with_it() {
 fn a_file_is_no_link() {
     let path = link("file");
     std::fs::write(&path, "mine").expect("a file");
-    let why = refused(&program(&["--pty", text(&path)]).output().expect("it starts"));
+    let why = refused(&["--pty", text(&path)]);
     assert!(why.contains(&format!("cannot make the link {}", path.display())), "{why}");
     assert!(why.contains("name another link, or remove the file"), "{why}");
     assert_eq!(std::fs::read_to_string(&path).expect("it is there"), "mine");
@@ -74,11 +76,10 @@ fn a_file_is_no_link() {
 
 #[test]
 fn another_speed_is_not_heard() {
-    let served = Served::begin(Stdio::piped(), &[]);
+    let mut served = Served::begin(Stdio::piped(), &[]);
     let port = terminal(&served, 57_600);
     port.write_all(&PING).expect("a terminal takes it");
     // The first client notices the loss later: the answer goes only to the second.
-    let mut served = served;
     let mut line = String::new();
     let mut complaints = BufReader::new(served.child.0.stderr.take().expect("it was asked for"));
     complaints.read_line(&mut line).expect("a line");
@@ -88,24 +89,18 @@ fn another_speed_is_not_heard() {
     }
     assert!(line.contains("a client sends at 57600 baud, the finger listens at 1000000"), "{line}");
     drop(port);
-    pings(&terminal(&served, 1_000_000));
+    pings(&mut terminal(&served, 1_000_000));
 }
 
 #[test]
 fn tcp_takes_one_client_after_another_and_says_so() {
     let served = Served::begin(Stdio::piped(), &["--tcp", "0"]);
-    let ping = |client: &mut TcpStream| {
-        client.write_all(&PING).expect("it listens");
-        let mut reply = [0; 14];
-        client.read_exact(&mut reply).expect("it answers");
-        assert_eq!(reply[..12], PONG);
-    };
     let mut first = TcpStream::connect(&served.name).expect("it listens");
-    ping(&mut first);
+    pings(&mut first);
     let mut words = String::new();
     TcpStream::connect(&served.name).expect("it listens").read_to_string(&mut words).expect("words, and an end");
     assert!(words.starts_with("busy: 127.0.0.1:") && words.ends_with("one client at a time\n"), "{words}");
-    ping(&mut first);
+    pings(&mut first);
     drop(first);
     // The first client's end may be reported after the second one's connection.
     loop {
@@ -136,7 +131,7 @@ fn a_busy_port_says_so_also_to_who_speaks_first() {
 #[test]
 fn who_has_gone_keeps_nobody_out() {
     let mut served = Served::begin(Stdio::piped(), &["--tcp", "0"]);
-    let pid = rustix::process::Pid::from_raw(served.child.0.id() as i32).expect("a process number");
+    let pid = served.pid();
     let signal = |signal| rustix::process::kill_process(pid, signal).expect("it runs");
     for _ in 0..20 {
         // The server is paused while one client leaves and the next connects, as on a busy machine.
@@ -147,20 +142,17 @@ fn who_has_gone_keeps_nobody_out() {
         drop(first);
         let mut next = TcpStream::connect(&served.name).expect("the system takes it");
         signal(rustix::process::Signal::CONT);
-        next.write_all(&PING).expect("it listens");
-        let mut reply = [0; 14];
-        next.read_exact(&mut reply).expect("it answers");
-        assert_eq!(reply[..12], PONG);
+        pings(&mut next);
     }
 }
 
 #[test]
 fn what_is_there_is_told() {
-    let why = refused(&program(&["wal"]).output().expect("it starts"));
+    let why = refused(&["wal"]);
     assert!(why.contains("no scene wal") && why.contains("did you mean `wall`?") && why.contains("raspberry"), "{why}");
     let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("some port is free");
     let port = taken.local_addr().expect("it is bound").port();
-    let why = refused(&program(&["--tcp", &port.to_string()]).output().expect("it starts"));
+    let why = refused(&["--tcp", &port.to_string()]);
     assert!(why.contains(&format!("cannot open TCP port {port}")), "{why}");
 }
 
@@ -181,7 +173,7 @@ fn commands_change_the_scene() {
     assert!(served.ask("help").starts_with("remove "));
     // Without anybody at its side it serves on.
     served.side = None;
-    pings(&terminal(&served, 1_000_000));
+    pings(&mut terminal(&served, 1_000_000));
     let (well, _, complained) = served.interrupt();
     assert!(well);
     for wrong in ["MM of `far`", "no fault `nothing`", "no finger `2`: 1 to 1", "`jump` is no command"] {

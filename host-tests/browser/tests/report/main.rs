@@ -51,7 +51,7 @@ fn a_report_of_two_fingers_has_nothing_wrong() {
 
 /// Runs a scene; returns it with its trace and its outcome.
 fn ran(name: &str) -> (Scene, Trace, Outcome) {
-    let scene = format!("{}/host-tests/sim/tests/left_behind/{name}.toml", env!("FINGERTIP_ROOT"));
+    let scene = format!("{}/host-tests/sim/tests/files/{name}.toml", env!("FINGERTIP_ROOT"));
     let scene = cli::load(&scene, &[], None).unwrap();
     let mut trace = Trace::new(scene.duration_s);
     let outcome = run(&scene, &native::board, &mut [&mut trace]).unwrap();

@@ -43,6 +43,10 @@ impl Served {
         served
     }
 
+    pub fn pid(&self) -> rustix::process::Pid {
+        rustix::process::Pid::from_child(&self.child.0)
+    }
+
     pub fn line(&mut self) -> String {
         let mut line = String::new();
         self.said.read_line(&mut line).expect("a line");
@@ -57,9 +61,7 @@ impl Served {
 
     /// Sends Ctrl-C; returns success, the last output, and standard error.
     pub fn interrupt(mut self) -> (bool, String, String) {
-        let pid = i32::try_from(self.child.0.id()).expect("a process number");
-        let pid = rustix::process::Pid::from_raw(pid).expect("a process number");
-        rustix::process::kill_process(pid, rustix::process::Signal::INT).expect("it runs");
+        rustix::process::kill_process(self.pid(), rustix::process::Signal::INT).expect("it runs");
         let (mut last, mut complained) = (String::new(), String::new());
         self.said.read_to_string(&mut last).expect("words");
         let stderr = self.child.0.stderr.as_mut().expect("it was asked for");

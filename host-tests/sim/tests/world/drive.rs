@@ -1,11 +1,10 @@
 //! Effects of motor and gear.
 
-use crate::{close, run, world};
+use crate::{close, part, run, world};
 use core::f64::consts::TAU;
 use sim::bridge::Bridge;
 use sim::effects::drive::{Circuit, Friction};
 use sim::effects::{Named, Part};
-use sim::registry;
 use sim::world::World;
 
 const FAR: &str = "[object]\ndistance_mm = 100.0\n";
@@ -14,11 +13,6 @@ const STEPS_S: [f64; 4] = [1e-6, 10e-6, 50e-6, 200e-6];
 
 fn speed(world: &World<Named>) -> f64 {
     world.fingers()[0].shaft().speed_rad_per_s
-}
-
-fn part(text: &str) -> Part {
-    let scene = crate::scene(&format!("duration_s = 1.0\n{text}"));
-    registry::build(&scene.effects, 1, 0).next().unwrap().1
 }
 
 #[test]
@@ -81,33 +75,13 @@ fn stribeck_friction_breaks_away_higher_than_it_slides() {
     let both = format!("{dry}[effects.stribeck]\ntorque_mnm = 0.06\nspeed_rad_per_s = 5.0\n");
     close(breakaway_v(dry), 0.12 / 5.35 * 3.53, 1e-9);
     close(breakaway_v(&both), 0.18 / 5.35 * 3.53, 1e-9);
-    let Part::Resist(mut part) = part("[effects.stribeck]\ntorque_mnm = 0.06\nspeed_rad_per_s = 5.0\n") else {
+    let Part::Resist(mut part) = part("[effects.stribeck]\ntorque_mnm = 0.06\nspeed_rad_per_s = 5.0\n", 1) else {
         panic!()
     };
     for (speed, share) in [(0.0, 1.0), (5.0, 0.5), (-5.0, 0.5), (50.0, 1.0 / 101.0)] {
         let mut friction = Friction::default();
         part(speed, &mut friction);
         close(friction.sliding_nm, 0.06e-3 * share, 1e-12);
-    }
-}
-
-#[test]
-fn the_gear_lets_its_share_through_and_holds_on_the_way_back() {
-    // A stalled motor presses until eta k i = T: F = eta k i / r.
-    let mut world =
-        world("[effects.gear_efficiency]\nefficiency = 0.7\n[effects.viscous_friction]\ntorque_unm_s = 20.0\n");
-    run(&mut world, 20e-6, 100_000, Bridge::Driven { duty: 0.1 });
-    let torque_nm = 5.35e-3 * 0.6 / 3.53;
-    close(world.force_n(0), 0.7 * torque_nm / (12e-3 / 43.0), 1e-4);
-    // From there the motor torque may fall to T (2 - 1/eta) = 0.571 T before the gear moves back.
-    let held = world.force_n(0);
-    for (share, holds) in [(0.41, true), (0.39, false)] {
-        let mut duty = 0.1 * share;
-        if holds {
-            duty = 0.1 * 0.7 * (2.0 - 1.0 / 0.7) * 1.01;
-        }
-        run(&mut world, 20e-6, 1_000, Bridge::Driven { duty });
-        assert_eq!(world.force_n(0) > 0.999 * held, holds, "at {duty}");
     }
 }
 
@@ -154,7 +128,7 @@ fn the_play_is_as_wide_as_it_says() {
 fn the_winding_warms_up_like_its_closed_form() {
     let text = "[effects.thermal_derating]\nk_per_w = 46.0\ntau_s = 10.0\nambient_c = 30.0\nmagnet_per_k = -0.001\n";
     for step_s in [1e-4, 0.1, 3.0] {
-        let Part::Electric(mut part) = part(text) else { panic!() };
+        let Part::Electric(mut part) = part(text, 1) else { panic!() };
         let cold = Circuit {
             source_v: 6.0,
             source_ohm: 0.0,

@@ -1,4 +1,4 @@
-//! The moving world and the effects on it, against closed forms and with extreme numbers.
+//! The simulated world: effects against closed forms and with extreme numbers, events, clock, and the reference plant.
 //!
 //! Effects that a scene does not name must cost nothing, and effects without magnitude must change nothing. This file
 //! also has the functions that the tests share.
@@ -7,14 +7,18 @@ mod clock;
 mod contact;
 mod drive;
 mod energy;
+mod events;
+mod link;
+mod plant;
+mod sensor;
 
 use fingertip::state::Mode;
 use sim::bridge::Bridge;
-use sim::effects::{Named, Set};
+use sim::effects::{Named, Part, Set};
 use sim::native::simulate_with;
 use sim::registry;
 use sim::scene::{Scene, read, text};
-use sim::watch::{Step, Summary, Truth, Watch};
+use sim::watch::{Cost, Step, Summary, Truth, Watch};
 use sim::world::{Surroundings, World};
 
 /// The world of a scene, to be moved by hand.
@@ -92,9 +96,8 @@ fn a_contact_a_thousand_times_as_stiff_stays_sound() {
     let scene = scene("duration_s = 0.1\n[object]\ndistance_mm = 0.5\n");
     let mut setup = scene.setup();
     setup.tip.modulus_kpa *= 1000.0;
-    let parts = <Named as sim::effects::Set>::of(&scene, 0);
-    let around = sim::world::Surroundings::of(&scene);
-    let mut world = sim::world::World::<Named>::new(&setup, &around, vec![(parts.drive, parts.contact)]);
+    let parts = Named::of(&scene, 0);
+    let mut world = World::<Named>::new(&setup, &Surroundings::of(&scene), vec![(parts.drive, parts.contact)]);
     assert!(world.check_step(200e-6).is_err());
     world.check_step(100e-6).unwrap();
     world.fingers_mut()[0].launch(200.0);
@@ -121,17 +124,6 @@ fn scenes_of_no_time_and_of_one_frame_end() {
 }
 
 #[test]
-fn of_events_at_the_same_instant_the_last_counts() {
-    let text = |goals: &[&str]| {
-        let events = goals.iter().map(|goal| format!("[[script]]\nat_s = 0.01\ngoal_n = {goal}\n"));
-        format!("duration_s = 0.3\n{}", events.collect::<String>())
-    };
-    let run = |goals: &[&str]| sim::simulate(&scene(&text(goals)), &mut Last::default()).unwrap().digest;
-    assert_eq!(run(&["2.0", "0.5", "1.0"]), run(&["1.0"]));
-    assert_ne!(run(&["2.0"]), run(&["1.0"]));
-}
-
-#[test]
 fn denormal_and_zero_steps_change_nothing_that_counts() {
     let mut world = world(
         "[object]\ndistance_mm = 0.5\n[effects.relaxation]\n[effects.winding_inductance]\n[effects.object_mass]\n[effects.thermal_derating]\n",
@@ -147,16 +139,6 @@ fn denormal_and_zero_steps_change_nothing_that_counts() {
     }
     run(&mut world, 10e-6, 2_000, Bridge::Driven { duty: 0.5 });
     assert!(world.fingers()[0].tip_mm() > 0.1);
-}
-
-#[test]
-fn the_finger_touches_and_holds() {
-    let mut last = Last::default();
-    let summary = sim::simulate(&scene("duration_s = 0.5\n[[script]]\nat_s = 0.0\ngoal_n = 1.0\n"), &mut last).unwrap();
-    println!("{} times real time, {last:?}", summary.virtual_s / summary.wall_s);
-    assert_eq!(last.mode, Some(Mode::Force));
-    assert!((0.995..=1.005).contains(&last.truth.force_n), "{} N", last.truth.force_n);
-    assert!((0.995..=1.05).contains(&last.peak_n), "{} N", last.peak_n);
 }
 
 /// Touches, changes the goal and releases, with tables of effects.
@@ -177,28 +159,17 @@ fn compiled_in_but_not_named_changes_no_bit_and_is_never_called() {
 }
 
 #[test]
-fn each_effect_without_magnitude_changes_no_bit() {
+fn effects_without_magnitude_change_no_bit_and_are_called_alike_alone_and_together() {
     let plain = run_script::<()>("").digest;
-    let mut changed = Vec::new();
-    for effect in registry::all() {
-        let zero = run_script::<Named>(&text::zero(effect));
-        changed.extend((zero.digest != plain).then_some(effect.name));
-        assert_eq!(zero.ledger.len(), 1);
-        assert!(zero.ledger[0].evaluations > 0, "{} was not called", effect.name);
-    }
-    assert!(changed.is_empty(), "these change bits: {changed:?}");
-}
-
-#[test]
-fn all_effects_without_magnitude_change_no_bit_and_cost_the_sum_of_each() {
-    let all: String = registry::all().map(text::zero).collect();
-    let all = run_script::<Named>(&all);
-    assert_eq!(all.digest, run_script::<()>("").digest);
-    assert_eq!(all.ledger.len(), registry::all().count());
+    let all = run_script::<Named>(&registry::all().map(text::zero).collect::<String>());
+    assert_eq!((all.digest.as_str(), all.ledger.len()), (plain.as_str(), registry::all().count()));
     // Calls of one do not depend on which others are named: cost is linear in their number, to the call.
     for cost in &all.ledger {
         let effect = registry::all().find(|effect| effect.name == cost.effect).unwrap();
-        assert_eq!(run_script::<Named>(&text::zero(effect)).ledger[0].evaluations, cost.evaluations, "{}", effect.name);
+        let alone = run_script::<Named>(&text::zero(effect));
+        let [Cost { evaluations, .. }] = alone.ledger[..] else { panic!("{}: {:?}", effect.name, alone.ledger) };
+        assert_eq!((&alone.digest, evaluations), (&plain, cost.evaluations), "{}", effect.name);
+        assert!(evaluations > 0, "{} was not called", effect.name);
     }
 }
 
@@ -216,13 +187,17 @@ fn scene(text: &str) -> Scene {
     read("test.toml", &format!("about = \"a test\"\n{text}"), &[]).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Keeps the last step and the highest force.
+/// The first effect of these tables.
+fn part(tables: &str, seed: u64) -> Part {
+    registry::build(&scene(&format!("duration_s = 1.0\n{tables}")).effects, seed, 0).next().expect("an effect").1
+}
+
+/// Keeps the last step.
 #[derive(Debug, Default)]
 struct Last {
     steps: u64,
     truth: Truth,
     mode: Option<Mode>,
-    peak_n: f64,
 }
 
 impl Watch for Last {
@@ -230,6 +205,5 @@ impl Watch for Last {
         self.steps += 1;
         self.truth = *step.truth;
         self.mode = Some(step.status.mode);
-        self.peak_n = self.peak_n.max(step.truth.force_n);
     }
 }

@@ -1,0 +1,182 @@
+//! The library of scenes: each holds its bounds, and the paper's compression test has its forces and pressures.
+
+use crate::scene;
+use fingertip::shipped::{COLUMNS, ROWS, SLOTS};
+use sim::metrics::Verdict;
+use sim::run::run;
+use sim::scene::{Bound, library};
+use sim::watch::{Step, Watch};
+use sim::{cores, native, registry};
+use std::collections::BTreeSet;
+
+/// Runs a scene, and says which bounds it breaks.
+fn broken(name: &str, seed: Option<u64>) -> Vec<String> {
+    let scene = scene(name, &[], seed);
+    let two_sided = scene.bounds.iter().any(|bound| bound.min.is_some() && bound.max.is_some());
+    let outcome = run(&scene, &native::board, &mut []).expect("it runs");
+    let verdicts = outcome.verdicts.iter().filter(|verdict| !verdict.held);
+    let unbounded = (!two_sided).then(|| format!("{name}: nothing is bounded on both sides"));
+    let broken = verdicts.map(|verdict| format!("{name}: {:?} is {:?}", verdict.bound, verdict.value));
+    broken.chain(unbounded).collect()
+}
+
+#[test]
+fn every_scene_of_the_library_holds_its_bounds() {
+    // The test of the breakers below has the names of all scenes.
+    let broken = cores::map(BREAKERS, |(name, _)| broken(name, None)).concat();
+    assert!(broken.is_empty(), "{broken:#?}");
+}
+
+/// Scene and the keys that break its bounds, set one at a time. Together they break each side of each bound: a side
+/// that nothing can break tests nothing.
+type Breakers = (&'static str, &'static [&'static str]);
+
+/// A supply that is too low: the finger stops with a fault.
+const LOW: &str = "supply.source_v=3";
+/// A controller that reads too little and presses half as much again, and one that reads too much and presses two
+/// thirds.
+const MORE: &str = "controller.codes_per_kpa_milli=36000";
+const LESS: &str = "controller.codes_per_kpa_milli=16000";
+
+/// Drives in which the force loop hunts: a winding that is too slow for it, friction that is far higher at rest, and a
+/// motor taken for one that is much heavier.
+const HUNTS: &str = "effects.winding_inductance.inductance_uh=5000";
+const STICKS: &str = "effects.stribeck.torque_mnm=1";
+const HEAVY: &str = "controller.inertia_ug_m2=1000";
+
+#[rustfmt::skip]
+const BREAKERS: &[Breakers] = &[
+    ("compression", &[LOW, MORE, "controller.force_max_mn=1000", HUNTS]),
+    ("demo", &[LOW, MORE, "controller.inertia_ug_m2=300", "object.distance_mm=1.0", "object.distance_mm=7.0", STICKS]),
+    ("everything", &[LOW, MORE, LESS, "effects.breakable_object.force_n=0.1", "effects.tangential.still=0.05", "object.distance_mm=1.0", HEAVY]),
+    ("grasp", &[LOW, "host.grip_friction=0.2", "object.distance_mm=0.5", "object.shake_g=0", "hand.lift_mm=12", "host.grip_most_n=0.9", "effects.tangential.still=0.1", HUNTS]),
+    ("hot_hour", &[LOW, LESS, "controller.codes_per_kpa_milli=24600", "effects.thermal_derating.ambient_c=25", "effects.thermal_derating.ambient_c=60", STICKS]),
+    ("impact", &[LOW, MORE, LESS, "controller.approach_um_per_s=200000", "object.distance_mm=1.0", HEAVY]),
+    ("noisy_supply", &[LOW, MORE, LESS, "effects.noise.rms_codes=0", HUNTS]),
+    ("off_the_array", &[LOW, MORE, LESS, "object.centre_x_mm=3", HUNTS]),
+    ("paper_cup", &[LOW, MORE, LESS, "effects.breakable_object.force_n=0.1", HEAVY]),
+    ("raspberry", &[LOW, MORE, LESS, "effects.breakable_object.force_n=0.9", "controller.encoder_counts_per_turn=800"]),
+    ("slip_and_recovery", &[LOW, "effects.tangential.still=5", "host.read_ms=20", "effects.tangential.drift_mm_per_s=20", "effects.tangential.drift_mm_per_s=1", HUNTS]),
+    ("soft_ball", &[LOW, MORE, LESS, "effects.object_stiffness.yield_mm_per_n=0.2", "effects.object_stiffness.yield_mm_per_n=1", HUNTS]),
+    ("step_ladder", &[LOW, "controller.inertia_ug_m2=20", "controller.inertia_ug_m2=300", "motor.inertia_g_cm2=0.2", "controller.modulus_pa=100000", "controller.modulus_pa=40000", "controller.force_max_mn=50", HUNTS]),
+    ("tilted_plane", &[LOW, LESS, MORE, "object.centre_x_mm=7", "effects.tilted_plane.along_columns_deg=0.5", HUNTS]),
+    ("wall", &[MORE, LESS, HUNTS]),
+    ("worn_sensor", &[LOW, MORE, LESS, "effects.broken_taxels.dead=[]", "effects.creep.rate_percent_per_decade=0", "effects.noise.rms_codes=7", "controller.encoder_counts_per_turn=700"]),
+];
+
+/// The sides of a scene's bounds that are not broken by any of the keys set. A metric that is missing breaks none here,
+/// and a finger that stopped with a fault breaks only that it must not.
+fn unbroken(name: &str, keys: &[&str]) -> BTreeSet<(String, &'static str)> {
+    let sides = |verdict: &Verdict| {
+        let Verdict { bound: Bound { metric, min, .. }, value, max, .. } = verdict;
+        let held = [
+            (min.is_some(), "min", value.is_some_and(|value| min.is_some_and(|min| value < min))),
+            (max.is_some(), "max", value.is_some_and(|value| max.is_some_and(|max| value > max))),
+        ];
+        let metric = metric.clone();
+        held.into_iter().filter(|(is, ..)| *is).map(move |(_, side, broken)| ((metric.clone(), side), broken))
+    };
+    let mut all = BTreeSet::new();
+    let mut broken = BTreeSet::new();
+    for key in keys {
+        let outcome = run(&scene(name, &[key], None), &native::board, &mut []).expect("it runs");
+        let stopped = outcome.measured.get("faults_count") != Some(0.0);
+        for (side, breaks) in outcome.verdicts.iter().flat_map(sides) {
+            all.insert(side.clone());
+            broken.extend((breaks && (!stopped || side.0 == "faults_count")).then_some(side));
+        }
+    }
+    all.difference(&broken).cloned().collect()
+}
+
+#[test]
+fn each_bound_of_the_library_breaks_on_either_side_when_something_is_wrong() {
+    let names: Vec<&str> = BREAKERS.iter().map(|(name, _)| *name).collect();
+    assert_eq!(names, library::names().expect("the library is there"));
+    cores::map(BREAKERS, |(name, keys)| assert_eq!(unbroken(name, keys), BTreeSet::new(), "{name}"));
+}
+
+#[test]
+fn the_page_of_scenes_shows_the_wall_as_it_is() {
+    let page = include_str!("../../../../docs/scenes.md");
+    let wall = include_str!("../../scenes/wall.toml");
+    assert!(page.contains(wall) && wall.lines().count() <= 25);
+}
+
+/// The first of the many seeds for which these scenes hold; `cargo xtask sweep` runs them all.
+#[test]
+fn what_depends_on_chance_holds_for_more_than_one_seed() {
+    let broken: Vec<String> = ["raspberry", "grasp", "slip_and_recovery", "noisy_supply", "paper_cup", "worn_sensor"]
+        .into_iter()
+        .flat_map(|name| (1..=10).flat_map(move |seed| broken(name, Some(seed))))
+        .collect();
+    assert!(broken.is_empty(), "{broken:#?}");
+}
+
+#[test]
+fn the_library_shows_every_effect() {
+    let everything = scene("everything", &[], None);
+    let named: Vec<&str> = everything.effects.iter().map(|named| named.effect.name).collect();
+    let missing: Vec<&str> =
+        registry::all().map(|effect| effect.name).filter(|effect| !named.contains(effect)).collect();
+    assert!(missing.is_empty(), "everything.toml does not name {missing:?}");
+}
+
+/// Readings of the array at the end of each hold of the compression test.
+#[derive(Default)]
+struct Gauge {
+    until_s: Vec<f64>,
+    shown: Vec<Shown>,
+}
+
+struct Shown {
+    depth_mm: f64,
+    sensed_n: f64,
+    kpa: [[f64; COLUMNS]; ROWS],
+}
+
+impl Watch for Gauge {
+    fn step(&mut self, step: &Step) {
+        if self.until_s.first().is_some_and(|until_s| step.time_s >= *until_s) {
+            self.until_s.remove(0);
+            let net = |row, column| {
+                let codes = |slot| f64::from(step.frame.code(slot, column));
+                // By the scene's array: 40 codes of preload, 24 codes for each kPa.
+                (codes(row) - codes(SLOTS - 1) - 40.0) / 24.0
+            };
+            self.shown.push(Shown {
+                depth_mm: step.truth.indentation_mm,
+                sensed_n: step.status.contact.force.0.to_num(),
+                kpa: core::array::from_fn(|row| core::array::from_fn(|column| net(row, column))),
+            });
+        }
+    }
+}
+
+#[test]
+fn figures_10_and_11_of_the_paper_come_out_of_the_compression_test() {
+    const PARTS: usize = 40;
+    let (a, modulus_kpa) = (10.0_f64, 250.0);
+    let mut gauge = Gauge { until_s: vec![0.399, 0.649, 0.899], shown: Vec::new() };
+    native::simulate(&scene("compression", &[], None), &mut gauge).expect("it runs");
+    assert_eq!(gauge.shown.len(), 3);
+    for (shown, asked_mm) in gauge.shown.iter().zip([1.0, 2.0, 3.0]) {
+        let d = shown.depth_mm;
+        assert!((d - asked_mm).abs() < 0.005, "{d} mm instead of {asked_mm}");
+        // Figure 11: F = pi Y d^2, here read off the array.
+        let force_n = core::f64::consts::PI * modulus_kpa * 1e-3 * d * d;
+        let off = shown.sensed_n / force_n - 1.0;
+        assert!(off.abs() < 0.01, "{} N instead of {force_n} at {d} mm", shown.sensed_n);
+        // Figure 10: each taxel's mean of p = Y (1 - (a - d) / sqrt(a^2 - r^2)), 0 beyond the rim.
+        let pressure =
+            |x: f64, y: f64| modulus_kpa * (1.0 - (a - d) / (a * a - x * x - y * y).max(1.0).sqrt()).max(0.0);
+        for (row, column) in (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column))) {
+            let place = |taxel: usize, part: usize| 1.5 * (taxel as f64 - 5.0 + (part as f64 + 0.5) / PARTS as f64);
+            let points =
+                (0..PARTS * PARTS).map(|point| pressure(place(column, point % PARTS), place(row, point / PARTS)));
+            let mean = points.sum::<f64>() / (PARTS * PARTS) as f64;
+            let kpa = shown.kpa[row][column];
+            assert!((kpa - mean).abs() < 0.1, "{kpa} kPa instead of {mean} at row {row}, column {column}, {d} mm deep");
+        }
+    }
+}

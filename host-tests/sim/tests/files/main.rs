@@ -1,0 +1,55 @@
+//! Texts that are read and files that are written: scenes and populations, the library, reports, recordings, sweeps.
+
+mod demo;
+mod draws;
+mod interrupted;
+mod library;
+mod mistakes;
+mod population;
+mod promises;
+mod reader;
+mod recorded;
+mod refused;
+mod report;
+mod response;
+mod swept;
+
+use fingertip::command::Command;
+use fingertip::frame::Sense;
+use fingertip::pipeline::Status;
+use fingertip::shipped::Frame;
+use sim::metrics::Meter;
+use sim::scene::Scene;
+use sim::watch::{Step, Truth, Watch};
+use std::fs;
+use std::path::PathBuf;
+
+/// A wall with one effect.
+const WALL: &str = concat!(env!("FINGERTIP_ROOT"), "/host-tests/sim/tests/files/wall.toml");
+
+/// Reads a scene: a file, or a name of the library.
+fn scene(name: &str, keys: &[&str], seed: Option<u64>) -> Scene {
+    let keys: Vec<String> = keys.iter().map(|key| (*key).into()).collect();
+    sim::cli::load(name, &keys, seed).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// An empty folder.
+fn folder(name: &str) -> PathBuf {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+fn wall() -> Scene {
+    scene(WALL, &[], None)
+}
+
+/// Adds a step of a constructed finger to a meter.
+fn observe(meter: &mut Meter, finger: usize, time_s: f64, command: &Command, status: &Status, truth: &Truth) {
+    let (frame, sense) = (&Frame::EMPTY, &Sense::default());
+    meter.step(&Step { finger, time_s, frame, sense, command, status, truth });
+}
+
+/// CRC of the files that are written.
+const CRC: crc::Crc<u64> = crc::Crc::<u64>::new(&crc::CRC_64_XZ);

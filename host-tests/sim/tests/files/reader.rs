@@ -1,0 +1,230 @@
+//! Reader of scenes: any text gives a scene, or errors with places inside the text; none causes a panic. Also the rules
+//! for the keys of the tables and of the effects.
+
+use fastrand::Rng;
+use fingertip::params::Params;
+use sim::cli::load;
+use sim::events::{EVENT, KINDS};
+use sim::scene::tables::{EXPECT, Key, Kind, ROOT, SCRIPT, TABLES};
+use sim::scene::text::{self, set};
+use sim::scene::{self, Scene, SceneErrors, read};
+use sim::{metrics, registry};
+use std::collections::BTreeSet;
+
+/// Names and texts of the library.
+fn library() -> Vec<(String, String)> {
+    let names = scene::library::names().unwrap();
+    names.into_iter().map(|name| (name.clone(), scene::library::text(&name).unwrap().1)).collect()
+}
+
+fn read_it(text: &str) -> Result<Scene, SceneErrors> {
+    read("my.toml", text, &metrics::names())
+}
+
+/// Scene of a text, preceded by the keys that every scene needs.
+fn scene(text: &str) -> Scene {
+    read_it(&format!("about = \"\"\nduration_s = 1\n{text}")).unwrap_or_else(|errors| panic!("{errors}"))
+}
+
+#[test]
+fn every_scene_reads_and_writes_the_same() {
+    let event = "about = \"\"\nduration_s = 1\n[[event]]\nkind = \"encoder_slip\"\nat_s = 0.5\nby_counts = -4\n";
+    for (name, text) in library().into_iter().chain([("event".into(), event.into())]) {
+        let once = read_it(&text).unwrap_or_else(|errors| panic!("{name}: {errors}"));
+        let written = text::write(&once);
+        let again = read_it(&written).unwrap_or_else(|errors| panic!("{name}: {errors}"));
+        assert_eq!(text::write(&again), written);
+        let named = |scene: &Scene| {
+            scene.effects.iter().map(|named| (named.effect.name, named.values.clone())).collect::<Vec<_>>()
+        };
+        assert_eq!(named(&again), named(&once));
+        assert_eq!((again.tables, again.script), (once.tables, once.script));
+        assert_eq!((again.events, again.bounds), (once.events, once.bounds));
+        assert_eq!((again.seed, again.duration_s, again.about), (once.seed, once.duration_s, once.about));
+    }
+}
+
+#[test]
+fn a_goal_may_come_as_an_inline_table_and_at_the_same_time_as_another() {
+    let scene = scene("script = [{ at_s = 1, goal_n = 1.5 }, { at_s = 1, goal_n = 0 }]\n");
+    assert_eq!(scene.script.iter().map(|event| event.goal_n).collect::<Vec<_>>(), [1.5, 0.0]);
+    assert_eq!(scene.table("tip").number("radius_mm"), 10.0);
+}
+
+#[test]
+fn the_controller_knows_the_finger_unless_told_otherwise() {
+    let params = |tables: &str| scene(tables).params();
+    // The reference finger without effects, and with its direction confirmed.
+    assert_eq!(
+        params(""),
+        Params { row_sag_ppb_per_code: 0, friction_unm: 0, direction_confirmed: 1, ..Params::DEFAULT }
+    );
+    assert_eq!(params("[effects.row_sag]").row_sag_ppb_per_code, Params::DEFAULT.row_sag_ppb_per_code);
+    assert_eq!(params("[tip]\nmodulus_kpa = 400.5").modulus_pa, 400_500);
+    assert_eq!(params("[tip]\nmodulus_kpa = 400\n[controller]\nmodulus_pa = 250000").modulus_pa, 250_000);
+}
+
+#[rustfmt::skip]
+const TOKENS: &[&str] = &[
+    "about", "duration_s", "seed", "tip", "effects", "effects.noise", "script", "expect", "controller", "object",
+    "rms_codes", "at_s", "goal_n", "metric", "min", "max", "radius_mm", "dead", "[", "]", "[[", "]]", "{", "}", "=",
+    ".", ",", "\n", "\n", "\n", " ", "\t", "\"", "'", "\"\"\"", "#", "1", "-1", "0.5", "1e308", "1e400", "nan",
+    "-inf", "0x10", "true", "1979-05-27", "\"x\"", "peak_force_n", "\u{feff}", "\r\n", "\0", "ü", "\u{1F600}",
+    "\\u12", "9223372036854775808",
+];
+
+fn answers(text: &str) {
+    if let Err(errors) = read_it(text) {
+        assert!(!errors.0.is_empty(), "refused without a reason:\n{text}");
+        for error in &errors.0 {
+            assert!(error.line >= 1 && error.line <= text.lines().count().max(1) + 1, "{error}");
+            assert!(error.column >= 1);
+        }
+        let _ = errors.to_string();
+    }
+}
+
+#[test]
+fn any_tokens_are_answered() {
+    let mut rng = Rng::with_seed(1);
+    for _ in 0..20_000 {
+        let text: String = (0..rng.usize(0..30)).map(|_| TOKENS[rng.usize(0..TOKENS.len())]).collect();
+        answers(&text);
+    }
+}
+
+#[test]
+fn any_change_to_a_scene_is_answered() {
+    let mut rng = Rng::with_seed(2);
+    let scenes = library();
+    for _ in 0..10_000 {
+        let mut text: Vec<char> = scenes[rng.usize(0..scenes.len())].1.chars().collect();
+        for _ in 0..rng.usize(1..4) {
+            let at = rng.usize(0..text.len());
+            match rng.u8(0..3) {
+                0 => drop(text.drain(at..(at + rng.usize(1..10)).min(text.len()))),
+                1 => {
+                    let token = TOKENS[rng.usize(0..TOKENS.len())].chars();
+                    text.splice(at..at, token).for_each(drop);
+                }
+                _ => text[at] = char::from(rng.u8(0..128)),
+            }
+        }
+        answers(&text.into_iter().collect::<String>());
+    }
+}
+
+#[test]
+fn any_setting_is_answered() {
+    let mut rng = Rng::with_seed(3);
+    let scenes = library();
+    for _ in 0..5_000 {
+        let mut some = |most| (0..rng.usize(0..most)).map(|_| TOKENS[rng.usize(0..TOKENS.len())]).collect::<String>();
+        let (place, value) = (some(5), some(3));
+        if let Ok(changed) = text::set(&scenes[0].1, &place, &value) {
+            answers(&changed);
+        }
+    }
+}
+
+/// Plain numbers that have no unit.
+#[rustfmt::skip]
+const PLAIN: &[&str] = &[
+    "seed", "ratio", "efficiency", "bits", "min", "max", "fingers", "share", "chip_share", "left", "still",
+    "slipping", "teeth", "grip_friction", "row", "column", "factor", "fit_level",
+];
+
+fn described() -> Vec<(&'static str, &'static Key)> {
+    let tables =
+        TABLES.iter().chain([&ROOT, &SCRIPT, &EVENT, &EXPECT]).chain(&KINDS).map(|table| (table.name, table.keys));
+    let effects = registry::all().map(|effect| (effect.name, effect.keys));
+    tables.chain(effects).flat_map(|(name, keys)| keys.iter().map(move |key| (name, key))).collect()
+}
+
+#[test]
+fn every_quantity_ends_with_its_unit() {
+    let mut without = Vec::new();
+    for (table, key) in described() {
+        // Those of the controller are the firmware's, which has its own.
+        let quantity = matches!(key.kind, Kind::Number { .. } | Kind::Whole { .. } | Kind::Optional { .. });
+        let plain = !quantity || PLAIN.contains(&key.name) || table == "controller";
+        without.extend((!plain && key.unit().is_none()).then_some((table, key.name)));
+    }
+    assert!(without.is_empty(), "these have no unit: {without:?}");
+}
+
+/// The unit that is shown is the whole one: the word in front of it is no unit that is not known.
+#[test]
+fn no_unit_is_cut_short() {
+    const SHORT: [&str; 36] = [
+        "at", "axis", "by", "dead", "drop", "fast", "for", "from", "gain", "gear", "goal", "grip", "hold", "inl",
+        "lift", "lost", "mass", "max", "min", "most", "off", "on", "play", "rate", "read", "rms", "rows", "sag",
+        "slew", "step", "tau", "time", "to", "x", "y", "zero",
+    ];
+    const RATES: [&str; 4] = ["curvature", "magnet", "max", "rate"];
+    for (table, key) in described() {
+        let (unit, label) = (key.unit(), output::units::label(key.name));
+        let word = label.split(',').next().and_then(|words| words.rsplit(' ').next()).unwrap_or_default();
+        let known = match &unit {
+            None => !key.name.contains("_per_"),
+            Some(unit) if unit.starts_with("1/") => RATES.contains(&word),
+            Some(_) => word.is_empty() || word.len() > 4 || SHORT.contains(&word),
+        };
+        assert!(known, "{table}: {} in {unit:?}", key.name);
+    }
+}
+
+#[test]
+fn every_default_lies_within_its_range_and_every_key_says_what_it_is() {
+    for (table, key) in described() {
+        assert!(key.about.trim().len() > 3 && key.about.trim().ends_with('.'), "{table}: {}", key.name);
+        let fits = match key.kind {
+            Kind::Number { min, max, default } => (min..=max).contains(&default.unwrap_or(min)),
+            Kind::Whole { min, max, default } => (min..=max).contains(&default.unwrap_or(min)),
+            Kind::Word { words, default } => default.is_none_or(|default| words.contains(&default)),
+            Kind::Optional { min, max, .. } => min <= max,
+            Kind::Text | Kind::Pairs { .. } => true,
+        };
+        assert!(fits, "{table}: {}", key.name);
+    }
+}
+
+#[test]
+fn every_effect_is_described_and_no_name_comes_twice() {
+    let distinct = |names: Vec<&str>| BTreeSet::from_iter(names.iter().copied()).len() == names.len();
+    assert!(distinct(registry::all().map(|effect| effect.name).collect()));
+    for effect in registry::all() {
+        assert!(distinct(effect.keys.iter().map(|key| key.name).collect()), "{}", effect.name);
+        assert!(!effect.equations.is_empty() && !effect.state.is_empty() && !effect.reference.is_empty());
+    }
+}
+
+const SCENE: &str = "about = \"a\" # kept\nduration_s = 1.0\n[[script]]\nat_s = 0 # kept too\ngoal_n = 1\n[[script]]\nat_s = 0.5\ngoal_n = 2\n";
+
+#[test]
+fn what_is_set_is_read_and_comments_stay() {
+    let text = set(SCENE, "script.1.goal_n", "3.5").unwrap();
+    let text = set(&text, "seed", "9").unwrap();
+    let text = set(&text, "duration_s", "2").unwrap();
+    let text = set(&text, "effects.noise.rms_codes", "4").unwrap();
+    let text = set(&text, "tip.modulus_kpa", "300").unwrap();
+    assert!(text.contains("about = \"a\" # kept\n") && text.contains("at_s = 0 # kept too\n"), "{text}");
+    let scene = read_it(&text).unwrap_or_else(|errors| panic!("{errors}"));
+    assert_eq!((scene.seed, scene.duration_s, scene.script[1].goal_n), (9, 2.0, 3.5));
+    assert_eq!(scene.effects[0].values.number("rms_codes"), 4.0);
+    assert_eq!(scene.table("tip").number("modulus_kpa"), 300.0);
+}
+
+#[test]
+fn what_cannot_be_set_is_told() {
+    for (place, value) in
+        [("script.2.goal_n", "1"), ("tip.1.x", "1"), ("about.x", "1"), ("", "1"), ("seed", "1 2"), ("seed", "")]
+    {
+        assert!(set(SCENE, place, value).is_err(), "{place} = {value}");
+    }
+    let error = |set: &str| load("wall", &[set.into()], None).expect_err("a mistake");
+    assert!(error("tip.radius = 3").contains("did you mean `radius_mm`?"));
+    assert!(error("tip.radius_mm").contains("TABLE.KEY=VALUE"));
+    assert!(load("wal", &[], None).expect_err("no scene").contains("did you mean `wall`?"));
+    assert_eq!(load("wall", &[], Some(12)).unwrap().seed, 12);
+}

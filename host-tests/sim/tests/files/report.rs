@@ -1,0 +1,241 @@
+//! Results of a run: metrics, bounds, ablation, report. `cargo xtask test` shows the report in a browser; here it is text.
+
+use crate::{WALL, observe, scene, wall};
+use fingertip::command::Command;
+use fingertip::config::newtons;
+use fingertip::pipeline::Status;
+use fingertip::state::Fault;
+use sim::metrics::{self, METRICS, Meter, Verdict};
+use sim::native;
+use sim::report::{Over, Report, Trace, page};
+use sim::run::{self, Outcome, Without, run};
+use sim::scene::{Bound, Scene};
+use sim::watch::Truth;
+use std::collections::BTreeSet;
+
+#[test]
+fn every_metric_has_a_name_with_a_unit_and_stands_once() {
+    let units =
+        ["n", "mn", "ms", "mm", "mm_per_s", "percent", "count", "um", "number", "j", "a", "c", "dropped", "broken"];
+    let names = metrics::names();
+    assert_eq!(names.len(), 3 * METRICS.len());
+    assert_eq!(names.iter().collect::<BTreeSet<_>>().len(), names.len());
+    for name in names {
+        assert!(units.iter().any(|unit| name.ends_with(&format!("_{unit}")) || name.ends_with(unit)), "{name}");
+    }
+    assert_eq!(metrics::page().lines().count(), 2 + METRICS.len());
+}
+
+#[test]
+fn the_wall_is_measured() {
+    let scene = wall();
+    let outcome = run(&scene, &native::board, &mut []).unwrap();
+    let value = |name: &str| outcome.measured.get(name).unwrap_or_else(|| panic!("no {name}"));
+    for (name, range) in [
+        ("peak_force_n", 0.99..1.05),
+        ("overshoot_percent", 0.0..5.0),
+        ("approach_mm_per_s", 29.0..31.0),
+        ("touch_ms", 160.0..220.0),
+        ("settling_ms", 1.0..30.0),
+        ("steady_error_max_mn", 0.01..10.0),
+        ("steady_error_rms_mn", 0.0..value("steady_error_max_mn") * (1.0 + 1e-12)),
+        ("energy_j", 0.001..0.2),
+        ("confidence_min_percent", 50.1..f64::INFINITY),
+    ] {
+        assert!(range.contains(&value(name)), "{name}: {}", value(name));
+    }
+    assert_eq!(value("finger0.peak_force_n"), value("peak_force_n"));
+    let exact = ["faults_count", "missed_frames_count", "winding_max_c"].map(value);
+    assert_eq!(exact, [0.0, 0.0, 25.0]);
+    assert!(outcome.measured.get("fault_ms").is_none() && outcome.measured.get("slip_noticed_ms").is_none());
+    assert!(outcome.passed(), "{}", outcome.text());
+}
+
+#[test]
+fn of_two_fingers_faults_the_first_in_time_is_the_scenes() {
+    // Fault of each finger and its time, if there is one.
+    let measure = |fingers: [Option<(Fault, f64)>; 2]| {
+        let mut meter = Meter::default();
+        for (finger, tenth) in (0..10).flat_map(|tenth| [(0, tenth), (1, tenth)]) {
+            let time_s = f64::from(tenth) * 0.1;
+            let fault = fingers[finger].filter(|(_, at_s)| time_s >= *at_s).map(|(fault, _)| fault);
+            let status = Status { fault, ..Status::default() };
+            observe(&mut meter, finger, time_s, &Command::default(), &status, &Truth::default());
+        }
+        let measured = meter.measured();
+        ["fault_number", "fault_ms", "faults_count"].map(|name| measured.get(name))
+    };
+    let (low, high) = (Fault::ArrayBroken, Fault::SupplyLow);
+    let number = |fault: Fault| Some(f64::from(fault as u8));
+    assert!(number(low) < number(high));
+    for (first, second) in [(low, high), (high, low)] {
+        let expected = [number(first), Some(1e3 * 0.3), Some(2.0)];
+        let close = |measured: [Option<f64>; 3]| {
+            measured.iter().zip(expected).all(|(a, b)| (a.unwrap() - b.unwrap()).abs() < 1e-9)
+        };
+        assert!(close(measure([Some((first, 0.25)), Some((second, 0.6))])));
+        assert!(close(measure([Some((second, 0.6)), Some((first, 0.25))])));
+    }
+    let alone = measure([None, Some((high, 0.25))]);
+    assert!(alone[0] == number(high) && alone[1].is_some() && alone[2] == Some(1.0), "{alone:?}");
+    assert_eq!(measure([None, None]), [Some(0.0), None, Some(0.0)]);
+}
+
+/// As for a bound that does not grow with the goal: a missing value of one finger is not replaced by that of the other.
+#[test]
+fn of_two_fingers_one_without_a_value_breaks_what_grows_with_the_goal() {
+    let mut meter = Meter::default();
+    // Only the first has a goal.
+    for (step, (finger, goal_mn)) in (0..600).flat_map(|step| [(step, (0, 1_000)), (step, (1, 0))]) {
+        let command = Command { goal: newtons(goal_mn), ..Command::default() };
+        let truth = Truth { force_n: f64::from(goal_mn) * 1e-3, ..Truth::default() };
+        observe(&mut meter, finger, f64::from(step) * 1e-3, &command, &Status::default(), &truth);
+    }
+    let bound = |metric: &str| Bound { metric: metric.into(), min: None, max: Some(50.0), max_per_goal_n: Some(100.0) };
+    let bounds = ["hold_swing_mn", "finger0.hold_swing_mn", "finger1.hold_swing_mn"].map(bound);
+    let verdicts = meter.verdicts(&bounds);
+    let values: Vec<_> = verdicts.iter().map(|verdict| (verdict.value, verdict.held)).collect();
+    assert_eq!(values, [(None, false), (Some(0.0), true), (None, false)]);
+}
+
+#[test]
+fn a_bound_breaks_on_either_side_and_without_a_value() {
+    let mut scene = wall();
+    let bound = |metric: &str, min, max| Bound { metric: metric.into(), min, max, max_per_goal_n: None };
+    scene.bounds = vec![
+        bound("peak_force_n", Some(1.2), None),
+        bound("peak_force_n", None, Some(0.9)),
+        bound("peak_force_n", Some(0.9), Some(1.2)),
+        bound("slip_noticed_ms", None, Some(10.0)),
+    ];
+    let outcome = run(&scene, &native::board, &mut []).unwrap();
+    let held: Vec<bool> = outcome.verdicts.iter().map(|verdict| verdict.held).collect();
+    assert_eq!(held, [false, false, true, false]);
+    assert!(!outcome.passed());
+    let text = outcome.text();
+    assert!(text.contains("BROKEN peak_force_n") && text.contains("1.2 or more asked"), "{text}");
+    let json = outcome.json(&scene, "native", &[]);
+    assert_eq!(json["passed"], false);
+    assert_eq!(json["bounds"][3]["value"], serde_json::Value::Null);
+    assert_eq!(json["ledger"][0]["effect"], "row_sag");
+    assert_eq!(json["seed"], 1);
+}
+
+#[test]
+fn an_ablation_shows_what_an_effect_changes() {
+    let scene = wall();
+    let whole = run(&scene, &native::board, &mut []).unwrap();
+    let ablated = run::ablate(&scene, &native::board).unwrap();
+    assert_eq!(ablated.iter().map(|without| without.effect).collect::<Vec<_>>(), ["row_sag"]);
+    let rows = run::differences(&whole.measured, &ablated);
+    assert!(rows.iter().any(|(name, ..)| *name == "force_error_rms_mn"));
+    assert!(rows.iter().all(|(name, ..)| *name != "winding_max_c"));
+    let text = run::ablation_text(&whole.measured, &ablated);
+    assert!(text.contains("row_sag") && text.contains("force_error_rms_mn"), "{text}");
+}
+
+#[test]
+fn values_are_shown_with_the_digits_that_count() {
+    let values = [Some(0.0), Some(1.0), Some(1.234_567_8), Some(-123_456.7), Some(1.234_567e-4), None];
+    assert_eq!(values.map(metrics::shown), ["0", "1", "1.2346", "-123457", "0.00012346", "none"]);
+}
+
+/// Library that draws the plots, after its licence.
+const LIBRARY: &str =
+    include_str!(concat!(env!("FINGERTIP_ROOT"), "/host-tests/sim/src/report/uplot/uPlot.iife.min.js"));
+
+/// Runs a scene with its trace.
+fn traced(scene: &Scene) -> (Trace, Outcome) {
+    let mut trace = Trace::new(scene.duration_s);
+    let outcome = run(scene, &native::board, &mut [&mut trace]).unwrap();
+    (trace, outcome)
+}
+
+/// Report of a run.
+pub fn written(scene: &Scene, (trace, outcome): &(Trace, Outcome), ablated: &[Without], over: Option<&Over>) -> String {
+    page(&Report { scene, board: "native", outcome, trace, ablated, over }).unwrap()
+}
+
+#[test]
+fn a_report_stands_alone_and_has_every_part() {
+    let mut scene = wall();
+    scene.about = "A <b>wall</b> & more".into();
+    let ran = traced(&scene);
+    let page = written(&scene, &ran, &run::ablate(&scene, &native::board).unwrap(), None);
+    for part in ["bounds", "plots", "metrics", "ledger", "ablation", "scene"] {
+        assert!(page.contains(&format!("<section id=\"{part}\">")), "{part}");
+    }
+    assert!(page.contains("A &lt;b&gt;wall&lt;/b&gt; &amp; more") && !page.contains("<b>wall"));
+    assert!(page.contains("Simulated") && page.contains("row_sag") && page.contains("[[expect]]"));
+    // The control error is drawn to the scale of the holds: the approach is off by the whole goal.
+    let plots = &ran.0.fingers[0];
+    let [[low, high], held] = [&plots.control_error, &plots.held_error].map(|track| track.ends().unwrap());
+    assert!(low < -900.0 && high < 100.0 && held[0] > -50.0 && held[1] < 50.0, "{low} to {high}, held {held:?}");
+    assert!(page.contains("the axis fits the holds"));
+    // Nothing is fetched, and nothing may be: the only addresses are XML's names, and the library's of itself.
+    assert!(page.contains("content=\"default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'\""));
+    assert_eq!(page.matches(LIBRARY).count(), 1);
+    let fetched = page.replace(LIBRARY, "").replace("http://www.w3.org/2000/svg", "");
+    for address in ["http:", "https:", "src=", "href=", "url(", "@import"] {
+        assert!(!fetched.contains(address), "{address}");
+    }
+    // Every picture has a description.
+    let pictures: Vec<&str> = page.split(" role=\"img\"").skip(1).collect();
+    assert!(pictures.len() > 20, "{} pictures", pictures.len());
+    assert!(pictures.iter().all(|tag| tag.split('>').next().unwrap().contains(" aria-label=\"")));
+    assert_eq!(page.matches("Pressure map at").count(), 10);
+    assert_eq!(plots.instants.len(), 150);
+    assert!(plots.instants.iter().any(|at| at.true_kpa.iter().flatten().any(|kpa| *kpa > 10.0)));
+    assert!(plots.instants.iter().any(|at| at.codes.iter().flatten().any(|code| *code > 100)));
+    // Stretches and maps bound its size for any length of a run.
+    assert!(page.len() < 1_000_000, "{} bytes", page.len());
+}
+
+#[test]
+fn what_is_broken_comes_first_and_the_rest_is_folded() {
+    let scene = scene(WALL, &["duration_s=0.05"], None);
+    assert_eq!(scene.set, ["duration_s=0.05"]);
+    let mut ran = traced(&scene);
+    let held = Verdict { held: true, ..ran.1.verdicts[0].clone() };
+    let mut broken = Verdict { held: false, ..held.clone() };
+    broken.bound.metric = "energy_j".into();
+    ran.1.verdicts = vec![held, broken];
+    let page = written(&scene, &ran, &[], None);
+    let at = |part: &str| page.find(part).unwrap_or_else(|| panic!("no {part}"));
+    assert!(at("<code>duration_s=0.05</code>") < at("1 of 2 bounds broken"));
+    assert!(at("1 of 2 bounds broken") < at("<code>energy_j</code>"));
+    assert!(at("<code>energy_j</code>") < at("<details><summary>1 held</summary>"));
+    let groups: Vec<&str> = page.split("<details class=\"group\"").skip(1).collect();
+    assert!(groups.len() > 4 && groups[0].starts_with(" open><summary>Motor and energy"), "{}", &groups[0][..80]);
+    assert!(groups[1..].iter().all(|group| group.starts_with("><summary>")));
+}
+
+#[test]
+fn a_report_lies_over_another_whatever_the_scenes_are_called() {
+    let mut scene = wall();
+    scene.name = "</script><script>alert(1)</script><!--".into();
+    scene.about = scene.name.clone();
+    let ran = traced(&scene);
+    let alone = written(&scene, &ran, &[], None);
+    // Its data, the library, the scripts of the page.
+    assert_eq!((alone.matches("<script").count(), alone.matches("</script>").count()), (3, 3));
+    let over = Over::of(&alone).unwrap();
+    let both = written(&scene, &ran, &[], Some(&over));
+    assert_eq!((both.matches("<script").count(), both.matches("</script>").count()), (4, 4));
+    assert!(!both.contains("<!--"));
+    // The page holds the data of the other run unchanged.
+    let data =
+        |page: &str, begin: &str| page.split_once(begin).unwrap().1.split_once("</script>").unwrap().0.to_owned();
+    let [own, other] =
+        ["run", "over"].map(|id| data(&both, &format!("<script type=\"application/json\" id=\"{id}\">")));
+    assert_eq!(own, other);
+    for (wrong, why) in [
+        ("<p>a page</p>".to_owned(), "no report"),
+        (alone.split_at(alone.find("\"fingers\"").unwrap() + 20).0.to_owned(), "cut off"),
+        (alone.replace("id=\"run\">{", "id=\"run\">{{"), "damaged"),
+        (alone.replace("\"format\":1,", "\"format\":99,"), "format 99, not 1"),
+    ] {
+        let error = Over::of(&wrong).unwrap_err();
+        assert!(error.contains(why) && error.contains("--out"), "{error}");
+    }
+}

@@ -1,0 +1,196 @@
+//! A goal of 0 must release the object after any other request. Also torque off and on while the tip moves.
+
+use crate::{
+    CONTACT_ON_N, Case, Finger, LOSSES, finger, interrupt_torque, judge, log_uniform, most_n, object, press, set_goal,
+    touch, uniform,
+};
+use fastrand::Rng;
+use fingertip::measure::Task;
+use fingertip::params::Params;
+use fingertip::state::{Fault, Mode};
+use sim::cores;
+
+/// Time within which a goal of 0 releases an object of this compliance. In a very soft object the tip has several times
+/// the distance to go.
+fn release_s(yield_mm_per_n: f64) -> f64 {
+    if yield_mm_per_n > 1.0 { 0.8 } else { 0.5 }
+}
+
+/// Requests a release, and judges the largest force from the time allowed to 1.5 s after.
+fn case(finger: &mut Finger, yield_mm_per_n: f64, what: String) -> Case {
+    press(finger, 0.0, release_s(yield_mm_per_n));
+    Case::new(what, finger.run(1.5), CONTACT_ON_N)
+}
+
+/// A soft object's compliance, mm/N, the goal, N, and the losses of the drive.
+type Held = (f64, f64, &'static str);
+
+/// These objects and goals, without and with losses.
+fn with_and_without_losses(objects: [(f64, f64); 2]) -> impl Iterator<Item = Held> {
+    objects.into_iter().flat_map(|(yield_mm_per_n, goal_n)| ["", LOSSES].map(|losses| (yield_mm_per_n, goal_n, losses)))
+}
+
+fn drawn(rng: &mut Rng) -> Held {
+    (log_uniform(rng, 0.1, 2.0), uniform(rng, 0.3, 7.0), if rng.bool() { LOSSES } else { "" })
+}
+
+/// Holds the goal for 1 s, lets an interruption happen, and releases.
+fn interrupted((yield_mm_per_n, goal_n, losses): Held, happens: &str, interrupt: impl FnOnce(&mut Finger)) -> Case {
+    let mut finger = finger(&(object(2.5, yield_mm_per_n) + losses));
+    press(&mut finger, goal_n, 1.0);
+    interrupt(&mut finger);
+    case(&mut finger, yield_mm_per_n, format!("{yield_mm_per_n:.3} mm/N, {goal_n:.2} N, {happens}, {losses:?}"))
+}
+
+#[test]
+fn goal_zero_releases_soft_objects_after_a_torque_interruption() {
+    let objects = with_and_without_losses([(0.7, 5.0), (2.0, 7.0)]);
+    let fixed = objects.flat_map(|held| [0.0, 0.01, 0.3].map(|wait_s| (held, 0.01, wait_s)));
+    let drawn = (0..56).map(|seed| {
+        let mut rng = Rng::with_seed(seed);
+        (drawn(&mut rng), uniform(&mut rng, 0.002, 0.06), uniform(&mut rng, 0.0, 0.1))
+    });
+    let cases = cores::map(fixed.chain(drawn).collect::<Vec<_>>(), |(held, off_s, wait_s)| {
+        interrupted(held, &format!("off for {off_s:.4} s, 0 after {wait_s:.3} s"), |finger| {
+            interrupt_torque(finger, off_s);
+            finger.run(wait_s);
+        })
+    });
+    judge("soft objects, torque interrupted", "N", &cases);
+}
+
+/// Goal 0 for the first time, another goal for the second one, and 0 for good.
+#[test]
+fn goal_zero_releases_soft_objects_after_a_goal_interruption() {
+    let fixed = with_and_without_losses([(0.7, 5.0), (1.0, 7.0)]).map(|held| (held, 0.5, [0.003; 2]));
+    let drawn = (100..135).map(|seed| {
+        let mut rng = Rng::with_seed(seed);
+        let held = drawn(&mut rng);
+        (held, uniform(&mut rng, 0.1, 1.0) * held.1, [0; 2].map(|_| log_uniform(&mut rng, 0.001, 0.03)))
+    });
+    let cases = cores::map(fixed.chain(drawn).collect::<Vec<_>>(), |(held, again_n, times_s)| {
+        interrupted(held, &format!("{again_n:.2} N again, {times_s:.4?} s"), |finger| {
+            press(finger, 0.0, times_s[0]);
+            press(finger, again_n, times_s[1]);
+        })
+    });
+    judge("soft objects, goal interrupted", "N", &cases);
+}
+
+/// The surface of a soft object is the travel of the first touch, not the travel to which the object has yielded.
+#[test]
+fn goal_zero_releases_a_soft_object_after_a_press_that_measures() {
+    let cases = cores::map([0.0, 0.3, 0.5, 1.0, 2.0], |yield_mm_per_n| {
+        let mut finger = finger(&(object(3.0, yield_mm_per_n) + LOSSES));
+        finger.run(0.1);
+        finger.request(Task::Press);
+        finger.step();
+        let until_s = finger.time_s() + 12.0;
+        while finger.status().mode == Mode::Press && finger.time_s() < until_s {
+            finger.step();
+        }
+        let what = format!("{yield_mm_per_n} mm/N, then {:?} {:?}", finger.status().mode, finger.status().fault);
+        case(&mut finger, yield_mm_per_n, what)
+    });
+    judge("soft objects, after a press that measures", "N", &cases);
+}
+
+#[test]
+fn goal_zero_releases_a_soft_object_that_moved_while_it_was_held() {
+    let mut tasks = Vec::new();
+    for yield_mm_per_n in [0.3, 0.7, 1.0, 2.0] {
+        tasks.extend([-2.0, -1.0, 1.0, 2.0].map(|by_mm| (yield_mm_per_n, by_mm)));
+    }
+    let cases = cores::map(tasks, |(yield_mm_per_n, by_mm)| {
+        let mut finger = finger(&(object(5.0, yield_mm_per_n) + LOSSES));
+        press(&mut finger, 3.0, 1.0);
+        finger.carry_object(5.0, 5.0 + by_mm, 40.0, |_| {});
+        finger.run(0.3);
+        let what = format!("{yield_mm_per_n} mm/N, moved by {by_mm} mm, {:?}", finger.status().fault);
+        case(&mut finger, yield_mm_per_n, what)
+    });
+    judge("soft objects that moved", "N", &cases);
+}
+
+#[test]
+fn torque_off_just_after_the_touch_does_not_let_the_tip_run_into_the_object() {
+    let mut tasks = Vec::new();
+    for losses in ["", LOSSES] {
+        for goal_n in [0.5, 1.0, 3.0, 7.0] {
+            tasks.extend([1, 2, 4, 6, 8, 10, 12, 14, 17, 20].map(|after_ms| (losses, goal_n, after_ms)));
+        }
+    }
+    let cases = cores::map(tasks, |(losses, goal_n, after_ms)| {
+        let mut finger = finger(&(object(2.0, 0.0) + losses));
+        set_goal(&mut finger, goal_n);
+        touch(&mut finger);
+        let before_n = finger.run(1e-3 * f64::from(after_ms));
+        let peak_n = before_n.max(interrupt_torque(&mut finger, 0.5));
+        let losses = if losses.is_empty() { "no losses" } else { "losses" };
+        Case::new(format!("goal {goal_n} N, off {after_ms} ms after the touch, {losses}"), peak_n, most_n(goal_n))
+    });
+    judge("torque off just after the touch", "N", &cases);
+}
+
+#[test]
+fn torque_off_during_a_release_does_not_let_the_tip_fly_back() {
+    let clearance_mm = f64::from(Params::DEFAULT.clearance_um) * 1e-3;
+    let mut cases = Vec::new();
+    for goal_n in [1.0, 3.0, 7.0] {
+        for after_s in [0.004, 0.012, 0.03, 0.1] {
+            let mut finger = finger(&(object(5.0, 0.0) + LOSSES));
+            press(&mut finger, goal_n, 1.0);
+            let indentation_mm = finger.truth().indentation_mm;
+            press(&mut finger, 0.0, after_s);
+            interrupt_torque(&mut finger, 3.0);
+            let behind_mm = 5.0 - finger.truth().travel_mm;
+            let what = format!("goal {goal_n} N, off {after_s} s after the release began");
+            cases.push(Case::new(what, behind_mm, clearance_mm + indentation_mm + 3.0));
+        }
+    }
+    judge("torque off during a release, behind the surface", "mm", &cases);
+}
+
+/// One press, torque off somewhere in it, and on again while the motor still turns.
+fn restarted(seed: u64) -> Case {
+    let mut rng = Rng::with_seed(seed);
+    let goal_n = uniform(&mut rng, 0.5, 7.0);
+    let mut finger = finger(&(object(uniform(&mut rng, 1.0, 5.0), 0.0) + LOSSES));
+    set_goal(&mut finger, goal_n);
+    let moment = match seed % 4 {
+        0 => {
+            finger.run(uniform(&mut rng, 0.005, 0.03));
+            "in the approach"
+        }
+        1 => {
+            touch(&mut finger);
+            finger.run(uniform(&mut rng, 0.0, 0.02));
+            "after the touch"
+        }
+        2 => {
+            finger.run(0.7);
+            press(&mut finger, 0.0, uniform(&mut rng, 0.002, 0.1));
+            "in the release"
+        }
+        _ => {
+            finger.run(0.7);
+            press(&mut finger, uniform(&mut rng, 0.5, 7.0), uniform(&mut rng, 0.001, 0.02));
+            "between two goals"
+        }
+    };
+    let (speed, off_s) = (finger.truth().speed_mm_per_s, uniform(&mut rng, 0.001, 0.03));
+    interrupt_torque(&mut finger, off_s);
+    let again_n = if rng.bool() { goal_n } else { uniform(&mut rng, 0.5, 7.0) };
+    press(&mut finger, again_n, 0.5);
+    let fault = finger.status().fault;
+    let stopped = matches!(fault, Some(Fault::EncoderFrozen | Fault::Runaway | Fault::Reversed));
+    let what = format!(
+        "{seed}: goal {goal_n:.2} N, off {moment} at {speed:.0} mm/s for {off_s:.4} s, then {again_n:.2} N: {fault:?}"
+    );
+    Case::new(what, f64::from(u8::from(stopped)), 0.0)
+}
+
+#[test]
+fn torque_on_while_the_motor_coasts_is_no_fault() {
+    judge("torque on while the motor coasts", "faults 5, 14 or 15", &cores::map(0..100, restarted));
+}

@@ -1,0 +1,177 @@
+//! Fingers under the controller: unusual orders of events at exact times, contacts that the array measures badly,
+//! measuring motions, worn sensors, heat, and the bus.
+//!
+//! The tests judge the true state of the simulated finger. `cargo test -p sim --profile host --test fingers --
+//! --nocapture` prints the largest value of each group of cases.
+
+mod goals;
+mod instants;
+mod measure;
+mod memory;
+mod ordinary;
+mod sequences;
+mod served;
+mod signal;
+mod worn;
+
+use fastrand::Rng;
+use fingertip::config::newtons;
+use fingertip::params::Params;
+use fingertip::shipped::Frame;
+use images::record::Record;
+use sim::effects::Named;
+use sim::native::bench::Bench;
+use sim::scene::{Scene, read};
+
+/// A finger with the effects that its scene names.
+type Finger = Bench<Named>;
+
+/// Losses of the reference finger of `docs/runs.md`.
+const LOSSES: &str = "[effects.dry_friction]\n[effects.gear_efficiency]\n[effects.supply_sag]\n";
+
+/// Below this force nothing is touched, N.
+const CONTACT_ON_N: f64 = Params::DEFAULT.contact_on_mn as f64 * 1e-3;
+
+/// Speed of the approach, mm/s.
+const APPROACH_MM_PER_S: f64 = Params::DEFAULT.approach_um_per_s as f64 * 1e-3;
+
+/// Largest force allowed after an interruption of a press with this goal, N.
+fn most_n(goal_n: f64) -> f64 {
+    1.3 * goal_n + 0.5
+}
+
+/// Reads a scene from the tables of one finger.
+fn scene(tables: &str) -> Scene {
+    let text = format!("about = \"a finger\"\nduration_s = 1.0\n{tables}\n[[script]]\nat_s = 0.0\ngoal_n = 0.0\n");
+    read("test.toml", &text, &[]).unwrap_or_else(|errors| panic!("{errors}\n{text}"))
+}
+
+/// A finger that is tared; its torque is on from the next frame.
+fn finger(tables: &str) -> Finger {
+    begun(&scene(tables))
+}
+
+/// The same from a scene.
+fn begun(scene: &Scene) -> Finger {
+    let mut finger = Bench::new(scene).unwrap_or_else(|error| panic!("{error}"));
+    finger.tare();
+    finger
+}
+
+/// Tables of an object in front of the tip that yields like a spring.
+fn object(distance_mm: f64, yield_mm_per_n: f64) -> String {
+    format!(
+        "[object]\ndistance_mm = {distance_mm:?}\n[effects.object_stiffness]\nyield_mm_per_n = {yield_mm_per_n:?}\n"
+    )
+}
+
+fn set_goal(finger: &mut Finger, goal_n: f64) {
+    finger.command().goal = newtons((goal_n * 1e3).round() as i32);
+}
+
+/// Sets a goal and steps for a time; returns the largest true force meanwhile, N.
+fn press(finger: &mut Finger, goal_n: f64, seconds: f64) -> f64 {
+    set_goal(finger, goal_n);
+    finger.run(seconds)
+}
+
+/// Turns torque off for a time and on again; returns the largest true force meanwhile, N.
+fn interrupt_torque(finger: &mut Finger, seconds: f64) -> f64 {
+    finger.command().torque = false;
+    let largest_n = finger.run(seconds);
+    finger.command().torque = true;
+    largest_n
+}
+
+/// Steps for a time while the controller is given other records; returns the largest true force meanwhile, N.
+fn run_with(finger: &mut Finger, seconds: f64, change: impl Fn(&mut Record)) -> f64 {
+    let until_s = finger.time_s() + seconds;
+    let mut largest_n: f64 = 0.0;
+    while finger.time_s() < until_s {
+        finger.step_with(&change);
+        largest_n = largest_n.max(finger.truth().force_n);
+    }
+    largest_n
+}
+
+/// Replaces the codes of a frame and keeps its sequence number.
+fn show(record: &mut Record, codes: &Frame) {
+    record.frame = Frame { sequence: record.frame.sequence, ..*codes };
+}
+
+/// Steps until the tip touches.
+fn touch(finger: &mut Finger) {
+    let until_s = finger.time_s() + 2.0;
+    while finger.truth().force_n == 0.0 {
+        assert!(
+            finger.time_s() < until_s,
+            "nothing is touched: {:?} {:?}",
+            finger.status().mode,
+            finger.status().fault
+        );
+        finger.step();
+    }
+}
+
+/// Time from the first frame with torque to the touch of a finger of these tables, s.
+fn touch_s(tables: &str, goal_n: f64) -> f64 {
+    let mut finger = finger(tables);
+    let begun_s = finger.time_s();
+    set_goal(&mut finger, goal_n);
+    touch(&mut finger);
+    finger.time_s() - begun_s
+}
+
+/// A value of one case and the largest one allowed.
+struct Case {
+    what: String,
+    is: f64,
+    most: f64,
+}
+
+impl Case {
+    fn new(what: String, is: f64, most: f64) -> Self {
+        Self { what, is, most }
+    }
+}
+
+/// Prints the case nearest to its bound or farthest beyond it, and fails if any case is beyond its bound.
+fn judge(name: &str, unit: &str, cases: &[Case]) {
+    let worst = cases.iter().max_by(|a, b| (a.is - a.most).total_cmp(&(b.is - b.most))).expect("there are cases");
+    let beyond: Vec<String> = cases
+        .iter()
+        .filter(|case| case.is.is_nan() || case.is > case.most)
+        .map(|case| format!("{}: {:.3} {unit}, {:.3} allowed", case.what, case.is, case.most))
+        .collect();
+    let Case { what, is, most } = worst;
+    println!("{name}: {} of {} beyond; worst {is:.3} {unit}, {most:.3} allowed: {what}", beyond.len(), cases.len());
+    assert!(
+        beyond.is_empty(),
+        "{name}: {} of {} cases are beyond their bounds: {beyond:#?}",
+        beyond.len(),
+        cases.len()
+    );
+}
+
+/// Draws a number from a log-uniform distribution.
+fn log_uniform(rng: &mut Rng, least: f64, most: f64) -> f64 {
+    least * (most / least).powf(rng.f64())
+}
+
+/// Draws a number between two.
+fn uniform(rng: &mut Rng, least: f64, most: f64) -> f64 {
+    least + (most - least) * rng.f64()
+}
+
+/// A text in which each first part is replaced by the second one.
+fn replaced(text: &str, changes: &[(&str, &str)]) -> String {
+    changes.iter().fold(text.to_owned(), |text, (from, to)| {
+        assert!(text.contains(from), "{from}");
+        text.replace(from, to)
+    })
+}
+
+/// A number from the environment, or the usual one.
+fn number(name: &str, usual: u64) -> u64 {
+    std::env::var(name).map_or(usual, |text| text.parse().unwrap_or_else(|_| panic!("{name} of {text} is no number")))
+}

@@ -1,0 +1,289 @@
+//! Measuring motions on drawn fingers: completion, early ends, and bounds of travel, force and time.
+
+use crate::replaced;
+use fingertip::measure::press::ROWS_MAX;
+use fingertip::measure::series::HEAD;
+use fingertip::measure::{Ended, MeasureState, MeasureStatus, Task};
+use fingertip::params::Params;
+use fingertip::shipped::Config;
+use fingertip::state::Fault;
+use sim::cores;
+use sim::effects::{Named, Set};
+use sim::native::bench::Bench;
+use sim::plant::Faults;
+use sim::population::{Finger, read};
+use sim::setup::Setup;
+use solve::record;
+
+/// The tests below with more fingers.
+#[test]
+#[ignore = "long: cargo xtask test --long"]
+fn long_measuring_motions_of_more_fingers() {
+    presses_complete(30);
+    presses_end_within_limits(12);
+    strokes_complete(40);
+    strokes_stop_at_an_object(20);
+}
+
+/// A measuring motion, and the largest true values during it.
+struct Made {
+    status: MeasureStatus,
+    fault: Option<Fault>,
+    rows: u32,
+    record: Vec<u8>,
+    force_n: f64,
+    /// From the place where it began.
+    travel_mm: f64,
+    took_s: f64,
+}
+
+/// Tares and makes a motion; calls `each` after every frame with the time since the request.
+fn make<E: Set>(mut bench: Bench<E>, task: Task, mut each: impl FnMut(&mut Bench<E>, f64)) -> Made {
+    bench.tare();
+    if task == Task::Press {
+        bench.run(0.05);
+    } else {
+        bench.command().torque = false;
+    }
+    let (begun_s, begun_mm) = (bench.time_s(), bench.truth().travel_mm);
+    let (mut force_n, mut travel_mm) = (0.0_f64, 0.0_f64);
+    let status = bench.measure(task, |bench| {
+        let truth = bench.truth();
+        force_n = force_n.max(truth.force_n);
+        travel_mm = travel_mm.max((truth.travel_mm - begun_mm).abs());
+        each(bench, bench.time_s() - begun_s);
+    });
+    let (record, mut rows) = (bench.kept().to_vec(), 0);
+    // A jog keeps no record. The head of the others agrees with how the motion ended.
+    if task != Task::Jog {
+        assert!(record.len() >= HEAD && record.starts_with(b"FTS\x01"), "{} bytes", record.len());
+        assert_eq!(record[7], status.ended as u8);
+        rows = u32::from_le_bytes([record[8], record[9], record[10], record[11]]);
+    }
+    Made { status, fault: bench.status().fault, rows, record, force_n, travel_mm, took_s: bench.time_s() - begun_s }
+}
+
+fn largest(made: &[Made], of: fn(&Made) -> f64) -> f64 {
+    made.iter().map(of).fold(0.0, f64::max)
+}
+
+/// Prints how the motions ended, and their largest values.
+fn print(name: &str, made: &[Made]) {
+    println!("{name}:");
+    for (number, Made { status: MeasureStatus { ended, value, .. }, fault, rows, took_s, .. }) in
+        made.iter().enumerate()
+    {
+        println!("  finger {number}: {ended:?} {value} {fault:?}, {rows} rows in {took_s:.2} s");
+    }
+    let [force_n, travel_mm] = [largest(made, |made| made.force_n), largest(made, |made| made.travel_mm)];
+    println!("  {force_n:.3} N and {travel_mm:.2} mm at most");
+}
+
+/// Fingers of a population.
+fn fingers(text: &str, seed: u64, numbers: impl Iterator<Item = usize>) -> Vec<Finger> {
+    let population = read("drawn.toml", text).unwrap_or_else(|errors| panic!("{errors}"));
+    numbers.map(|number| population.finger(seed, number).unwrap_or_else(|errors| panic!("{errors}"))).collect()
+}
+
+/// Value drawn for a finger under this name, if there is one.
+fn drawn(finger: &Finger, name: &str) -> Option<f64> {
+    finger.drawn.iter().find(|(known, _)| known == name).and_then(|(_, value)| value.number())
+}
+
+/// The tips, with no, one and two dead taxels near the contact in turn.
+fn tips(count: usize, changes: &[(&str, &str)]) -> Vec<Finger> {
+    let text = replaced(include_str!("tips.toml"), changes);
+    let dead = ["[]", "[[4, 5]]", "[[5, 4], [2, 6]]"].iter().enumerate();
+    let tips = dead.flat_map(|(first, dead)| {
+        fingers(&text.replace("dead = []", &format!("dead = {dead}")), 2, (first..count).step_by(3))
+    });
+    tips.collect()
+}
+
+/// Makes a motion with each finger. The object is put where `place_mm` has it, by its distance and the time, s.
+fn make_all(fingers: &[Finger], task: Task, place_mm: Option<fn(f64, f64) -> f64>) -> Vec<Made> {
+    cores::map(fingers, |finger| {
+        let distance_mm = drawn(finger, "object.distance_mm");
+        make(Bench::<Named>::new(&finger.scene).expect("a world"), task, |bench, time_s| {
+            if let (Some(place_mm), Some(distance_mm)) = (place_mm, distance_mm) {
+                bench.place_object(place_mm(distance_mm, time_s));
+            }
+        })
+    })
+}
+
+#[test]
+fn valid_presses_complete() {
+    presses_complete(10);
+}
+
+/// Every press completes and gives a modulus: most within two reported sigmas, and with errors that are not smaller
+/// than noise allows.
+fn presses_complete(count: usize) {
+    let fingers = tips(count, &[]);
+    let made = make_all(&fingers, Task::Press, None);
+    print("presses", &made);
+    let most_n = 1e-3 * f64::from(Params::DEFAULT.force_max_mn) * 1.05;
+    assert!(largest(&made, |made| made.force_n) < most_n);
+    let (mut errors_percent, mut within) = (Vec::new(), 0);
+    for (number, (finger, made)) in fingers.iter().zip(&made).enumerate() {
+        assert!(made.status.state == MeasureState::Done && made.fault.is_none(), "tip {number}");
+        assert!(made.rows <= ROWS_MAX as u32, "tip {number}");
+        // A press is read as its own finger is set: its encoder's counts are drawn.
+        let press =
+            record::press(&made.record, &finger.scene.params()).unwrap_or_else(|why| panic!("tip {number}: {why}"));
+        let found = solve::modulus(&[press]).unwrap_or_else(|why| panic!("tip {number}: {why}"));
+        let truth_kpa = drawn(finger, "modulus_kpa").expect("it is drawn");
+        errors_percent.push(100.0 * (found.kpa / truth_kpa - 1.0).abs());
+        within += usize::from((found.kpa - truth_kpa).abs() <= 2.0 * found.sigma_kpa);
+    }
+    errors_percent.sort_by(f64::total_cmp);
+    let (median, worst) = (errors_percent[count / 2], errors_percent[count - 1]);
+    println!("error of the modulus: median {median:.2} %, worst {worst:.2} %; {within} of {count} within two sigmas");
+    assert!((0.1..4.0).contains(&median) && worst < 10.0 && 10 * within >= 9 * count);
+}
+
+/// Disturbance of a press: its name, changes of the tips, the place of the object, and the ends that are valid with it.
+type Trouble = (&'static str, &'static [(&'static str, &'static str)], Option<fn(f64, f64) -> f64>, &'static [Ended]);
+
+/// Ends of a press whose object moves.
+const MOVED: &[Ended] = &[Ended::Complete, Ended::Touched, Ended::Stalled];
+
+const TROUBLES: [Trouble; 7] = [
+    ("no object", &[("distance_mm = { uniform = [1, 8] }", "distance_mm = 50")], None, &[Ended::NoContact]),
+    (
+        "a soft object",
+        &[(
+            "[effects.noise]",
+            "[effects.object_stiffness]\nyield_mm_per_n = { log_uniform = [0.2, 2] }\n[effects.noise]",
+        )],
+        None,
+        &[Ended::Complete, Ended::Stalled],
+    ),
+    (
+        "an object that breaks",
+        &[("[effects.noise]", "[effects.breakable_object]\nforce_n = { log_uniform = [0.1, 3] }\n[effects.noise]")],
+        None,
+        &[Ended::Complete, Ended::Stalled],
+    ),
+    (
+        "an object that vanishes",
+        &[],
+        Some(|distance_mm, time_s| if time_s > 1.0 + 0.2 * distance_mm { 1e3 } else { distance_mm }),
+        MOVED,
+    ),
+    (
+        "an object that comes 1 mm nearer at 20 mm/s",
+        &[],
+        Some(|distance_mm, time_s| distance_mm - (20.0 * (time_s - 1.2)).clamp(0.0, 1.0)),
+        MOVED,
+    ),
+    (
+        "an object that goes 2 mm away at 20 mm/s",
+        &[],
+        Some(|distance_mm, time_s| distance_mm + (20.0 * (time_s - 1.2)).clamp(0.0, 2.0)),
+        MOVED,
+    ),
+    (
+        "an object that comes past the tip's rest at 20 mm/s while the tip seeks it",
+        &[],
+        Some(|distance_mm, time_s| (distance_mm - 20.0 * time_s).max(-0.5)),
+        MOVED,
+    ),
+];
+
+#[test]
+fn what_moves_yields_or_vanishes_ends_a_press_within_its_limits() {
+    presses_end_within_limits(3);
+}
+
+fn presses_end_within_limits(count: usize) {
+    let mut broken = Vec::new();
+    for (name, changes, place_mm, ends) in TROUBLES {
+        let made = make_all(&tips(count, changes), Task::Press, place_mm);
+        print(name, &made);
+        let valid = |made: &Made| {
+            let ended = ends.contains(&made.status.ended) || made.fault.is_some();
+            ended && made.force_n < 9.0 && made.rows <= ROWS_MAX as u32
+        };
+        broken.extend((!made.iter().all(valid)).then_some(name));
+    }
+    assert!(broken.is_empty(), "{broken:?}");
+}
+
+/// The reference finger with a defect.
+fn harmed(defect: impl FnOnce(&mut Faults)) -> Bench<impl Set> {
+    let config = Config::shipped(&images::CONFIRMED).expect("the defaults are allowed");
+    let mut bench = Bench::of(&Setup::default(), &config);
+    bench.harm(defect);
+    bench
+}
+
+/// An end stop before the object: the motor is driven against it for at most 1 s.
+#[test]
+fn a_stuck_finger_ends_a_press() {
+    for front_mm in [0.5, 4.0, 5.2] {
+        let made = make(harmed(|faults| faults.end_stops_mm = Some([-20.0, front_mm])), Task::Press, |_, _| {});
+        assert!(made.status.ended == Ended::Stalled || made.fault.is_some(), "stop at {front_mm} mm");
+        assert!(made.took_s < 2.5, "stop at {front_mm} mm: {} s", made.took_s);
+    }
+}
+
+/// Limit of the strokes: distance from the origin.
+const STROKES_MM: f64 = 1.6;
+
+/// Strokes or jogs of drawn drives, within their limits of travel and force. Returns how many completed.
+fn driven(name: &str, count: usize, task: Task, changes: &[(&str, &str)]) -> usize {
+    let made = make_all(&fingers(&replaced(include_str!("drives.toml"), changes), 1, 0..count), task, None);
+    print(name, &made);
+    let [travel_mm, force_n] = [largest(&made, |made| made.travel_mm), largest(&made, |made| made.force_n)];
+    assert!(travel_mm < STROKES_MM && force_n < 0.3, "{name}: {travel_mm} mm, {force_n} N");
+    made.iter().filter(|made| made.status.state == MeasureState::Done).count()
+}
+
+#[test]
+fn strokes_in_free_air_stay_near_the_origin_and_complete() {
+    strokes_complete(8);
+}
+
+fn strokes_complete(count: usize) {
+    let done = driven("free air", count, Task::Strokes, &[]);
+    assert!(10 * done >= 9 * count, "{done}");
+}
+
+#[test]
+fn jogs_complete() {
+    let done = driven("jogs", 20, Task::Jog, &[("direction_confirmed = 1", "direction_confirmed = 0")]);
+    assert!(10 * done >= 9 * 20, "{done}");
+}
+
+#[test]
+fn an_object_in_the_way_is_pressed_with_no_more_than_300_mn() {
+    strokes_stop_at_an_object(4);
+}
+
+/// An object from 0.1 to 1.2 mm ahead, on the array or off it.
+fn strokes_stop_at_an_object(count: usize) {
+    let near = ("distance_mm = { uniform = [2, 8] }", "distance_mm = { uniform = [0.1, 1.2] }");
+    let off = ("centre_x_mm = { uniform = [-3.5, 3.5] }", "centre_x_mm = 20");
+    driven("an object ahead", count, Task::Strokes, &[near]);
+    driven("an object ahead, off the array", count, Task::Strokes, &[near, off]);
+}
+
+/// The tip must not go far before the strokes end.
+#[test]
+fn strokes_of_a_broken_drive_end_near_the_origin() {
+    type Case = (fn(&mut Faults), &'static [Ended]);
+    let cases: [Case; 5] = [
+        (|faults| faults.encoder_reversed = true, &[Ended::Reversed]),
+        (|faults| faults.leads_swapped = true, &[Ended::Reversed]),
+        (|faults| faults.encoder_frozen = true, &[Ended::Still]),
+        (|faults| faults.end_stops_mm = Some([-0.1, 5.0]), &[Ended::Pushed, Ended::Still]),
+        (|faults| faults.end_stops_mm = Some([-5.0, 0.1]), &[Ended::Pushed, Ended::Still]),
+    ];
+    for (number, (defect, ends)) in cases.into_iter().enumerate() {
+        let Made { status, fault, travel_mm, .. } = make(harmed(defect), Task::Strokes, |_, _| {});
+        let ended = ends.contains(&status.ended) || fault.is_some();
+        assert!(travel_mm < STROKES_MM && ended, "case {number}: {:?}, {fault:?}, {travel_mm:.2} mm", status.ended);
+    }
+}

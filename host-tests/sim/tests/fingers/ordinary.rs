@@ -1,0 +1,282 @@
+//! Ordinary fingers: noise, temperature, coarse encoders, contacts off the middle, weak sources. Each test repeats a
+//! past defect and cases near it, and judges by the true state. Every run must keep the envelope of the population
+//! `ordinary`. After a release the tip stays at its clearance, for any reading in the air, and finds the next touch.
+
+mod force;
+
+use sim::metrics::Hold;
+use sim::run::{Outcome, run};
+use sim::scene::{Bound, read};
+use sim::watch::{Step, Truth, Watch};
+use sim::{native, population};
+use std::ops::Range;
+use std::sync::OnceLock;
+
+/// Result of a run.
+#[derive(Debug)]
+struct Ran {
+    /// Script and tables.
+    finger: String,
+    outcome: Outcome,
+    last: Last,
+}
+
+/// The promises of `ordinary`.
+fn envelope() -> &'static [Bound] {
+    static ENVELOPE: OnceLock<Vec<Bound>> = OnceLock::new();
+    ENVELOPE.get_or_init(|| {
+        let ordinary = population::load("ordinary").unwrap_or_else(|error| panic!("{error}"));
+        ordinary.finger(1, 0).unwrap_or_else(|errors| panic!("{errors}")).scene.bounds
+    })
+}
+
+/// Asks for these forces, from these times on, of a finger of these tables.
+fn asks(script: &[(f64, f64)], duration_s: f64, tables: &str) -> Ran {
+    let goals = script.iter().map(|(at_s, goal_n)| format!("[[script]]\nat_s = {at_s:?}\ngoal_n = {goal_n:?}\n"));
+    let finger = format!("about = \"\"\nduration_s = {duration_s:?}\n{tables}\n{}", goals.collect::<String>());
+    let mut scene = read("test.toml", &finger, &[]).unwrap_or_else(|errors| panic!("{errors}\n{finger}"));
+    scene.bounds = envelope().to_vec();
+    let mut last = Last::default();
+    let outcome = run(&scene, &native::board, &mut [&mut last]).expect("it runs");
+    Ran { finger, outcome, last }
+}
+
+/// Touches, holds and releases.
+fn holds(goal_n: f64, tables: &str) -> Ran {
+    asks(&[(0.0, goal_n), (0.7, 0.0)], 1.3, tables)
+}
+
+impl Ran {
+    /// A metric.
+    fn of(&self, metric: &str) -> f64 {
+        self.outcome.measured.get(metric).unwrap_or_else(|| panic!("no {metric}"))
+    }
+
+    /// Checks that a metric is in a range.
+    fn has(self, metric: &str, range: Range<f64>) -> Self {
+        assert!(range.contains(&self.of(metric)), "{metric} is {}:\n{}", self.of(metric), self.finger);
+        self
+    }
+
+    /// Checks that every promise is kept, but for these metrics.
+    fn keeps_all_but(self, spared: &[&str]) -> Self {
+        let broken = self.outcome.verdicts.iter().filter(|verdict| !verdict.held);
+        let broken: Vec<_> = broken.filter(|verdict| !spared.contains(&verdict.bound.metric.as_str())).collect();
+        assert!(broken.is_empty(), "{broken:#?}\n{}", self.finger);
+        self
+    }
+
+    /// Checks that every promise is kept.
+    fn keeps_all(self) -> Self {
+        self.keeps_all_but(&[])
+    }
+
+    /// Checks the first force that was held, as a share of its goal.
+    fn holds_share(self, range: Range<f64>) -> Self {
+        let Hold { mean_n, goal_n, .. } = self.outcome.holds[0];
+        assert!(range.contains(&(mean_n / goal_n)), "{mean_n} N is held:\n{}", self.finger);
+        self
+    }
+
+    /// Checks that the tip rests at the clearance of 1 mm behind its touch.
+    fn stands_clear(self) -> Self {
+        let behind_mm = self.last.touch_mm.expect("it touched") - self.last.truth.travel_mm;
+        assert_eq!(self.last.truth.force_n, 0.0, "{}", self.finger);
+        assert!((0.75..1.25).contains(&behind_mm), "{behind_mm} mm behind:\n{}", self.finger);
+        self
+    }
+}
+
+/// The last state of a run.
+#[derive(Debug, Default)]
+struct Last {
+    truth: Truth,
+    confidence: u8,
+    /// Travel at which the tip first touched.
+    touch_mm: Option<f64>,
+}
+
+impl Watch for Last {
+    fn step(&mut self, step: &Step) {
+        (self.truth, self.confidence) = (*step.truth, step.status.contact.confidence);
+        if step.truth.force_n > 0.0 {
+            self.touch_mm.get_or_insert(step.truth.travel_mm);
+        }
+    }
+}
+
+/// Touches, releases at 0.5 s and waits 3 s, in which the tip once retracted by 27 mm.
+fn lets_go(goal_n: f64, tables: &str) -> Ran {
+    asks(&[(0.0, goal_n), (0.5, 0.0)], 3.5, tables)
+}
+
+/// Codes of noise that the array reads with, or friction as if there were none.
+fn noise(rms_codes: f64, friction_mnm: f64) -> String {
+    format!("[effects.noise]\nrms_codes = {rms_codes:?}\n[effects.dry_friction]\ntorque_mnm = {friction_mnm:?}\n")
+}
+
+#[test]
+fn noise_does_not_walk_a_released_tip_back() {
+    for rms_codes in [1.5, 3.0, 4.0, 6.0] {
+        for (goal_n, friction_mnm) in [(1.0, 0.12), (1.0, 0.0), (5.0, 0.12), (0.2, 0.12)] {
+            let ran = lets_go(goal_n, &noise(rms_codes, friction_mnm)).keeps_all().stands_clear();
+            // The noise is there: a sum of 100 taxels and 10 levels.
+            ran.has("force_error_rms_mn", 1.5 * rms_codes..5.0 * rms_codes);
+        }
+    }
+}
+
+#[test]
+fn heat_does_not_drive_a_released_tip_away() {
+    for warming_k in [20.0, 40.0, -20.0, -40.0] {
+        for time_constant_s in [600.0, 20.0, 1.0] {
+            for friction_mnm in [0.12, 0.0] {
+                let warming = format!("warming_k = {warming_k:?}\ntime_constant_s = {time_constant_s:?}");
+                let noise = noise(0.0, friction_mnm);
+                lets_go(1.0, &format!("[effects.temperature_drift]\n{warming}\n{noise}")).keeps_all().stands_clear();
+            }
+        }
+    }
+}
+
+#[test]
+fn a_released_tip_goes_back_no_faster_than_it_came() {
+    // The same with the tip deep in: a soft one, a hard one, and 5 N.
+    for (modulus_kpa, goal_n) in [(60.0, 1.0), (60.0, 5.0), (1_000.0, 2.0)] {
+        let ran = lets_go(goal_n, &format!("[tip]\nmodulus_kpa = {modulus_kpa:?}\n{}", noise(1.5, 0.12)));
+        ran.keeps_all().stands_clear().has("air_speed_percent", 95.0..130.0);
+    }
+}
+
+/// Effects that leave more than `contact_off_mn` after a release: creep, hysteresis and temperature.
+fn remembering(warming_k: f64) -> String {
+    format!(
+        "[effects.creep]\nrate_percent_per_decade = 4\n[effects.hysteresis]\nwidth_percent = 10\n\
+        [effects.temperature_drift]\nwarming_k = {warming_k:?}\ntime_constant_s = 5\n"
+    )
+}
+
+/// Two touches, and again.
+const AGAIN: [(f64, f64); 5] = [(0.0, 1.0), (0.7, 0.0), (1.5, 2.0), (2.2, 0.0), (3.2, 1.0)];
+
+#[test]
+fn every_touch_is_found_again() {
+    for rms_codes in [0.0, 2.0, 4.0] {
+        let ran = asks(&AGAIN, 4.0, &noise(rms_codes, 0.12)).keeps_all().has("force_error_rms_mn", 0.1..f64::INFINITY);
+        let close = |hold: &Hold, goal_n: f64| (hold.mean_n / goal_n - 1.0).abs() < 0.02;
+        let holds = &ran.outcome.holds;
+        assert!(
+            holds.len() == 3 && holds.iter().zip([1.0, 2.0, 1.0]).all(|(hold, goal_n)| close(hold, goal_n)),
+            "{holds:?}"
+        );
+    }
+}
+
+#[test]
+fn what_an_array_remembers_is_learnt_again_after_each_touch() {
+    for rms_codes in [0.0, 2.0, 4.0] {
+        for warming_k in [20.0, -20.0] {
+            let ran = asks(&AGAIN, 4.0, &(remembering(warming_k) + &noise(rms_codes, 0.12)));
+            assert_eq!(ran.outcome.holds.len(), 3);
+            // What such an array reads of 2 N is off by more than the envelope.
+            let ran = ran.keeps_all_but(&["hold_error_mn"]).has("hold_error_mn", 0.0..450.0);
+            ran.has("force_error_rms_mn", 5.0..f64::INFINITY);
+        }
+    }
+}
+
+/// The array reads more than a contact in the air, with the same codes at every travel, but it is not frozen. An offset
+/// above `contact_off_mn` once ended in fault 4 or 1.
+#[test]
+fn an_offset_in_the_air_is_no_fault() {
+    for (zero_kpa_per_k, time_constant_s) in [(0.01, 1.0), (0.01, 0.5), (0.02, 1.0), (0.04, 2.0), (-0.02, 1.0)] {
+        for goal_n in [0.5, 1.0, 4.0] {
+            let zero = format!("zero_kpa_per_k = {zero_kpa_per_k:?}\ngain_percent_per_k = 0");
+            let warming = format!("[effects.temperature_drift]\n{zero}\ntime_constant_s = {time_constant_s:?}\n");
+            // At a force a hundred times as large, the offset is indistinguishable.
+            let ran = asks(&[(0.0, goal_n), (0.4, 0.0), (1.2, goal_n), (1.7, 0.0)], 2.4, &warming);
+            ran.keeps_all_but(&["hold_error_mn"]).stands_clear();
+        }
+    }
+}
+
+/// 99 of 100 hunted with 30 to 50 % of the duty.
+#[test]
+fn the_duty_rests_in_a_hundred_of_a_hundred_holds() {
+    let population =
+        population::read("holds.toml", include_str!("holds.toml")).unwrap_or_else(|errors| panic!("{errors}"));
+    let mut quiet = 0;
+    for number in 0..100 {
+        let finger = population.finger(1, number).unwrap_or_else(|errors| panic!("{errors}"));
+        let outcome = run(&finger.scene, &native::board, &mut []).expect("it runs");
+        let [duty, error_mn] =
+            ["rest_duty_percent", "hold_error_mn"].map(|metric| outcome.measured.get(metric).expect("it holds"));
+        assert!(outcome.passed(), "finger {number} deviates by {duty} %: {:?}", finger.drawn);
+        let hold = outcome.holds[0];
+        assert!(!hold.faulty && error_mn < 0.15 * 1e3 * hold.goal_n, "finger {number}: {error_mn} mN off {hold:?}");
+        quiet += usize::from(duty < 0.5);
+    }
+    assert!((50..100).contains(&quiet), "{quiet} are quite quiet: with noise and counts not all are");
+}
+
+/// A coarse encoder makes a slower loop, never a swinging one. 256 counts swung by 33 mN, 128 by 158, 48 by 817; 16
+/// held 3 N at goal 1.
+#[test]
+fn coarse_encoders_do_not_swing() {
+    for counts in [256, 128, 64, 48, 24, 16] {
+        for goal_n in [0.3, 1.0, 3.0] {
+            for friction_mnm in [0.12, 0.0] {
+                let tables = format!(
+                    "[motor]\nencoder_counts_per_turn = {counts}\n[effects.noise]\nrms_codes = 1\n\
+                    [effects.dry_friction]\ntorque_mnm = {friction_mnm:?}\n"
+                );
+                // A drift within a count is invisible: the bound is a count if that is more than the envelope's 50 um.
+                let count_mm = 2.0 * core::f64::consts::PI / (f64::from(counts) * 43.0 / 12.0);
+                let unseen: &[&str] = if count_mm > 0.05 { &["rest_travel_um"] } else { &[] };
+                // The coarsest encoders take half a second to settle.
+                let ran = asks(&[(0.0, goal_n), (1.2, 0.0)], 2.4, &tables).keeps_all_but(unseen).stands_clear();
+                ran.has("rest_travel_um", 0.0..1e3 * count_mm);
+            }
+        }
+    }
+}
+
+#[test]
+fn noise_and_bursts_are_no_fault() {
+    for (rms_codes, goal_n) in [(4.0, 1.0), (6.0, 0.5), (6.0, 1.0), (6.0, 3.0)] {
+        let ran = holds(goal_n, &format!("[effects.noise]\nrms_codes = {rms_codes:?}\n")).keeps_all().stands_clear();
+        ran.has("force_error_rms_mn", 5.0..f64::INFINITY);
+    }
+    for (amplitude_codes, rate_per_s) in [(20, 10), (20, 100), (10, 1_000)] {
+        for goal_n in [0.5, 1.0, 3.0] {
+            let bursts = format!("amplitude_codes = {amplitude_codes}\nrate_per_s = {rate_per_s}");
+            holds(goal_n, &format!("[effects.burst]\n{bursts}\n")).keeps_all().stands_clear();
+        }
+    }
+}
+
+/// The current is limited before the supply goes under, so it was no fault 9.
+#[test]
+fn a_weak_source_is_spared() {
+    for source_ohm in [0.5, 1.0, 2.0] {
+        for goal_n in [1.0, 5.0, 7.0] {
+            let script = [(0.0, goal_n), (0.6, 0.3), (1.1, goal_n), (1.7, 0.0)];
+            let ran = asks(&script, 2.3, &format!("[effects.supply_sag]\nsource_ohm = {source_ohm:?}\n"));
+            ran.keeps_all().stands_clear();
+        }
+    }
+}
+
+/// A tip that the motor drives almost directly goes far for each count, and friction counts for much: that was fault 5,
+/// at three times the speed of the approach.
+#[test]
+fn a_small_reduction_is_no_fault() {
+    for (ratio, counts) in [(1.2, 1_600), (2.4, 1_600), (6.0, 256), (12.0, 256)] {
+        let tables = format!(
+            "[transmission]\nratio = {ratio:?}\n[motor]\nencoder_counts_per_turn = {counts}\n\
+            [effects.dry_friction]\ntorque_mnm = 0.12\n"
+        );
+        // At 40 um a count no force is held to 15 %.
+        holds(1.0, &tables).keeps_all_but(&["hold_error_mn"]).holds_share(0.5..1.1);
+    }
+}

@@ -1,0 +1,196 @@
+//! Bus of a scene's fingers: the same bytes as the firmware's, in virtual time.
+
+use fingertip::link::Reply;
+use fingertip::link::packet::instruction::{READ, REBOOT, SYNC_READ, WRITE};
+use fingertip::link::packet::{Event, Receiver, Sender};
+use fingertip::shipped::address;
+use fingertip::state::{Fault, Mode};
+use sim::effects::Named;
+use sim::native::served::Bus;
+
+const MODE: u16 = address::PRESENT_MODE;
+
+struct Host(Bus<Named>);
+
+impl Host {
+    fn new(scene: &str) -> Self {
+        Self(Bus::new(&sim::cli::load(scene, &[], None).expect("a scene")).expect("a world"))
+    }
+
+    /// Sends an instruction; returns ID, error and data of each answer.
+    fn ask(&mut self, id: u8, instruction: u8, params: &[u8]) -> Vec<(u8, u8, Vec<u8>)> {
+        let mut bytes = Reply::new();
+        let mut sender = Sender::new(&mut bytes, id, instruction);
+        params.iter().for_each(|byte| sender.push(*byte));
+        sender.finish();
+        self.0.hear(&bytes);
+        let (mut receiver, mut heard) = (Receiver::new(), Vec::new());
+        while let Some(due_s) = self.0.due_s() {
+            let answer = self.0.answer(due_s).expect("it is due");
+            for byte in answer.bytes {
+                if receiver.push(byte) == Some(Event::Packet) {
+                    let packet = receiver.packet();
+                    heard.push((packet.id, packet.params[0], packet.params[1..].to_vec()));
+                }
+            }
+        }
+        heard
+    }
+
+    fn write(&mut self, address: u16, data: &[u8]) -> u8 {
+        let heard = self.ask(1, WRITE, &[&address.to_le_bytes(), data].concat());
+        heard[0].1
+    }
+
+    fn read(&mut self, address: u16, length: u16) -> Vec<u8> {
+        let [(1, _, data)] = &self.ask(1, READ, &[address.to_le_bytes(), length.to_le_bytes()].concat())[..] else {
+            panic!("one answer is asked for")
+        };
+        data.clone()
+    }
+
+    fn word(&mut self, address: u16) -> i32 {
+        i32::from_le_bytes(self.read(address, 4).try_into().expect("four bytes"))
+    }
+
+    /// Lets frames pass until a register reads this.
+    fn wait(&mut self, address: u16, value: u8) {
+        for _ in 0..100_000 {
+            if self.read(address, 1) == [value] {
+                return;
+            }
+            self.0.frame();
+        }
+        panic!("{address} reads {:?}, {:?}", self.read(address, 1), self.0.command("state"));
+    }
+
+    fn frames(&mut self, count: u32) {
+        (0..count).for_each(|_| self.0.frame());
+    }
+
+    /// Ends a fault by this register, and presses with 0.5 N.
+    fn resume(&mut self, register: u16) {
+        self.write(register, &[1]);
+        self.wait(address::FAULT, 0);
+        self.write(address::TORQUE_ENABLE, &[1]);
+        self.write(address::GOAL_FORCE_MN, &500_i32.to_le_bytes());
+        self.wait(MODE, Mode::Force as u8);
+    }
+
+    fn hold(&mut self, force_mn: i32) {
+        // Whatever touches the tip, as after a reboot on a contact.
+        assert_eq!(self.write(address::TARE, &[2]), 0);
+        self.wait(address::TARE_STATE, 2);
+        assert_eq!(self.write(address::TORQUE_ENABLE, &[1]), 0);
+        assert_eq!(self.write(address::GOAL_FORCE_MN, &force_mn.to_le_bytes()), 0);
+        self.wait(MODE, Mode::Force as u8);
+        self.frames(3_000);
+    }
+}
+
+#[test]
+fn it_touches_holds_and_loses_what_is_taken_away() {
+    let mut host = Host::new("wall");
+    host.hold(1_500);
+    let force_mn = host.word(address::PRESENT_FORCE_MN);
+    assert!((1_480..=1_520).contains(&force_mn), "{force_mn}");
+    assert!((host.0.truths()[0].0.force_n - 1.5).abs() < 0.02);
+
+    host.0.command("remove").expect("a command");
+    host.wait(MODE, Mode::Approach as u8);
+    assert_eq!(host.0.truths()[0].0.force_n, 0.0);
+    // It is put in front of a tip that is beyond its place.
+    host.frames(1_000);
+    host.0.command("put").expect("a command");
+    host.wait(MODE, Mode::Force as u8);
+    host.frames(3_000);
+    assert!((host.0.truths()[0].0.force_n - 1.5).abs() < 0.02);
+
+    // The tip moves with the object.
+    let before_mm = host.0.truths()[0].0.travel_mm;
+    host.0.command(&format!("move {} 5", before_mm - 3.0)).expect("a command");
+    host.frames(10_000);
+    let (truth, _) = host.0.truths()[0];
+    assert!(truth.travel_mm < before_mm - 1.0 && (truth.force_n - 1.5).abs() < 0.02, "{truth:?}");
+}
+
+#[test]
+fn what_breaks_is_a_fault_until_it_is_mended_and_cleared() {
+    let breaks = [
+        ("lost-frames", Fault::LostFrames),
+        ("array-broken", Fault::ArrayBroken),
+        ("row-stuck", Fault::RowStuck),
+        ("supply-low", Fault::SupplyLow),
+        ("supply-high", Fault::SupplyHigh),
+        ("bridge", Fault::Bridge),
+    ];
+    let mut host = Host::new("wall");
+    host.hold(500);
+    for (kind, fault) in breaks {
+        host.0.command(&format!("fault {kind}")).expect("a command");
+        host.wait(address::FAULT, fault as u8);
+        assert_eq!(host.read(address::TORQUE_ENABLE, 1), [0], "{kind}");
+        let supply = kind.starts_with("supply");
+        assert_eq!(host.write(address::RECOVER, &[1]), if supply { 0x81 } else { 0x80 }, "{kind}");
+        host.0.command("mend").expect("a command");
+        host.frames(10);
+        host.resume(address::RECOVER);
+    }
+    // These show once the tip moves.
+    for (kind, faults) in [
+        ("encoder-frozen", [Fault::EncoderFrozen, Fault::EncoderFrozen]),
+        ("encoder-reversed", [Fault::Reversed, Fault::EncoderFrozen]),
+    ] {
+        host.0.command(&format!("fault {kind}")).expect("a command");
+        host.write(address::GOAL_FORCE_MN, &[0; 4]);
+        host.wait(MODE, Mode::Fault as u8);
+        let found = host.read(address::FAULT, 1)[0];
+        assert!(faults.iter().any(|fault| *fault as u8 == found), "{kind}: {found}");
+        host.0.command("mend").expect("a command");
+        host.resume(address::CLEAR_FAULT);
+    }
+}
+
+#[test]
+fn what_is_saved_outlives_a_reboot_and_nothing_else_does() {
+    let mut host = Host::new("wall");
+    let (radius, modulus) = (address::PARAMS, address::PARAMS + 4);
+    let (radius_um, modulus_pa) = (host.word(radius), host.word(modulus));
+    assert_eq!(host.write(radius, &9_000_i32.to_le_bytes()), 0);
+    assert_eq!(host.write(address::SAVE_PARAMETERS, &[1]), 0);
+    assert_eq!(host.write(modulus, &300_000_i32.to_le_bytes()), 0);
+    assert_eq!((host.word(radius), host.word(modulus), host.read(address::SAVED_STATE, 1)[0]), (9_000, 300_000, 1));
+    host.hold(200);
+    assert_eq!(host.ask(1, REBOOT, &[]).len(), 1);
+    host.frames(100);
+    assert_eq!((host.word(radius), host.word(modulus)), (9_000, modulus_pa));
+    assert_ne!(radius_um, 9_000);
+    assert_eq!(host.read(address::RESET_CAUSE, 1), [4]);
+    assert_eq!((host.read(MODE, 1), host.read(address::TORQUE_ENABLE, 1)), (vec![0], vec![0]));
+    assert_eq!(host.read(address::LIMITS, 1)[0] & 1 << 6, 1 << 6, "not tared");
+    host.hold(200);
+}
+
+#[test]
+fn a_silent_host_trips_the_watchdog() {
+    let mut host = Host::new("wall");
+    host.hold(500);
+    assert_eq!(host.write(address::BUS_WATCHDOG, &[2]), 0);
+    host.frames(350);
+    assert_eq!(host.read(address::FAULT, 1), [0], "heard 35 ms ago");
+    host.frames(450);
+    assert_eq!((host.read(address::FAULT, 1), host.read(MODE, 1)), (vec![0], vec![Mode::Release as u8]));
+    host.frames(5_000);
+    assert_eq!(host.read(address::FAULT, 1), [Fault::BusSilent as u8], "that read came too late");
+}
+
+#[test]
+fn two_fingers_share_the_bus() {
+    let mut host = Host::new("grasp");
+    host.frames(10);
+    let request = [MODE.to_le_bytes(), 54_u16.to_le_bytes()].concat();
+    let heard = host.ask(254, SYNC_READ, &[&request[..], &[2, 1]].concat());
+    let ids: Vec<(u8, usize)> = heard.iter().map(|(id, _, data)| (*id, data.len())).collect();
+    assert_eq!(ids, [(2, 54), (1, 54)], "in the order of the list, each behind the one before");
+    assert!(host.0.command("move 3").unwrap_err().contains("between two fingers"));
+}

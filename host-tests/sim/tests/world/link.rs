@@ -1,0 +1,145 @@
+//! Each effect of clock, bus and host against its closed form, and the host that repeats its command.
+
+use crate::part;
+use fingertip::shipped::{COLUMNS, SLOTS};
+use sim::effects::link::{Named, Stages};
+use sim::effects::{Part, stream};
+use sim::host::Host;
+use sim::registry;
+use sim::scene::Scene;
+
+fn scene(tables: &str) -> Scene {
+    crate::scene(&format!("duration_s = 1000\n{tables}"))
+}
+
+fn stages(scene: &Scene, seed: u64) -> Named {
+    let mut stages = Named::default();
+    for (name, part) in registry::build(&scene.effects, seed, 0) {
+        assert!(stages.take(name, part).is_none());
+    }
+    stages
+}
+
+#[test]
+fn a_fast_clock_has_short_seconds() {
+    let mut fast = stages(&scene("[effects.clock_tolerance]\nfast_ppm = 10000"), 1);
+    assert!((fast.second_s(0.0) - 1.0 / 1.01).abs() < 1e-15);
+    let mut slow = stages(&scene("[effects.clock_tolerance]\nfast_ppm = -50"), 1);
+    assert!((slow.second_s(0.0) - (1.0 + 50e-6)).abs() < 1e-8);
+}
+
+/// The share of many packets that arrives.
+fn arriving(tables: &str) -> f64 {
+    let mut stages = stages(&scene(tables), 4);
+    (0..40_000).filter(|_| stages.pass(1.0).is_some()).count() as f64 / 40_000.0
+}
+
+#[test]
+fn packets_are_lost_and_corrupted_as_often_as_asked() {
+    for (tables, share) in [
+        ("[effects.lost_packets]\nlost_percent = 20", 0.8),
+        ("[effects.lost_packets]\nlost_percent = 100", 0.0),
+        ("[effects.corrupted_packets]\nbit_error_ppm = 1000", f64::powi(1.0 - 1e-3, 128)),
+        // Every bit flips: the sum of the flipped is not the flipped sum.
+        ("[effects.corrupted_packets]\nbit_error_ppm = 1000000", 0.0),
+        (
+            "[effects.lost_packets]\nlost_percent = 20\n[effects.corrupted_packets]\nbit_error_ppm = 1000",
+            0.8 * f64::powi(1.0 - 1e-3, 128),
+        ),
+    ] {
+        // 40,000 draws know a share to 0.0025; 3 deviations.
+        assert!((arriving(tables) - share).abs() < 0.0075, "{tables}: {} for {share}", arriving(tables));
+    }
+    // Noise alone passes a CRC of 16 bits once in 65,536.
+    assert!(arriving("[effects.corrupted_packets]\nbit_error_ppm = 500000") < 4.0 / 40_000.0);
+}
+
+#[test]
+fn hosts_are_late_by_their_distribution() {
+    for (distribution, mean, square) in
+        [("uniform", 0.5, 1.0 / 3.0), ("normal", (2.0 / core::f64::consts::PI).sqrt(), 1.0)]
+    {
+        let tables = format!("[effects.host_jitter]\ndelay_ms = 4\ndistribution = \"{distribution}\"");
+        let mut stages = stages(&scene(&tables), 3);
+        let late: Vec<f64> = (0..40_000).map(|_| (stages.pass(7.0).unwrap() - 7.0) / 4e-3).collect();
+        let of = |power: i32| late.iter().map(|late| late.powi(power)).sum::<f64>() / late.len() as f64;
+        assert!(late.iter().all(|late| *late >= 0.0));
+        assert!((of(1) - mean).abs() < 0.01, "{distribution}: mean {}", of(1));
+        assert!((of(2) - square).abs() < 0.025, "{distribution}: square {}", of(2));
+    }
+}
+
+#[test]
+fn bursts_come_and_last_as_asked() {
+    let burst = "[effects.burst]\nrate_per_s = 50\nlength_us = 2000\namplitude_codes = 100";
+    let Part::Codes(mut burst) = part(burst, 9) else { panic!() };
+    let (mut noisy, mut begun, mut was) = (0, 0, false);
+    let steps = 2_000_000;
+    for step in 0..steps {
+        let mut codes = [1000.0; COLUMNS];
+        burst(step % SLOTS, step as f64 * 1e-4, &mut codes);
+        let is = codes != [1000.0; COLUMNS];
+        assert!(codes.iter().all(|code| (code - 1000.0).abs() <= 100.0));
+        noisy += usize::from(is);
+        begun += usize::from(is && !was);
+        was = is;
+    }
+    // 200 s, 10,000 bursts: a Poisson process covers 1 - exp(-rate length) of the time, and restarts from quiet.
+    let (share, exact) = (noisy as f64 / steps as f64, 1.0 - f64::exp(-0.1));
+    assert!((share / exact - 1.0).abs() < 0.04, "{share} for {exact}");
+    let begins = 50.0 * 200.0 * f64::exp(-0.1);
+    // Sampled every 0.1 ms, a quiet shorter than that is not seen: 0.5 %.
+    assert!((begun as f64 / begins - 1.0).abs() < 0.04, "{begun} for {begins}");
+}
+
+#[test]
+fn a_lost_goal_arrives_with_the_next_repetition() {
+    /// Loses the packets with these numbers.
+    struct Loses(Vec<usize>, usize);
+    impl Stages for Loses {
+        fn pass(&mut self, sent_s: f64) -> Option<f64> {
+            self.1 += 1;
+            (!self.0.contains(&(self.1 - 1))).then_some(sent_s)
+        }
+    }
+    let scene =
+        scene("[host]\nperiod_ms = 10\n[[script]]\nat_s = 0.0\ngoal_n = 1\n[[script]]\nat_s = 0.025\ngoal_n = 2");
+    // Sent at 0, 10, 20, 25, 35, 45 ms. Those at 25 and 35 ms get lost.
+    let mut host = Host::new(&scene);
+    let mut loses = Loses(vec![3, 4], 0);
+    for (ms, goal_n, silent_ms) in [(-1.0, 0.0, 0), (0.0, 1.0, 0), (24.9, 1.0, 4), (44.9, 1.0, 24), (45.1, 2.0, 0)] {
+        assert_eq!(host.goal_n(ms * 1e-3, &mut loses), goal_n, "at {ms} ms");
+        assert_eq!(host.silent_ms(ms * 1e-3), silent_ms, "at {ms} ms");
+    }
+    assert_eq!((host.sent, host.lost), (6, 2));
+}
+
+#[test]
+fn the_last_of_simultaneous_events_counts_and_late_packets_keep_their_order() {
+    let scene = scene(
+        "[[script]]\nat_s = 0.5\ngoal_n = 1\n[[script]]\nat_s = 0.5\ngoal_n = 2\n[effects.host_jitter]\ndelay_ms = 300",
+    );
+    let mut host = Host::new(&scene);
+    assert_eq!(host.goal_n(0.499, &mut ()), 0.0);
+    assert_eq!(host.goal_n(0.5, &mut ()), 2.0);
+    for seed in 0..50 {
+        let (mut host, mut stages) = (Host::new(&scene), stages(&scene, seed));
+        let mut last = 0.0;
+        for ms in 0..2000 {
+            let goal_n = host.goal_n(f64::from(ms) * 1e-3, &mut stages);
+            assert!(goal_n >= last, "an older goal overtook");
+            let silent_ms = host.silent_ms(f64::from(ms) * 1e-3);
+            assert!(goal_n == last || silent_ms <= 1, "a goal came {silent_ms} ms before it arrived");
+            last = goal_n;
+        }
+        assert_eq!(last, 2.0);
+    }
+}
+
+#[test]
+fn streams_differ_by_seed_name_and_finger() {
+    let streams = [stream(1, "noise", 0), stream(2, "noise", 0), stream(1, "burst", 0), stream(1, "noise", 1)];
+    for (place, one) in streams.iter().enumerate() {
+        assert!(!streams[..place].contains(one));
+    }
+}

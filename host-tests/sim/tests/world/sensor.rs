@@ -1,0 +1,262 @@
+//! Every sensor effect, alone and together, over any input; hysteresis, creep, spread and temperature against their
+//! closed forms.
+
+mod network;
+
+use crate::scene;
+use fingertip::shipped::{COLUMNS, ROWS, SLOTS};
+use sim::effects::Part;
+use sim::effects::sensor::{self, Codes, Network, Pressure, Readout, Row, Volts};
+use sim::registry;
+use sim::scene::text;
+use sim::setup::Array;
+
+/// An effect by its keys.
+fn part(name: &str, keys: &str, seed: u64) -> Part {
+    crate::part(&format!("[effects.{name}]\n{keys}\n"), seed)
+}
+
+fn pressure(name: &str, keys: &str) -> Box<dyn Pressure> {
+    let Part::Pressure(part) = part(name, keys, 1) else { panic!("{name} acts elsewhere") };
+    part
+}
+
+fn network(name: &str, keys: &str) -> Box<Network> {
+    let Part::Network(part) = part(name, keys, 1) else { panic!("{name} acts elsewhere") };
+    part
+}
+
+fn volts(name: &str, keys: &str) -> Box<Volts> {
+    let Part::Volts(part) = part(name, keys, 1) else { panic!("{name} acts elsewhere") };
+    part
+}
+
+fn codes(name: &str, keys: &str, seed: u64) -> Box<Codes> {
+    let Part::Codes(part) = part(name, keys, seed) else { panic!("{name} acts elsewhere") };
+    part
+}
+
+/// The same number in every column.
+fn all(value: f64) -> Row {
+    [value; COLUMNS]
+}
+
+/// The readout with these effects.
+fn stages(tables: &str, seed: u64) -> sensor::Named {
+    let scene = scene(&format!("duration_s = 1\n{tables}"));
+    let mut stages = sensor::Named::default();
+    for (name, part) in registry::build(&scene.effects, seed, 0) {
+        stages.take(name, part);
+    }
+    stages
+}
+
+/// The effects that act in the readout, one of the link's among them.
+fn names() -> Vec<&'static str> {
+    sensor::EFFECTS.iter().map(|effect| effect.name).chain(["burst"]).collect()
+}
+
+/// Scans frames of a random world.
+fn scan(stages: &mut impl sensor::Stages, frames: usize, seed: u64) -> Vec<[u16; COLUMNS]> {
+    let mut rng = fastrand::Rng::with_seed(seed);
+    let mut readout = Readout::new(&Array::default());
+    let mut codes = Vec::new();
+    let mut time_s = -0.01;
+    for _ in 0..frames {
+        let scale = [0.0, 1e-300, 1.0, 30.0, 1e4][rng.usize(0..5)];
+        for slot in 0..SLOTS {
+            time_s += [0.0, 1e-9, 9e-6, 9e-6, 1.0][rng.usize(0..5)];
+            let kpa: Row = core::array::from_fn(|_| scale * rng.f64());
+            codes.push(readout.codes(stages, slot, time_s, &kpa));
+        }
+    }
+    codes
+}
+
+#[test]
+fn any_effect_and_all_together_take_any_input() {
+    let all: String = names().iter().map(|name| format!("[effects.{name}]\n")).collect();
+    let alone = names().into_iter().map(|name| format!("[effects.{name}]\n"));
+    for tables in alone.chain([all]) {
+        for seed in 1..=3 {
+            let codes = scan(&mut stages(&tables, seed), 1000, seed);
+            assert!(codes.iter().flatten().all(|code| *code < 4096));
+            assert_eq!(codes, scan(&mut stages(&tables, seed), 1000, seed), "{tables} is not repeatable");
+        }
+    }
+}
+
+#[test]
+fn every_effect_by_its_default_changes_something() {
+    let plain = scan(&mut (), 1000, 1);
+    for name in names() {
+        let table = match name {
+            "broken_taxels" => "[effects.broken_taxels]\ndead = [[1, 1]]".into(),
+            name => format!("[effects.{name}]\n"),
+        };
+        assert_ne!(scan(&mut stages(&table, 1), 1000, 1), plain, "{name}");
+    }
+}
+
+#[test]
+fn without_magnitude_no_bit_changes() {
+    let plain = scan(&mut (), 1000, 1);
+    assert_eq!(scan(&mut stages("", 1), 1000, 1), plain);
+    let all: String = registry::all().filter(|effect| names().contains(&effect.name)).map(text::zero).collect();
+    let mut zero = stages(&all, 1);
+    assert_eq!(scan(&mut zero, 1000, 1), plain);
+    for cost in zero.costs() {
+        let a_frame = cost.evaluations as usize / 1000;
+        assert!(a_frame == ROWS || a_frame == SLOTS, "{} is called {a_frame} times a frame", cost.effect);
+    }
+    assert_eq!(zero.costs().count(), names().len());
+}
+
+#[test]
+fn an_effects_numbers_are_its_own() {
+    // Naming another effect without magnitude does not change the draws of the noise.
+    let noise = "[effects.noise]\nrms_codes = 3\n";
+    let more = format!("{noise}[effects.gain_spread]\nrms_percent = 0\n[effects.burst]\namplitude_codes = 0\n");
+    assert_eq!(scan(&mut stages(noise, 1), 100, 1), scan(&mut stages(&more, 1), 100, 1));
+    assert_ne!(scan(&mut stages(noise, 1), 100, 1), scan(&mut stages(noise, 2), 100, 1));
+}
+
+/// Reading of a taxel under a pressure.
+fn reads(effect: &mut dyn Pressure, time_s: f64, kpa: f64) -> f64 {
+    let mut row = all(kpa);
+    effect.apply(3, time_s, &mut row);
+    assert!(row.iter().all(|column| *column == row[0]));
+    row[0]
+}
+
+#[test]
+fn hysteresis_encloses_its_area() {
+    for (percent, top_kpa) in [(10.0, 30.0), (10.0, 3.0), (40.0, 30.0), (100.0, 5.0)] {
+        let mut effect = pressure("hysteresis", &format!("width_percent = {percent}"));
+        let steps = 20_000;
+        let way = (0..=steps).chain((0..steps).rev()).map(|step| top_kpa * f64::from(step) / f64::from(steps));
+        let readings: Vec<_> = way.map(|kpa| (kpa, reads(&mut *effect, 0.0, kpa))).collect();
+        // Trapezoids: letting go lies above pressing.
+        let area: f64 = readings.windows(2).map(|w| -(w[1].0 - w[0].0) * 0.5 * (w[0].1 + w[1].1)).sum();
+        let w = percent / 200.0;
+        let exact = top_kpa * top_kpa * w * (1.0 - w) / (1.0 + w);
+        assert!((area / exact - 1.0).abs() < 1e-6, "{percent} %: {area} for {exact} kPa^2");
+        assert_eq!(readings.last(), Some(&(0.0, 0.0)));
+    }
+}
+
+#[test]
+fn hysteresis_gives_no_energy_on_any_closed_way() {
+    // Pressure times reading: a cycle never yields energy.
+    let mut rng = fastrand::Rng::with_seed(5);
+    let mut effect = pressure("hysteresis", "width_percent = 20");
+    let mut cycle = |way: &[f64]| {
+        let first = reads(&mut *effect, 0.0, way[0]);
+        let mut before = (way[0], first);
+        let mut area = 0.0;
+        for kpa in way.iter().skip(1) {
+            let now = (*kpa, reads(&mut *effect, 0.0, *kpa));
+            area -= (now.0 - before.0) * 0.5 * (now.1 + before.1);
+            before = now;
+        }
+        area
+    };
+    for _ in 0..1000 {
+        let turns: Vec<f64> = (0..rng.usize(1..20)).map(|_| 30.0 * rng.f64()).collect();
+        let ends = [0.0].iter().chain(&turns).chain(&[0.0]).copied().collect::<Vec<_>>();
+        let way: Vec<f64> =
+            ends.windows(2).flat_map(|w| (0..100).map(move |n| w[0] + (w[1] - w[0]) * f64::from(n) / 99.0)).collect();
+        assert!(cycle(&way) >= -1e-9);
+    }
+}
+
+#[test]
+fn creep_grows_by_its_rate_in_each_decade() {
+    for steps_a_decade in [3, 50] {
+        let mut effect = pressure("creep", "rate_percent_per_decade = 5");
+        let first = reads(&mut *effect, 0.0, 20.0);
+        assert_eq!(first, 20.0);
+        let mut readings = Vec::new();
+        for step in 0..=(7 * steps_a_decade) {
+            let time_s = 1e-3 * libm::exp10(f64::from(step) / f64::from(steps_a_decade));
+            let reading = reads(&mut *effect, time_s, 20.0);
+            if step % steps_a_decade == 0 {
+                readings.push(reading);
+            }
+        }
+        for (number, decade) in readings.windows(2).enumerate() {
+            let percent = (decade[1] - decade[0]) / 20.0 * 100.0;
+            // To 1000 s; the next slower term is missing after that.
+            let allowed = if number < 6 { 4.995..5.005 } else { 4.95..5.0 };
+            assert!(allowed.contains(&percent), "{percent} % in decade {number} from 1 ms");
+        }
+    }
+}
+
+#[test]
+fn creep_does_not_mind_how_often_it_is_asked() {
+    let ask = |times: u32| {
+        let mut effect = pressure("creep", "rate_percent_per_decade = 5");
+        reads(&mut *effect, 0.0, 20.0);
+        (1..=times).map(|n| reads(&mut *effect, f64::from(n) / f64::from(times), 20.0)).last().unwrap()
+    };
+    let (once, often) = (ask(1), ask(10_000));
+    assert!((once - often).abs() < 1e-9, "{once} and {often}");
+}
+
+#[test]
+fn gains_spread_as_asked_and_by_the_seed() {
+    let gains = |seed: u64| {
+        let Part::Pressure(mut effect) = part("gain_spread", "rms_percent = 6", seed) else { panic!() };
+        (0..ROWS)
+            .flat_map(|row| {
+                let mut kpa = all(1.0);
+                effect.apply(row, 0.0, &mut kpa);
+                kpa
+            })
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(gains(7), gains(7));
+    assert_ne!(gains(7), gains(8));
+    let many: Vec<f64> = (0..100).flat_map(gains).collect();
+    let count = many.len() as f64;
+    let mean = many.iter().sum::<f64>() / count;
+    let rms = (many.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / count).sqrt();
+    // Cut at 3 deviations, a normal distribution keeps 0.9866 of its deviation; 10^4 draws know it to 0.7 %.
+    assert!((mean - 1.0).abs() < 0.0025, "{mean}");
+    assert!((rms / (0.06 * 0.9866) - 1.0).abs() < 0.025, "{rms}");
+    assert!(many.iter().all(|gain| (gain - 1.0).abs() <= 0.18 + 1e-12));
+}
+
+#[test]
+fn temperature_drifts_with_the_exponential() {
+    let mut effect = pressure(
+        "temperature_drift",
+        "warming_k = 40\ntime_constant_s = 600\ngain_percent_per_k = 0.36\nzero_kpa_per_k = 0.05",
+    );
+    assert_eq!(reads(&mut *effect, -1.0, 20.0), 20.0);
+    for time_s in [1.0, 600.0, 3600.0] {
+        let warmer = 40.0 * (1.0 - f64::exp(-time_s / 600.0));
+        let exact = 20.0 * (1.0 + 0.0036 * warmer) + 0.05 * warmer;
+        assert!((reads(&mut *effect, time_s, 20.0) - exact).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn broken_taxels_conduct_as_broken() {
+    let taxels = "dead = [[3, 1]]\nshorted = [[3, 2]]\nstuck = [[3, 4], [4, 4]]\nat_s = 0.5";
+    let Part::Conductance(mut effect) = part("broken_taxels", taxels, 1) else { panic!() };
+    let mut see = |row: usize, time_s: f64, siemens: f64| {
+        let mut array = all(siemens);
+        effect(row, time_s, &mut array);
+        array
+    };
+    assert_eq!(see(3, 0.4, 1e-5), all(1e-5));
+    let mut broken = all(2e-5);
+    (broken[1], broken[2]) = (0.0, 0.1);
+    assert_eq!(see(3, 0.5, 2e-5), broken);
+    let mut later = [3e-5; COLUMNS];
+    (later[1], later[2], later[4]) = (0.0, 0.1, 2e-5);
+    assert_eq!(see(3, 0.6, 3e-5), later);
+    assert_eq!(see(2, 0.6, 3e-5), all(3e-5));
+}

@@ -3,7 +3,7 @@
 
 use fingertip::params::Params;
 use sim::effects::sensor::{self, Readout};
-use sim::effects::{Named, Set, contact};
+use sim::effects::{Named, Set};
 use sim::mechanics::contact::Contact;
 use sim::scene::{Scene, read};
 use sim::setup::Setup;
@@ -129,7 +129,7 @@ pub struct Finger {
     setup: Setup,
     sensor: sensor::Named,
     readout: Readout,
-    contact: Contact<contact::Named>,
+    contact: Contact,
     time_s: f64,
     travel_mm: f64,
     carried_mm_per_s: f64,

@@ -40,7 +40,7 @@ const CALM_COUNTS: f32 = 3.0;
 /// Largest band, Q24: 2 mm. The gain schedule's arithmetic holds 32 mm.
 const CALM_MAX: i32 = 2 << 24;
 /// Number of time constants of the quickest profile within the band before the loop is calmer.
-const CALM_TIME_CONSTANTS: f32 = 4.0;
+const SETTLED_TIME_CONSTANTS: f32 = 4.0;
 
 /// Share of the motor's braking that the profile uses, Q8; the rest is left to the speed loop.
 pub(crate) const BRAKE_SHARE_Q8: i32 = 218;
@@ -103,9 +103,9 @@ pub struct Config {
     /// Gain sets of the loop, quickest first.
     pub gain_sets: [Gains; GAIN_SETS],
     /// Uncertainty of the distance to go at rest.
-    pub calm_band: Millimetres,
+    pub settled_band: Millimetres,
     /// Number of frames within the band at the quickest gain set before the next set.
-    pub calm_frames: u32,
+    pub settled_frames: u32,
     /// c in 1/s, Q17: at most 16,384, for a motor that stops within less than a frame.
     pub damping_q17_per_s: i32,
     /// g V_max, Q8 mm/s^2.
@@ -251,10 +251,10 @@ impl Config {
                 .cast_unsigned(),
             counts_max: ((i64::from(i32::MAX) << 16) / mm_per_count_q40.max(1)).min(i32::MAX.into()) as i32,
             gain_sets,
-            calm_band: Millimetres(I8F24::from_bits(
+            settled_band: Millimetres(I8F24::from_bits(
                 narrow((CALM_MM + CALM_COUNTS * mm_per_count) * exp2(24)).min(CALM_MAX),
             )),
-            calm_frames: (CALM_TIME_CONSTANTS / (gain_sets[0].slope_per_s as f32 * frame_s)) as u32,
+            settled_frames: (SETTLED_TIME_CONSTANTS / (gain_sets[0].slope_per_s as f32 * frame_s)) as u32,
             damping_q17_per_s: narrow(c * exp2(17)),
             voltage_max_q8_mm_per_s2,
             current_max_q8_mm_per_s2,

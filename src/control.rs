@@ -78,33 +78,33 @@ impl SpeedLoop {
     /// The duty that makes the tip follow a speed reference.
     #[inline(always)]
     pub fn follow(&mut self, reference: Reference, supply_mv: u16, config: &Config, limits: &mut Limits) -> Duty {
-        self.pull(reference, supply_mv, config, limits);
+        self.apply_law(reference, supply_mv, config, limits);
         self.drive.duty(supply_mv, config)
     }
 
     /// Duty for a voltage (g V, Q8 mm/s^2) that is set without the control law.
-    pub fn push(&mut self, voltage: i32, supply_mv: u16, config: &Config, limits: &mut Limits) -> Duty {
-        self.drive.allow(self.winding.share());
+    pub fn apply_voltage(&mut self, voltage: i32, supply_mv: u16, config: &Config, limits: &mut Limits) -> Duty {
+        self.drive.limit_current(self.winding.share());
         self.drive.apply(voltage, self.back_emf(config), supply_mv, config, limits);
         self.drive.duty(supply_mv, config)
     }
 
     /// Computes the voltage by the law, and limits it.
     #[inline(always)]
-    pub fn pull(&mut self, reference: Reference, supply_mv: u16, config: &Config, limits: &mut Limits) {
+    pub fn apply_law(&mut self, reference: Reference, supply_mv: u16, config: &Config, limits: &mut Limits) {
         // Speeds are held to 2,048 mm/s, which is beyond every reference, and their difference to 8,192 mm/s: so no
         // product here leaves 32 bits. Accelerations are Q4 here, held to 28 bits, so that they fit 32 bits as Q8.
         let speed = clamp_bits(self.observer.speed.to_bits(), 28);
         let behind = clamp_bits(reference.speed.to_bits().saturating_sub(speed), 30);
         // c v, the acceleration that the back-EMF takes away.
         let back_emf = high(speed << 3, config.damping_q17_per_s);
-        let wanted = high(behind << 2, self.schedule.gains(config).speed_q18_per_s)
+        let requested = high(behind << 2, self.schedule.gains(config).speed_q18_per_s)
             + (reference.acceleration.to_bits() >> 4)
             + back_emf
             - (self.observer.disturbance.to_bits() >> 4);
-        self.drive.allow(self.winding.share());
-        let [wanted, back_emf] = [clamp_bits(wanted, 28) << 4, clamp_bits(back_emf, 28) << 4];
-        self.drive.apply(wanted, back_emf, supply_mv, config, limits);
+        self.drive.limit_current(self.winding.share());
+        let [requested, back_emf] = [clamp_bits(requested, 28) << 4, clamp_bits(back_emf, 28) << 4];
+        self.drive.apply(requested, back_emf, supply_mv, config, limits);
     }
 
     /// Updates observer and winding with the encoder's count of this frame.
@@ -116,7 +116,7 @@ impl SpeedLoop {
 
     /// Returns the speed reference for a distance to go, at most `limit`, and true if that limit reduced it.
     ///
-    /// Once the loop is calm, a distance within `slack` counts as 0: otherwise a tip that sticks would be driven from
+    /// Once the loop has settled, a distance within `slack` counts as 0: otherwise a tip that sticks would be driven from
     /// count to count for ever.
     #[inline(always)]
     pub fn towards(
@@ -127,7 +127,7 @@ impl SpeedLoop {
         config: &Config,
     ) -> (Reference, bool) {
         self.schedule.note(distance, config);
-        let distance = if self.schedule.calm() {
+        let distance = if self.schedule.settled() {
             Millimetres(distance.0 - distance.0.max(-slack.0).min(slack.0))
         } else {
             distance
@@ -200,12 +200,12 @@ pub struct GainSchedule {
     number: usize,
     /// Mean distance to go, Q24 mm.
     mean: i32,
-    calm_frames: u32,
+    settled_frames: u32,
 }
 
 impl GainSchedule {
     /// The quickest gain set.
-    pub const QUICK: Self = Self { number: 0, mean: 0, calm_frames: 0 };
+    pub const QUICK: Self = Self { number: 0, mean: 0, settled_frames: 0 };
 
     /// The gain set in use.
     #[inline(always)]
@@ -215,28 +215,28 @@ impl GainSchedule {
 
     /// True unless the quickest gain set is in use.
     #[inline(always)]
-    pub fn calm(&self) -> bool {
+    pub fn settled(&self) -> bool {
         self.number > 0
     }
 
     /// Takes the distance to go of this frame.
     #[inline(always)]
     pub fn note(&mut self, distance: Millimetres, config: &Config) {
-        let band = config.calm_band.to_bits();
+        let band = config.settled_band.to_bits();
         // Limited, so that a long distance is soon forgotten.
-        let held = distance.to_bits().max(-16 * band).min(16 * band);
-        self.mean += (held - self.mean) >> MEAN_BITS;
+        let limited = distance.to_bits().max(-16 * band).min(16 * band);
+        self.mean += (limited - self.mean) >> MEAN_BITS;
         let mean = self.mean.saturating_abs();
         while self.number > 0 && mean > reach(band, self.number) {
-            (self.number, self.calm_frames) = (self.number - 1, 0);
+            (self.number, self.settled_frames) = (self.number - 1, 0);
         }
         if self.number + 1 < GAIN_SETS && mean <= reach(band, self.number + 1) / 2 {
-            self.calm_frames += 1;
-            if self.calm_frames > config.calm_frames << self.number {
-                (self.number, self.calm_frames) = (self.number + 1, 0);
+            self.settled_frames += 1;
+            if self.settled_frames > config.settled_frames << self.number {
+                (self.number, self.settled_frames) = (self.number + 1, 0);
             }
         } else {
-            self.calm_frames = 0;
+            self.settled_frames = 0;
         }
     }
 }
@@ -289,8 +289,8 @@ impl Reference {
     /// Limits the speed to `limit`. A limited speed is constant, so its acceleration is 0.
     #[inline(always)]
     pub fn limited(self, limit: MillimetresPerSecond) -> Self {
-        let held = self.speed.max(MillimetresPerSecond::from_bits(limit.to_bits().saturating_neg())).min(limit);
-        if held == self.speed { self } else { Self { speed: held, acceleration: MillimetresPerSecond2::ZERO } }
+        let limited = self.speed.max(MillimetresPerSecond::from_bits(limit.to_bits().saturating_neg())).min(limit);
+        if limited == self.speed { self } else { Self { speed: limited, acceleration: MillimetresPerSecond2::ZERO } }
     }
 }
 

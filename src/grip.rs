@@ -110,7 +110,7 @@ impl Grip {
                 self.release = None;
                 touch.seek();
             }
-            self.press(goal, contact, touch, motion, config, limits)
+            self.pressing(goal, contact, touch, motion, config, limits)
         } else {
             let travel = motion.observer.travel;
             let release = self.release.get_or_insert_with(|| Release::new(contact, touch, travel));
@@ -127,7 +127,7 @@ impl Grip {
 
     /// Distance to the goal, speed limit and slack while the finger approaches or holds.
     #[inline(always)]
-    fn press(
+    fn pressing(
         &self,
         goal: &Goal,
         contact: &Contact,
@@ -139,17 +139,17 @@ impl Grip {
         // A force below that of a contact would be lost and sought again for ever; one that the converter cannot see
         // would be exceeded for ever.
         let most = config.force_max.min(config.force_seen);
-        let held = goal.force.min(most).max(config.contact_on);
-        if held != goal.force {
+        let limited = goal.force.min(most).max(config.contact_on);
+        if limited != goal.force {
             limits.set(Limits::GOAL);
         }
         // While the force is held, the reading creeps and drifts with temperature. The goal follows, but no farther
         // than the limits.
         let beside = self.creep.force().0.saturating_add(goal.drift.0);
-        let reading = Newtons(held.0.saturating_add(beside)).min(most).max(config.contact_on);
-        let wanted = config.tip.indentation(reading);
+        let reading = Newtons(limited.0.saturating_add(beside)).min(most).max(config.contact_on);
+        let goal_indentation = config.tip.indentation(reading);
         let sensed = sensed(contact, touch, motion, config, limits);
-        let distance = Millimetres(wanted.0.saturating_sub(sensed.0));
+        let distance = Millimetres(goal_indentation.0.saturating_sub(sensed.0));
         let back = distance < Millimetres::ZERO;
         let deep = contact.indentation.0.saturating_mul_int(if back { DEEPER_BACK } else { DEEPER });
         // The array confirms how far the tip went into the object.
@@ -168,7 +168,7 @@ impl Grip {
             (true, true) => config.speed_max,
             // This near to the goal the profile is slower than an approach.
             (true, false) if distance <= config.near => config.speed_max,
-            (true, false) => stopping_speed(held, sensed, config).min(config.speed_max).max(config.approach),
+            (true, false) => stopping_speed(limited, sensed, config).min(config.speed_max).max(config.approach),
         };
         // An approach must reach the contact, however short the distance.
         let slack = if touch.held() { config.count.min(FORCE_SLACK) } else { Millimetres::ZERO };
@@ -246,7 +246,7 @@ fn sensed(contact: &Contact, touch: &Touch, motion: &SpeedLoop, config: &Config,
             limits.set(Limits::FROM_BELOW);
         }
         // A force that the motor measured and the array did not confirms the uncertainty.
-        let doubt = if touch.felt() > Millimetres::ZERO { contact.doubt.saturating_mul(4) } else { contact.doubt };
+        let doubt = if touch.by_motor() > Millimetres::ZERO { contact.doubt.saturating_mul(4) } else { contact.doubt };
         let doubtful = (i64::from(deeper.to_bits()) * i64::from(doubt)) / i64::from(u8::MAX);
         sensed = sensed.saturating_add(I8F24::from_bits(doubtful as i32));
     }

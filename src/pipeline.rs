@@ -33,7 +33,7 @@ use crate::pressure::{Array, Calibration};
 use crate::safety::guard::{Guard, Seen};
 use crate::safety::monitor::{self, Monitor, MonitorInputs};
 use crate::state::{Fault, Limits};
-use crate::touch::{Felt, Touch};
+use crate::touch::{Touch, TouchInputs};
 use crate::units::{Duty, Newtons};
 use budget::Budget;
 
@@ -112,8 +112,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         // The tactile image and the contact in it. A broken array shows none: the contact is then the last one's, and
         // the motor gets no voltage by it.
         self.array.read(frame, &self.config);
-        let sound = monitor::array_sound(self.array.picture(), &self.config);
-        let contact = self.contact(sound);
+        let readable = monitor::array_readable(self.array.picture(), &self.config);
+        let contact = self.contact(readable);
 
         // Requests of the host, and reasons to stop.
         let no_new_tare = command.tare_request == self.status.taken.tare;
@@ -124,22 +124,22 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             self.serve(command, sense, &contact);
         }
         let summed = self.array.picture().force(&self.config);
-        if let Some(fault) = self.judge(&contact, sound.then_some(summed), sense, command) {
+        if let Some(fault) = self.judge(&contact, readable.then_some(summed), sense, command) {
             self.stop(fault);
         }
 
         // The duty of the activity, and the guard's limit of it.
-        if sound && self.tared {
+        if readable && self.tared {
             let presses = !self.activity.releases(&self.touch);
             let Self { touch, guard, config, motion, .. } = self;
             let travel = motion.observer.travel;
-            let felt = Felt { contact: &contact, summed, travel, presses };
-            touch.observe(&felt, || guard.depth_felt(config), config);
+            let inputs = TouchInputs { contact: &contact, summed, travel, presses };
+            touch.observe(&inputs, || guard.depth_by_motor(config), config);
             self.learn_baseline(contact.force);
         }
-        let wanted = self.act(&contact, [sound, no_new_tare], sense, command, &mut limits);
-        let duty = if sound { self.guard.allow(wanted, &mut limits) } else { Duty::ZERO };
-        if duty != wanted {
+        let requested = self.act(&contact, [readable, no_new_tare], sense, command, &mut limits);
+        let duty = if readable { self.guard.permit(requested, &mut limits) } else { Duty::ZERO };
+        if duty != requested {
             self.motion.drive.cut();
         }
 
@@ -173,13 +173,13 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
 
     /// Computes the contact in the tactile image. Before a tare the array's offsets look like a contact, so none is
     /// reported.
-    fn contact(&mut self, sound: bool) -> Contact {
-        let fits = sound && self.activity.fits();
+    fn contact(&mut self, readable: bool) -> Contact {
+        let fits = readable && self.activity.fits();
         let contact = if !self.tared {
             Contact { bad_taxels: self.array.picture().bad_count.min(255) as u8, ..Contact::default() }
         } else if fits {
             self.fit.read(self.array.picture(), &self.config)
-        } else if sound || !self.activity.drives() {
+        } else if readable || !self.activity.drives() {
             contact::from_sums(self.array.picture(), &self.config)
         } else {
             self.status.contact
@@ -255,7 +255,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     fn act(
         &mut self,
         contact: &Contact,
-        [sound, no_new_tare]: [bool; 2],
+        [readable, no_new_tare]: [bool; 2],
         sense: &Sense,
         command: &Command,
         limits: &mut Limits,
@@ -284,7 +284,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             }
             Activity::Strokes(run) => {
                 // The sums of a broken array mean nothing.
-                let force = if sound { contact.force.max(picture.force(config)) } else { contact.force };
+                let force = if readable { contact.force.max(picture.force(config)) } else { contact.force };
                 let view =
                     strokes::StrokeInputs { encoder: sense.encoder, force, supply_mv, applied: (applied >> 13) as i32 };
                 run.observe(&view, &mut status.measure, config);
@@ -292,10 +292,10 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
                 if !run.running() {
                     *activity = Activity::Off(Halt::BRAKES);
                 }
-                return motion.push(voltage, supply_mv, config, limits);
+                return motion.apply_voltage(voltage, supply_mv, config, limits);
             }
             Activity::Off(_) | Activity::Tare { .. } | Activity::Fault(_) => {
-                self.rest(sound && no_new_tare);
+                self.rest(readable && no_new_tare);
                 return Duty::ZERO;
             }
         };

@@ -106,10 +106,10 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         self.loads = curve.growth != 0;
         let common = Common { dead: both(config.dead_codes), sag: both(config.sag_q32), curve };
         let total = lanes::pass(&frame.codes, &mut self.rows, &common, &mut self.picture.taxels);
-        let sound = Sound::new(&frame.codes.undriven, config);
+        let limits = CodeLimits::new(&frame.codes.undriven, config);
         let largest = larger_lane(total.largest);
         self.picture.peak = total.peak;
-        self.picture.undriven_max = sound.undriven_max;
+        self.picture.undriven_max = limits.undriven_max;
         self.picture.peak_codes = largest.wrapping_add(config.dead_codes);
         let [sum, moment_x, moment_y] = if self.loads {
             [total.first, total.second, moment_y::<ROWS>(total.first, total.running)]
@@ -119,8 +119,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
             [sum.wrapping_sub(tare), moment_x.wrapping_sub(tare_x), moment_y.wrapping_sub(tare_y)]
         };
         (self.picture.sum, self.picture.moment_x, self.picture.moment_y) = (sum, moment_x, moment_y);
-        if sound.suspects(largest) {
-            self.leave_out(frame, &sound, &before, config);
+        if limits.suspects(largest) {
+            self.leave_out(frame, &limits, &before, config);
         }
         &self.picture
     }
@@ -132,14 +132,14 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
     fn leave_out(
         &mut self,
         frame: &Frame<ROWS, COLUMNS>,
-        sound: &Sound,
+        limits: &CodeLimits,
         before: &Option<[u32; ROWS]>,
         config: &Config,
     ) {
         let Codes { rows, undriven } = &frame.codes;
         let mut highest = 0;
         for (number, ((codes, row), mask)) in rows.iter().zip(&self.rows).zip(&self.mask).enumerate() {
-            if !sound.suspects(larger_lane(row.largest)) {
+            if !limits.suspects(larger_lane(row.largest)) {
                 continue;
             }
             let bad = bad_columns([codes, undriven], config);
@@ -166,10 +166,10 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
     /// readings, and quicker.
     pub fn bad_taxels(&self, frame: &Frame<ROWS, COLUMNS>, config: &Config) -> u32 {
         let Codes { rows, undriven } = &frame.codes;
-        let sound = Sound::new(undriven, config);
+        let limits = CodeLimits::new(undriven, config);
         let mut count = 0;
         for (codes, mask) in rows.iter().zip(&self.mask) {
-            if sound.suspects(sound.largest([codes, undriven])) {
+            if limits.suspects(limits.largest([codes, undriven])) {
                 count += (bad_columns([codes, undriven], config) & !mask).count_ones();
             }
         }
@@ -203,16 +203,16 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
 const COARSER: u32 = 32 - BOOST_BITS;
 
 /// Limits of sound codes of a frame, between dead and saturated.
-struct Sound {
+struct CodeLimits {
     /// Least sound code above the undriven level, in both lanes.
     dead: u32,
     /// The highest undriven level.
     undriven_max: u16,
-    /// The smallest sum of [`Sound::largest`] and the highest undriven level that may belong to a bad taxel.
+    /// The smallest sum of [`CodeLimits::largest`] and the highest undriven level that may belong to a bad taxel.
     suspect: u32,
 }
 
-impl Sound {
+impl CodeLimits {
     /// Computes the limits from the slot with no row driven.
     #[inline(always)]
     pub fn new<const COLUMNS: usize>(undriven: &[u16; COLUMNS], config: &Config) -> Self {
@@ -288,13 +288,13 @@ const fn weight(place: usize, of: usize) -> i32 {
 #[cold]
 #[inline(never)]
 fn bad_columns<const COLUMNS: usize>([codes, undriven]: [&[u16; COLUMNS]; 2], config: &Config) -> u32 {
-    let (dead, sound) = (both(config.dead_codes), both(config.saturated_codes - 1));
+    let (dead, highest) = (both(config.dead_codes), both(config.saturated_codes - 1));
     let mut bad = 0;
     each_pair::<COLUMNS>(|at| {
         let (code, undriven) = (codes_at(codes, at), codes_at(undriven, at));
         let net = lanes::sub(code, undriven);
         // A lane is negative if its taxel is bad; the signs of the first place are shifted most.
-        bad = bad >> 1 | (lanes::sub(net, dead) | lanes::sub(sound, code)) & SIGNS;
+        bad = bad >> 1 | (lanes::sub(net, dead) | lanes::sub(highest, code)) & SIGNS;
     });
     let half = pairs(COLUMNS);
     let first = bad >> (16 - half) & all(half);

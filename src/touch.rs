@@ -77,7 +77,7 @@ pub struct Touch {
     surface: Millimetres,
     place: Place,
     /// Indentation by the motor when the array came to see the contact; 0 where the array saw it first.
-    felt: Millimetres,
+    by_motor: Millimetres,
     /// Largest force of this touch.
     peak: Newtons,
     /// Least force of a touch without a place, or since the tip is clear.
@@ -100,7 +100,7 @@ pub struct Touch {
 }
 
 /// Inputs of the record in a frame.
-pub struct Felt<'a> {
+pub struct TouchInputs<'a> {
     /// The contact by the array.
     pub contact: &'a Contact,
     /// Force by the plain sum of the taxels: a step in it is a step of the signal, not of the fit.
@@ -115,18 +115,18 @@ impl Touch {
     /// Takes a frame; `by_motor` returns the indentation by the force that the motor measured, and is called when a
     /// touch begins.
     #[inline(always)]
-    pub fn observe(&mut self, felt: &Felt, by_motor: impl Fn() -> Millimetres, config: &Config) {
-        let Contact { force, doubt, .. } = *felt.contact;
-        let shown = if doubt > SURE { force.min(felt.summed) } else { force };
+    pub fn observe(&mut self, inputs: &TouchInputs, by_motor: impl Fn() -> Millimetres, config: &Config) {
+        let Contact { force, doubt, .. } = *inputs.contact;
+        let shown = if doubt > SURE { force.min(inputs.summed) } else { force };
         self.shown = shown;
         match self.stage {
-            Stage::Held => self.hold(felt, config),
-            Stage::None if force >= config.contact_on => self.begin(felt, by_motor()),
-            Stage::Lost if shown >= config.contact_on => self.begin(felt, by_motor()),
+            Stage::Held => self.hold(inputs, config),
+            Stage::None if force >= config.contact_on => self.begin(inputs, by_motor()),
+            Stage::Lost if shown >= config.contact_on => self.begin(inputs, by_motor()),
             Stage::None => {}
             Stage::Lost => {
                 // Nothing is pressed deeper than the largest force presses: the object left.
-                if self.deep(felt.travel) > config.bounds.back {
+                if self.deep(inputs.travel) > config.bounds.back {
                     *self = Self { shown, ..Self::default() };
                 }
             }
@@ -136,34 +136,33 @@ impl Touch {
                 self.least = self.least.min(shown);
                 self.frames = (self.frames + 1).min(FRAMES_MAX);
                 if shown.0 > self.least.0.saturating_add(config.contact_on.0) {
-                    self.begin(felt, by_motor());
+                    self.begin(inputs, by_motor());
                 }
             }
         }
-        self.lesser = (force.min(self.before.0), felt.summed.min(self.before.1));
-        self.before = (force, felt.summed, felt.contact.bad_taxels);
+        self.lesser = (force.min(self.before.0), inputs.summed.min(self.before.1));
+        self.before = (force, inputs.summed, inputs.contact.bad_taxels);
     }
 
     /// Starts a touch. A force that returns keeps the surface and the largest force of the contact before, until it
     /// rises.
-    fn begin(&mut self, felt: &Felt, by_motor: Millimetres) {
-        let force = felt.contact.force;
+    fn begin(&mut self, inputs: &TouchInputs, by_motor: Millimetres) {
+        let force = inputs.contact.force;
         let kept = self.stage != Stage::None && self.place != Place::Here;
         let (place, surface, peak) =
-            if kept { (Place::Before, self.surface, self.peak) } else { (Place::Here, place(felt, by_motor), force) };
+            if kept { (Place::Before, self.surface, self.peak) } else { (Place::Here, place(inputs, by_motor), force) };
         let shown = self.shown;
-        *self =
-            Self { stage: Stage::Held, place, surface, felt: by_motor, peak, least: shown, shown, ..Self::default() };
+        *self = Self { stage: Stage::Held, place, surface, by_motor, peak, least: shown, shown, ..Self::default() };
     }
 
-    fn hold(&mut self, felt: &Felt, config: &Config) {
-        let Contact { force, .. } = *felt.contact;
+    fn hold(&mut self, inputs: &TouchInputs, config: &Config) {
+        let Contact { force, .. } = *inputs.contact;
         let (force_before, Newtons(sum_before)) = self.lesser;
         let step = force_before.0.saturating_sub(force.0);
         let least = (sum_before >> STEP_BITS).saturating_add(config.contact_on.0);
         // Taxels that fail take their share of the sum with them; in a slow frame an object can leave.
-        let comparable = self.before.2 == felt.contact.bad_taxels && config.timing.frame_ns <= FRAME_NS_MAX;
-        if comparable && sum_before.saturating_sub(felt.summed.0) > least {
+        let comparable = self.before.2 == inputs.contact.bad_taxels && config.timing.frame_ns <= FRAME_NS_MAX;
+        if comparable && sum_before.saturating_sub(inputs.summed.0) > least {
             self.withheld = Newtons(self.withheld.0.saturating_add(step)).max(Newtons::from_bits(1));
         } else if self.withheld > Newtons::ZERO && step.saturating_neg() > self.withheld.0 >> 1 {
             // The signal is back.
@@ -173,7 +172,7 @@ impl Touch {
         self.frames = (self.frames + 1).min(FRAMES_MAX);
         if self.place != Place::Known && self.withheld == Newtons::ZERO {
             self.least = self.least.min(self.shown);
-            self.find(felt, config);
+            self.find(inputs, config);
         }
         // After a step, what hysteresis and creep leave is no force.
         let residue = self.withheld > Newtons::ZERO && force.0 <= self.peak.0 >> RESIDUE_BITS;
@@ -190,24 +189,24 @@ impl Touch {
     }
 
     /// Looks for the surface's place.
-    fn find(&mut self, felt: &Felt, config: &Config) {
+    fn find(&mut self, inputs: &TouchInputs, config: &Config) {
         let above = self.shown.0 > self.least.0.saturating_add(config.contact_on.0);
         self.risen = if above { (self.risen + 1).min(FRAMES_MAX) } else { 0 };
         let lasts = self.risen.saturating_mul(config.timing.frame_ns) > DOUBTFUL_NS;
         let rises = match self.place {
             Place::Here => above,
-            Place::Before => lasts && felt.presses,
+            Place::Before => lasts && inputs.presses,
             Place::Inherited | Place::Known => lasts,
         };
-        let here = place(felt, self.felt);
-        let sure = felt.contact.doubt == 0;
+        let here = place(inputs, self.by_motor);
+        let sure = inputs.contact.doubt == 0;
         match self.place {
             // If a part of the contact is hidden, an indentation that is too small must not move the surface.
             Place::Here if sure => self.surface = self.surface.max(here),
             Place::Before if rises => {
                 // A contact that was lost to the array alone is where it was.
                 self.surface = if sure { here } else { here.min(self.surface) };
-                self.peak = felt.contact.force;
+                self.peak = inputs.contact.force;
             }
             _ => {}
         }
@@ -257,8 +256,8 @@ impl Touch {
     }
 
     /// Indentation by the motor when the touch began.
-    pub fn felt(&self) -> Millimetres {
-        self.felt
+    pub fn by_motor(&self) -> Millimetres {
+        self.by_motor
     }
 
     /// Largest force of this touch.
@@ -329,8 +328,8 @@ impl Touch {
 
 /// Travel at which the tip touches, from the present frame. Where a part of the contact is hidden, the indentation that
 /// the motor measured counts if it is larger.
-fn place(felt: &Felt, by_motor: Millimetres) -> Millimetres {
-    let Contact { indentation, doubt, .. } = *felt.contact;
+fn place(inputs: &TouchInputs, by_motor: Millimetres) -> Millimetres {
+    let Contact { indentation, doubt, .. } = *inputs.contact;
     let deep = if doubt > 0 { indentation.max(by_motor) } else { indentation };
-    Millimetres(felt.travel.0.saturating_sub(deep.0))
+    Millimetres(inputs.travel.0.saturating_sub(deep.0))
 }

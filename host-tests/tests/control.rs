@@ -273,7 +273,7 @@ fn a_calm_loop_ignores_an_error_within_the_slack() {
     };
     let quick = SpeedLoop::new();
     let mut calm = quick;
-    for _ in 0..10 * config.calm_frames {
+    for _ in 0..10 * config.settled_frames {
         calm.schedule.note(Millimetres::ZERO, &config);
     }
     assert!(speed_over(quick, 0.004, slack) > MillimetresPerSecond::ZERO);

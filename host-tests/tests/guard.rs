@@ -46,7 +46,7 @@ fn travel_mm(guard: &Guard) -> f64 {
 fn lets_through(guard: &Guard) -> [bool; 2] {
     [Duty::FULL, -Duty::FULL].map(|duty| {
         let mut limits = Limits::default();
-        let allowed = guard.allow(Duty(duty), &mut limits);
+        let allowed = guard.permit(Duty(duty), &mut limits);
         assert_eq!(allowed.0 != duty, limits.has(Limits::GUARD));
         assert!(allowed.0 == duty || allowed.0 == 0);
         allowed.0 == duty
@@ -177,7 +177,7 @@ impl Adversary {
             self.left = rng.u32(1..600);
         }
         self.left -= 1;
-        let duty = guard.allow(Duty(self.duty), &mut Limits::default());
+        let duty = guard.permit(Duty(self.duty), &mut Limits::default());
         let voltage = i64::from(duty.0) * i64::from(config.voltage_max_q8_mm_per_s2) / i64::from(Duty::FULL);
         let frame_s = 1.0 / f64::from(config.bounds.frames_per_s);
         let damping = f64::from(config.damping_q17_per_s) / 131_072.0;

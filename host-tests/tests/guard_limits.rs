@@ -61,9 +61,9 @@ impl Finger {
     fn lets(&self) -> [bool; 2] {
         [1, -1].map(|sign| {
             let mut limits = Limits::default();
-            let duty = self.guard.allow(Duty(sign), &mut limits);
+            let duty = self.guard.permit(Duty(sign), &mut limits);
             assert_eq!(duty == Duty(sign), limits == Limits::default());
-            assert_eq!(self.guard.allow(Duty::ZERO, &mut Limits::default()), Duty::ZERO);
+            assert_eq!(self.guard.permit(Duty::ZERO, &mut Limits::default()), Duty::ZERO);
             duty == Duty(sign)
         })
     }

@@ -1,7 +1,7 @@
 //! The monitor by itself: each limit on both sides, and for how many frames.
 
 use crate::common::*;
-use fingertip::safety::monitor::{Monitor, MonitorInputs, array_broken, array_sound};
+use fingertip::safety::monitor::{Monitor, MonitorInputs, array_broken, array_readable};
 use fingertip::units::MillimetresPerSecond2;
 use host_tests::finger::tared;
 
@@ -278,7 +278,7 @@ fn an_array_is_broken_from_the_very_limit_on() {
         (51, 51, stuck + 1, Some(Fault::RowStuck), false),
     ] {
         let picture = TactileImage { bad_count, bad_again, undriven_max, ..TactileImage::EMPTY };
-        let found = (array_broken(&picture, &config), array_sound(&picture, &config));
+        let found = (array_broken(&picture, &config), array_readable(&picture, &config));
         assert_eq!(found, (fault, sound), "{bad_count} bad, {bad_again} again, {undriven_max} codes");
     }
 }

@@ -257,7 +257,7 @@ fn config(params: &Params) -> Config {
     assert!(config.force_seen > Newtons::ZERO && config.force_seen <= config.tip.force_max(), "{config:?}");
     // Room for the rounding of its quotient; a motor too weak for the acceleration's resolution is not driven.
     assert!((1..u32::MAX - 65_535).contains(&config.duty_gain) || config.voltage_max_q8_mm_per_s2 == 0, "{config:?}");
-    let positive = [config.frame_s_q37, config.counts_max, config.calm_band.to_bits(), config.bounds.leak];
+    let positive = [config.frame_s_q37, config.counts_max, config.settled_band.to_bits(), config.bounds.leak];
     let gains = config.gain_sets.iter().flat_map(|gains| {
         let Gains { observer: [l1, l2, l3], speed_q18_per_s, slope_per_s, half_over_slope_q32, half_over_slope2_q40 } =
             *gains;

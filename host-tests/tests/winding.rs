@@ -124,7 +124,7 @@ fn it_never_passes_its_largest_temperature() {
         for _ in 0..(60.0 / frame_s(&config)) as u32 {
             motion.winding.observe(motion.drive.acceleration(), &config);
             let mut limits = Limits::default();
-            motion.push(config.voltage_max_q8_mm_per_s2, 8_000, &config, &mut limits);
+            motion.apply_voltage(config.voltage_max_q8_mm_per_s2, 8_000, &config, &mut limits);
             held += u32::from(limits.has(Limits::WINDING));
             let amperes = f64::from(motion.drive.acceleration()) / f64::from(config.current_max_q8_mm_per_s2)
                 * f64::from(params.current_max_ma)

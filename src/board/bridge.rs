@@ -12,7 +12,7 @@ use embassy_stm32::pac::timer::regs::SrAdv;
 use embassy_stm32::pac::timer::vals::{Bkp, Ocm, Ossi, Ossr};
 use embassy_stm32::peripherals::{PA8, PA9, PB12, PC9, TIM1};
 use embassy_stm32::{Peri, pac, rcc};
-use fingertip::pipeline::Bridge as Wanted;
+use fingertip::pipeline::Bridge as Requested;
 use fingertip::scan::ScanTiming;
 use fingertip::units::{Duty, ScanTicks};
 
@@ -90,16 +90,16 @@ impl Bridge {
     }
 
     /// Sets the state that the pipeline requests. A sleeping driver is not woken to brake.
-    pub fn apply(&mut self, wanted: Wanted) {
-        match wanted {
-            Wanted::Asleep => self.sleep(),
-            Wanted::Open => {
+    pub fn apply(&mut self, requested: Requested) {
+        match requested {
+            Requested::Asleep => self.sleep(),
+            Requested::Open => {
                 self.coast();
                 self.wake();
             }
-            Wanted::Brakes if self.ready => self.drive(Duty::ZERO, true),
-            Wanted::Brakes => self.sleep(),
-            Wanted::Driven(duty) => {
+            Requested::Brakes if self.ready => self.drive(Duty::ZERO, true),
+            Requested::Brakes => self.sleep(),
+            Requested::Driven(duty) => {
                 self.wake();
                 if self.ready {
                     self.drive(duty, false);

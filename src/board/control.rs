@@ -8,7 +8,7 @@ use fingertip::capture::Ended;
 use fingertip::command::Command;
 use fingertip::frame::Sense;
 use fingertip::params::Params;
-use fingertip::pipeline::Bridge as Wanted;
+use fingertip::pipeline::Bridge as Requested;
 use fingertip::shipped::{Calibration, Config, Frame, Pipeline};
 use fingertip::state::{Fault, Mode};
 use fingertip::units::CoreCycles;
@@ -151,7 +151,7 @@ impl ControlTask {
         }
         self.parts.scan.copy_so_far(&mut self.frame);
         if self.parts.pipeline.check_part(&self.frame) {
-            self.parts.bridge.apply(Wanted::Brakes);
+            self.parts.bridge.apply(Requested::Brakes);
             self.keeper.end(Ended::Cut);
             self.publish();
         }
@@ -322,7 +322,7 @@ impl ControlTask {
     fn capture(&mut self) {
         self.keeper.take_asked();
         if self.keeper.is_due(self.parts.pipeline.status(), || HEARD.get().command) {
-            self.parts.bridge.apply(Wanted::Open);
+            self.parts.bridge.apply(Requested::Open);
             self.rest();
             self.keeper.begin(self.parts.pipeline);
             self.restart_scan();
@@ -334,7 +334,7 @@ impl ControlTask {
     fn configure(&mut self) {
         let Some(params) = PARAMS.take(|params| *params) else { return };
         self.keeper.end(Ended::Configured);
-        self.parts.bridge.apply(Wanted::Open);
+        self.parts.bridge.apply(Requested::Open);
         self.rest();
         self.parts.watchdogs.allow_long();
         if !set_config(self.parts.pipeline, &params) {
@@ -347,7 +347,7 @@ impl ControlTask {
     fn calibrate(&mut self) {
         if let Some(gains) = GAINS.take(|gains| *gains) {
             self.keeper.end(Ended::Configured);
-            self.parts.bridge.apply(Wanted::Open);
+            self.parts.bridge.apply(Requested::Open);
             self.rest();
             self.parts.pipeline.calibrate(&Calibration::of(&gains));
             self.restart_scan();

@@ -25,7 +25,12 @@ fn check(config: &Config) {
     near("slew_limit", config.slew_max_q8_mm_per_s2.into(), slew.min(i32::MAX.into()), 1e-5);
     let jump = (4e-3 * f64::from(p.speed_max_um_per_s) * frame_s).max(0.5);
     near("jump", config.jump.into(), jump * two(24), 1e-5);
-    near("calm_frames", config.calm_frames.into(), 4.0 / (f64::from(config.gain_sets[0].slope_per_s) * frame_s), 1e-5);
+    near(
+        "settled_frames",
+        config.settled_frames.into(),
+        4.0 / (f64::from(config.gain_sets[0].slope_per_s) * frame_s),
+        1e-5,
+    );
     near("frames_per_s", config.bounds.frames_per_s.into(), 1.0 / frame_s, 1e-6);
     let tau_s = f64::max(0.005 * (config.count.0.to_num::<f64>() / 0.008).clamp(1.0, 8.0), 8.0 * frame_s);
     near("leak", config.bounds.leak.into(), frame_s / tau_s * two(16), 1e-4);

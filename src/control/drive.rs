@@ -74,25 +74,25 @@ impl Drive {
     }
 
     /// Sets the share of the current limit that the winding's temperature allows, Q8.
-    pub fn allow(&mut self, share: i32) {
+    pub fn limit_current(&mut self, share: i32) {
         self.allowed = share;
     }
 
-    /// Limits the wanted g V to what slew, current and voltage allow.
+    /// Limits the requested g V to what slew, current and voltage allow.
     ///
     /// The current follows from the motor's model, i = (V - k_e omega) / R: holding |g V - c v| to g R i_max holds it.
     #[inline(always)]
-    pub fn apply(&mut self, wanted: i32, back_emf: i32, supply_mv: u16, config: &Config, limits: &mut Limits) {
-        let slewed = clamp_around(wanted, self.given, config.slew_max_q8_mm_per_s2);
+    pub fn apply(&mut self, requested: i32, back_emf: i32, supply_mv: u16, config: &Config, limits: &mut Limits) {
+        let slewed = clamp_around(requested, self.given, config.slew_max_q8_mm_per_s2);
         self.spare(supply_mv, config);
         let within_current =
             clamp_around(slewed, back_emf, (config.current_max_q8_mm_per_s2 >> 8) * self.share.min(self.allowed));
         let most = voltage_limit(supply_mv, config);
         let applied = within_current.max(-most).min(most);
-        if applied != wanted {
+        if applied != requested {
             let flag = |cut, flag| if cut { flag } else { 0 };
             limits.set(
-                flag(slewed != wanted, Limits::SLEW)
+                flag(slewed != requested, Limits::SLEW)
                     | flag(within_current != slewed, Limits::CURRENT)
                     | flag(within_current != slewed && self.allowed < self.share, Limits::WINDING)
                     | flag(applied != within_current, Limits::VOLTAGE),
@@ -214,7 +214,7 @@ impl Winding {
         let lags = [winding, housing].map(u64::cast_signed);
         let mut known = Self { squares, frames, lags, started, share: WHOLE };
         if started {
-            known.allow(&config.heat);
+            known.update_share(&config.heat);
         }
         Some(known)
     }
@@ -248,11 +248,11 @@ impl Winding {
             // A lag without a gain is left out: it keeps no heat of earlier parameters.
             *lag = if part.gain == 0 { 0 } else { (*lag + ((way * i64::from(leak)) >> 19)).max(0) };
         }
-        self.allow(heat);
+        self.update_share(heat);
     }
 
     #[inline(always)]
-    fn allow(&mut self, heat: &Heat) {
+    fn update_share(&mut self, heat: &Heat) {
         let left = (heat.room_q30 - self.above()).max(0);
         // Q8 of the allowance.
         self.share = (left >> (30 + ALLOWANCE_BITS - 8)).min(WHOLE.into()) as i32;

@@ -177,7 +177,7 @@ impl Guard {
     }
 
     /// Returns the duty if it is allowed, else zero with [`Limits::GUARD`] set.
-    pub fn allow(&self, duty: Duty, limits: &mut Limits) -> Duty {
+    pub fn permit(&self, duty: Duty, limits: &mut Limits) -> Duty {
         let allowed = (duty.0 == 0) || if duty.0 > 0 { self.may.forward } else { self.may.back };
         if allowed {
             return duty;
@@ -288,7 +288,7 @@ impl Guard {
 
     /// Indentation by the force that the motor measured before the array saw a contact.
     #[inline(never)]
-    pub fn depth_felt(&self, config: &Config) -> Millimetres {
+    pub fn depth_by_motor(&self, config: &Config) -> Millimetres {
         self.unseen.depth(self.force, self.speed, config)
     }
 

@@ -207,7 +207,7 @@ pub fn array_broken<const ROWS: usize, const COLUMNS: usize>(
 
 /// Returns true if a frame's array can be read. It cannot if more taxels are bad than allowed, even in this frame
 /// only.
-pub fn array_sound<const ROWS: usize, const COLUMNS: usize>(
+pub fn array_readable<const ROWS: usize, const COLUMNS: usize>(
     picture: &TactileImage<ROWS, COLUMNS>,
     config: &Config,
 ) -> bool {

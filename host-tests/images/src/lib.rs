@@ -12,7 +12,7 @@ use fingertip::control::{Reference, SpeedLoop};
 use fingertip::grip::{Goal, Grip};
 use fingertip::params::Params;
 use fingertip::state::Limits;
-use fingertip::touch::{Felt, Touch};
+use fingertip::touch::{Touch, TouchInputs};
 use fingertip::units::Millimetres;
 
 pub mod closed_loop;
@@ -42,7 +42,7 @@ pub fn reference(
     config: &Config,
     limits: &mut Limits,
 ) -> Reference {
-    let felt = Felt { contact, summed: contact.force, travel: motion.observer.travel, presses: true };
+    let felt = TouchInputs { contact, summed: contact.force, travel: motion.observer.travel, presses: true };
     touch.observe(&felt, || Millimetres::ZERO, config);
     grip.reference(&goal, contact, touch, motion, config, limits)
 }

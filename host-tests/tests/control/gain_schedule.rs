@@ -9,7 +9,7 @@ use fingertip::control::GainSchedule;
 fn number(schedule: &GainSchedule, config: &Config) -> usize {
     let number =
         config.gain_sets.iter().position(|gains| gains == schedule.gains(config)).expect("one of the gain sets");
-    assert_eq!(schedule.calm(), number > 0);
+    assert_eq!(schedule.settled(), number > 0);
     number
 }
 
@@ -25,7 +25,7 @@ fn run(schedule: &mut GainSchedule, way: i32, frames: u32, config: &Config) -> V
 /// Schedule with the calmest gain set and a mean position error of 0.
 fn calmest(config: &Config) -> GainSchedule {
     let mut schedule = GainSchedule::QUICK;
-    run(&mut schedule, 0, 10 * config.calm_frames, config);
+    run(&mut schedule, 0, 10 * config.settled_frames, config);
     assert_eq!(number(&schedule, config), GAIN_SETS - 1);
     schedule
 }
@@ -35,7 +35,7 @@ fn without_an_error_each_gain_set_lasts_twice_as_long_as_the_one_before() {
     let config = config();
     let mut schedule = GainSchedule::QUICK;
     for slower in 0..GAIN_SETS - 1 {
-        let lasts = config.calm_frames << slower;
+        let lasts = config.settled_frames << slower;
         assert_eq!(run(&mut schedule, 0, lasts, &config), vec![slower; lasts as usize]);
         assert_eq!(run(&mut schedule, 0, 1, &config), [slower + 1]);
     }
@@ -46,11 +46,11 @@ fn without_an_error_each_gain_set_lasts_twice_as_long_as_the_one_before() {
 #[test]
 fn a_gain_set_is_kept_up_to_its_largest_error() {
     let config = config();
-    let band = config.calm_band.to_bits();
+    let band = config.settled_band.to_bits();
     for (at, longest) in [(3, 2 * band), (2, 4 * band), (1, 8 * band)] {
         // Starts with the calmest gain set and steps up to set `at`.
         let mut schedule = calmest(&config);
-        run(&mut schedule, -longest / 2 - 1, 10 * config.calm_frames, &config);
+        run(&mut schedule, -longest / 2 - 1, 10 * config.settled_frames, &config);
         run(&mut schedule, -longest, 200, &config);
         assert_eq!(number(&schedule, &config), at, "{longest}");
         // The same error again, for longer than a change to a calmer set takes.
@@ -67,14 +67,14 @@ fn a_gain_set_is_kept_up_to_its_largest_error() {
 #[test]
 fn half_the_largest_error_is_calm() {
     let config = config();
-    let band = config.calm_band.to_bits();
+    let band = config.settled_band.to_bits();
     for (at, calm) in [(0, 4 * band), (1, 2 * band), (2, band)] {
         for (way, next) in [(calm, at + 1), (calm + 1, at)] {
             let mut schedule = GainSchedule::QUICK;
             run(&mut schedule, i32::MAX, 100, &config);
-            run(&mut schedule, calm + 1, 20 * config.calm_frames, &config);
+            run(&mut schedule, calm + 1, 20 * config.settled_frames, &config);
             assert_eq!(number(&schedule, &config), at, "at {calm}");
-            let last = *run(&mut schedule, way, 20 * config.calm_frames, &config).last().unwrap();
+            let last = *run(&mut schedule, way, 20 * config.settled_frames, &config).last().unwrap();
             assert_eq!(last, next, "{way} of {calm}");
         }
     }
@@ -92,7 +92,7 @@ fn a_large_error_counts_soon_and_is_forgotten_soon() {
         run(&mut schedule, way, 1_000, &config);
         // Down to a quarter in 11 frames; calm from then on.
         let frames = run(&mut schedule, 0, 1_000, &config).iter().position(|number| *number == 1).unwrap() as u32;
-        assert!((10..=11).contains(&(frames - config.calm_frames)), "{frames} frames");
+        assert!((10..=11).contains(&(frames - config.settled_frames)), "{frames} frames");
     }
 }
 
@@ -100,10 +100,10 @@ fn a_large_error_counts_soon_and_is_forgotten_soon() {
 fn an_error_in_between_restarts_the_calm() {
     let config = config();
     let mut schedule = GainSchedule::QUICK;
-    run(&mut schedule, 0, config.calm_frames - 2, &config);
+    run(&mut schedule, 0, config.settled_frames - 2, &config);
     // The third frame of 16 bands makes a mean of 5.3, which is again below 4 after three frames without an error.
     run(&mut schedule, i32::MAX, 3, &config);
-    let lasts = 2 + config.calm_frames;
+    let lasts = 2 + config.settled_frames;
     assert_eq!(run(&mut schedule, 0, lasts, &config), vec![0; lasts as usize]);
     assert_eq!(run(&mut schedule, 0, 1, &config), [1]);
 }

@@ -7,7 +7,7 @@ use crate::common::*;
 use fingertip::config::Config;
 use fingertip::control::Reference;
 use fingertip::grip::{Goal, Grip};
-use fingertip::touch::{Felt, Stage, Touch};
+use fingertip::touch::{Stage, Touch, TouchInputs};
 
 /// Position error that a calm loop accepts: 0.4 um.
 const SLACK: Millimetres = Millimetres::from_bits((1 << 24) / 2_500);
@@ -28,7 +28,7 @@ fn at(travel: Millimetres) -> SpeedLoop {
 /// The tip at rest for a while.
 fn calm_at(travel: Millimetres, config: &Config) -> SpeedLoop {
     let mut motion = at(travel);
-    for _ in 0..10 * config.calm_frames {
+    for _ in 0..10 * config.settled_frames {
         motion.schedule.note(Millimetres::ZERO, config);
     }
     motion
@@ -101,7 +101,7 @@ impl Hand {
 
     fn see(&mut self, contact: &Contact, motion: SpeedLoop, config: &Config) {
         let presses = self.grip.mode(&self.touch) != Mode::Release;
-        let felt = Felt { contact, summed: contact.force, travel: motion.observer.travel, presses };
+        let felt = TouchInputs { contact, summed: contact.force, travel: motion.observer.travel, presses };
         self.touch.observe(&felt, || Millimetres::ZERO, config);
     }
 

@@ -10,7 +10,7 @@ use fingertip::control::{Drive, Observer, Reference, SpeedLoop, TemperatureDrift
 use fingertip::grip::{Goal, Grip};
 use fingertip::shipped::{Array, Budget, COLUMNS, Config, Fit, Frame};
 use fingertip::state::Limits;
-use fingertip::touch::{Felt, Touch};
+use fingertip::touch::{Touch, TouchInputs};
 use fingertip::units::{Celsius, CoreCycles, Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons};
 use lanes::{Codes, Common, Curve, Row, Total};
 use paper::{Relaxation, RelaxationState};
@@ -190,7 +190,12 @@ pub const STEPS: [Step; 20] = [
         let goal = if s.share_q32 & 3 == 1 { Newtons::ZERO } else { goal };
         let travel = m.motion.observer.travel;
         m.touch.observe(
-            &Felt { contact: &contact, summed: Newtons::from_bits(s.words[2]), travel, presses: s.share_q32 & 4 == 0 },
+            &TouchInputs {
+                contact: &contact,
+                summed: Newtons::from_bits(s.words[2]),
+                travel,
+                presses: s.share_q32 & 4 == 0,
+            },
             || Millimetres::ZERO,
             &m.config,
         );

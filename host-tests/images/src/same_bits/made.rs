@@ -110,8 +110,8 @@ fn add_config(mix: &mut Mix, config: &Config) {
         jump,
         counts_max,
         gain_sets,
-        calm_band,
-        calm_frames,
+        settled_band,
+        settled_frames,
         damping_q17_per_s,
         voltage_max_q8_mm_per_s2,
         current_max_q8_mm_per_s2,
@@ -143,7 +143,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
     for force in [tip.force_max(), *contact_on, *contact_off, *force_fault, *force_max, *force_seen] {
         mix.add(force.to_bits());
     }
-    for length in [half_pitch, count, calm_band, travel_max, clearance, &bounds.back] {
+    for length in [half_pitch, count, settled_band, travel_max, clearance, &bounds.back] {
         mix.add(length.to_bits());
     }
     for number in [newtons_per_sum_q48, pascals_per_sum_q32, mm_per_count_q40] {
@@ -173,7 +173,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
         mix.add(rise_q31);
         mix.add(fall_q31);
     }
-    for number in [*frame_s_q37, *counts_max, calm_frames.cast_signed()] {
+    for number in [*frame_s_q37, *counts_max, settled_frames.cast_signed()] {
         mix.add(number);
     }
     for gains in gain_sets {

@@ -31,7 +31,7 @@ pub extern "C" fn creeping(bench: &mut Bench) {
 
 pub extern "C" fn follow(bench: &mut Bench) {
     let supply_mv = bench.record.sense.supply_mv;
-    bench.motion.pull(bench.reference, supply_mv, bench.config, &mut bench.limits);
+    bench.motion.apply_law(bench.reference, supply_mv, bench.config, &mut bench.limits);
 }
 
 pub extern "C" fn duty(bench: &mut Bench) {

@@ -102,7 +102,7 @@ extern "C" fn guard(bench: &mut Bench) {
         given_q8_mm_per_s2: bench.motion.drive.given(),
     };
     if bench.guard.check(&seen, true, bench.config).is_none() {
-        bench.duty = bench.guard.allow(bench.duty, &mut bench.limits);
+        bench.duty = bench.guard.permit(bench.duty, &mut bench.limits);
     }
 }
 

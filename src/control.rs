@@ -116,8 +116,8 @@ impl SpeedLoop {
 
     /// Returns the speed reference for a distance to go, at most `limit`, and true if that limit reduced it.
     ///
-    /// Once the loop has settled, a distance within `slack` counts as 0: otherwise a tip that sticks would be driven from
-    /// count to count for ever.
+    /// Once the loop has settled, a distance within `slack` counts as 0: otherwise a tip that sticks would be driven
+    /// from count to count for ever.
     #[inline(always)]
     pub fn towards(
         &mut self,

@@ -160,7 +160,7 @@ pub struct Motions {
 
 #[inline(never)]
 fn limited(value: f32, min: f32, max: f32) -> i32 {
-    value.clamp(min, max) as i32
+    value.max(min).min(max) as i32
 }
 
 impl Motions {

@@ -32,17 +32,6 @@ pub enum Error {
         /// Reason reported by the emulator.
         why: String,
     },
-    /// A snapshot could not be taken or read.
-    #[error("snapshot: {0}")]
-    Snapshot(#[from] rigless::snapshot::Error),
-    /// A snapshot could not be written.
-    #[error("cannot write the snapshot {}: {source}", path.display())]
-    WriteSnapshot {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
     /// A fault could not be injected.
     #[error("cannot inject the fault: {0}")]
     Fault(String),

@@ -18,7 +18,6 @@ use crate::window_watchdog::WindowWatchdog;
 use crate::wire::Wire;
 use rigless::device::{Device, ErasedDevice, Level, RegisterFile, ResetCause};
 use rigless::mcu::Mcu;
-use rigless::snapshot::store;
 use rigless::soc::stm32f427::Stm32f427;
 use rigless::soc::stm32f427::generated::c_adc::{self, ccr};
 use rigless::soc::stm32f427::generated::rcc::{Register, apb1enr, csr};
@@ -27,7 +26,6 @@ use rigless::soc::stm32f427::peripherals::tim::Channel;
 use rigless::soc::stm32f427::peripherals::{CONVERTERS, SERIAL_INTERFACES};
 use rigless::soc::{Bus, Error};
 use rigless::time::VirtualNanos;
-use serde::{Deserialize, Serialize};
 
 /// Clock of the buses after reset, Hz: the internal oscillator.
 const RESET_HZ: u64 = 16_000_000;
@@ -54,7 +52,7 @@ enum Model {
 }
 
 /// The levels that the board holds on pins, through every reset of the part.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug)]
 pub struct Inputs {
     /// Phase of the encoder in its quadrature cycle, 0 to 3.
     pub quarter: u8,
@@ -83,12 +81,6 @@ pub struct Part {
     pwm_slot: usize,
     common_slot: usize,
 }
-
-store!(Part {
-    values: [inputs],
-    parts: [chip, bus_port, converters, pwm_timer, scan_timer, streams, window_watchdog],
-    built: [front_end, layout, laying_out, wiring, port_slot, pwm_slot, common_slot],
-});
 
 impl Part {
     /// Out of power-on, the converters on a front end.

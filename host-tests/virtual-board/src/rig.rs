@@ -20,10 +20,8 @@ use fingertip::shipped::Record;
 use rigless::emulator::{self, Start};
 use rigless::image::Image;
 use rigless::session::Session;
-use rigless::snapshot::Snapshot;
 use rigless::time::VirtualNanos;
 use sim::plant::Plant;
-use std::num::NonZeroU64;
 use std::path::Path;
 use std::sync::mpsc;
 use std::thread::JoinHandle;
@@ -31,14 +29,8 @@ use std::thread::JoinHandle;
 /// Settings of a run.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Instructions that the core retires in a second, constant: 125 million is a CPI of 1.34 at 168 MHz, as in the
-    /// cycle estimate of the control step.
-    pub instructions_per_second: NonZeroU64,
     /// Addresses and bytes that memory holds beside the image, for example a parameter sector.
     pub presets: Vec<(u64, Vec<u8>)>,
-    /// Bits 3:2 of the option bytes: 0 is the brown-out level 3, as `cargo xtask flash` leaves them, and 3 is off, as
-    /// the factory does.
-    pub brown_out_bits: u8,
     /// Factory codes of the reference and of the temperature sensor.
     pub factory: Factory,
 }
@@ -54,12 +46,7 @@ impl Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self {
-            instructions_per_second: NonZeroU64::new(125_000_000).expect("the core runs"),
-            presets: Vec::new(),
-            brown_out_bits: 0,
-            factory: inside::factory(),
-        }
+        Self { presets: Vec::new(), factory: inside::factory() }
     }
 }
 
@@ -106,34 +93,18 @@ impl Rig {
     /// # Errors
     /// The image cannot be read or placed.
     pub fn new(image: &Path, world: impl Into<Surroundings>, options: &Options) -> Result<Self, Error> {
-        Self::start(image, world.into(), options, None)
-    }
-
-    /// The board as a snapshot kept it: the same image and options, at the instant at which it was taken.
-    ///
-    /// # Errors
-    /// Like [`Rig::new`]; also if the snapshot is of another image or other options.
-    pub fn restore(image: &Path, snapshot: &Path, options: &Options) -> Result<Self, Error> {
-        let world = Plant::new(&sim::setup::Setup::default());
-        Self::start(image, world.into(), options, Some(Snapshot::read(snapshot)?))
-    }
-
-    fn start(path: &Path, world: Surroundings, options: &Options, kept: Option<Snapshot>) -> Result<Self, Error> {
-        let image = Firmware::read(path)?;
+        let image = Firmware::read(image)?;
         let images = images(&image, options)?;
-        let front_end = Shared::new(world);
-        let board = FingerBoard::new(front_end.clone(), options)?;
-        let mut session = Session::new(Box::new(board), 0, VirtualNanos(STEP_NS)).map_err(failure(0))?;
-        let mut bench = Bench::new(front_end, &image);
+        let front_end = Shared::new(world.into());
+        let board = FingerBoard::new(front_end.clone())?;
+        let session = Session::new(Box::new(board), 0, VirtualNanos(STEP_NS)).map_err(failure)?;
+        let bench = Bench::new(front_end, &image);
         let (orders, ordered) = mpsc::channel();
         let (reaching, reached) = mpsc::channel();
-        let resume = kept.map(|kept| kept.restore(&mut session, &digest(&images), &mut bench)).transpose()?;
-        let hall = Hall::new(bench, ordered, reaching, digest(&images));
-        let thread = std::thread::Builder::new().name("board".into()).spawn(move || {
-            let mut start = Start::new(&images);
-            start.resume = resume.as_ref();
-            emulator::run(session, &start, hall).map(drop).map_err(failure(0))
-        })?;
+        let hall = Hall::new(bench, ordered, reaching);
+        let thread = std::thread::Builder::new()
+            .name("board".into())
+            .spawn(move || emulator::run(session, &Start::new(&images), hall).map(drop).map_err(failure))?;
         let mut rig = Self { image, orders: Some(orders), reached, thread: Some(thread), now_ns: 0 };
         rig.await_reached()?;
         Ok(rig)
@@ -219,15 +190,6 @@ impl Rig {
         self.with(|stand| stand.bench.trace.hash())
     }
 
-    /// Writes the run's whole state to a file.
-    ///
-    /// # Errors
-    /// The state cannot be kept just now, or the file cannot be written.
-    pub fn snapshot(&mut self, path: &Path) -> Result<(), Error> {
-        let file = self.with(|stand| stand.snapshot())??;
-        std::fs::write(path, file).map_err(|source| Error::WriteSnapshot { path: path.into(), source })
-    }
-
     /// Does something where the run will then stand, and does not wait.
     pub fn post<F>(&mut self, job: F) -> Result<(), Error>
     where
@@ -287,10 +249,6 @@ impl Drop for Rig {
     }
 }
 
-fn failure(at_ns: u64) -> impl Fn(emulator::Error) -> Error {
-    move |error| Error::Emulator { at_ns, why: error.to_string() }
-}
-
-fn digest(images: &[Image]) -> [u8; 32] {
-    rigless::image::digest(images, None)
+fn failure(error: emulator::Error) -> Error {
+    Error::Emulator { at_ns: 0, why: error.to_string() }
 }

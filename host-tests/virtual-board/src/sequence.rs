@@ -6,7 +6,6 @@
 use rigless::device::RegisterFile;
 use rigless::soc::FieldSpec;
 use rigless::soc::stm32f427::generated::adc1::{Register, cr1, jsqr, sqr1, sqr2, sqr3, sr};
-use serde::{Deserialize, Serialize};
 
 /// Cycles of a 12-bit conversion after sampling, RM0090 13.7.
 pub const CONVERSION_CYCLES: u64 = 12;
@@ -67,7 +66,7 @@ pub fn injected_inputs(registers: &RegisterFile) -> Vec<usize> {
 }
 
 /// Words of a group under way.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default)]
 pub struct Injected {
     words: Vec<u16>,
     done_ns: u64,

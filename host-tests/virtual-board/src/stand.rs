@@ -2,7 +2,6 @@
 
 use crate::bench::Bench;
 use crate::board::FingerBoard;
-use crate::error::Error;
 use crate::link::Listening;
 use crate::rig::Order;
 use rigless::emulator::{Driver, Host, Settled, Stop};
@@ -20,18 +19,6 @@ pub struct Stand<'a> {
     pub stop: Stop,
     /// All around the board.
     pub bench: &'a mut Bench,
-    firmware: &'a [u8; 32],
-}
-
-impl Stand<'_> {
-    /// The run's whole state.
-    ///
-    /// # Errors
-    /// A reset is under way at this very instant.
-    pub fn snapshot(&mut self) -> Result<Vec<u8>, Error> {
-        self.bench.flash.keep(self.host);
-        Ok(rigless::snapshot::take(self.session, self.host, self.stop, self.firmware, self.bench)?.file)
-    }
 }
 
 /// Drives a run by orders.
@@ -40,22 +27,14 @@ pub(crate) struct Hall {
     bench: Bench,
     orders: Receiver<Order>,
     reached: Sender<u64>,
-    firmware: [u8; 32],
     until_ns: u64,
     listening: Option<Listening>,
-    begun: bool,
 }
 
 impl Hall {
-    pub(crate) fn new(bench: Bench, orders: Receiver<Order>, reached: Sender<u64>, firmware: [u8; 32]) -> Self {
+    pub(crate) fn new(bench: Bench, orders: Receiver<Order>, reached: Sender<u64>) -> Self {
         let until_ns = bench.next_ns;
-        Self { bench, orders, reached, firmware, until_ns, listening: None, begun: false }
-    }
-
-    /// Runs from an instant of the grid to the next stop.
-    fn go_on(&mut self, session: &mut Session<FingerBoard>, stop: Stop) -> VirtualNanos {
-        self.bench.go_on();
-        self.bench.next_stop(session.board_mut(), stop.at)
+        Self { bench, orders, reached, until_ns, listening: None }
     }
 
     /// Passes received bytes to the listener, if there is one; returns true if the run must go on for its answer.
@@ -74,11 +53,7 @@ impl Hall {
 
     /// Executes orders until one continues the run; returns false after the last order.
     fn halt(&mut self, session: &mut Session<FingerBoard>, stop: Stop, host: &mut dyn Host) -> bool {
-        let Self { bench, orders, reached, firmware, until_ns, listening, begun } = self;
-        if !*begun {
-            bench.flash.put_back(host);
-        }
-        *begun = true;
+        let Self { bench, orders, reached, until_ns, listening } = self;
         if reached.send(bench.next_ns).is_err() {
             return false;
         }
@@ -93,7 +68,7 @@ impl Hall {
                     *listening = Some(begun);
                     return true;
                 }
-                Order::Do(job) => job(&mut Stand { session, host, stop, bench, firmware }),
+                Order::Do(job) => job(&mut Stand { session, host, stop, bench }),
             }
         }
         false
@@ -113,24 +88,19 @@ impl Driver<FingerBoard> for Hall {
                 self.bench.flash.stored(session, host, &access);
                 self.bench.clock.accessed(session, host, &access);
             }
-            // A run from a snapshot comes back first to where it was taken, inside that halt.
-            Settled::Stop(stop) if !self.begun && stop.at.0 >= self.bench.next_ns && session.until().0 <= stop.at.0 => {
-                let next = if self.halt(session, stop, host) { self.go_on(session, stop) } else { stop.at };
-                session.run_until(next);
-            }
             Settled::Stop(stop) => self.bench.stopped(session.board_mut(), stop.at.0),
             _ => {}
         }
     }
 
     fn on_stop(&mut self, session: &mut Session<FingerBoard>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
-        if stop.at.0 < self.bench.next_ns {
-            return Some(self.bench.next_stop(session.board_mut(), stop.at));
+        if stop.at.0 >= self.bench.next_ns {
+            self.bench.step(session, host);
+            if self.bench.next_ns >= self.until_ns && !self.hears_on(session) && !self.halt(session, stop, host) {
+                return None;
+            }
+            self.bench.go_on();
         }
-        self.bench.step(session, host);
-        if self.bench.next_ns >= self.until_ns && !self.hears_on(session) && !self.halt(session, stop, host) {
-            return None;
-        }
-        Some(self.go_on(session, stop))
+        Some(self.bench.next_stop(session.board_mut(), stop.at))
     }
 }

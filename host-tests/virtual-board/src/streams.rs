@@ -10,12 +10,10 @@ mod registers;
 use crate::front_end::Shared;
 use registers::*;
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
-use rigless::snapshot::store;
 use rigless::soc::stm32f427::generated::dma2::{Register, s0cr};
 use rigless::soc::stm32f427::generated::{ADC2, ADC3};
 use rigless::soc::stm32f427::peripherals::{CONVERTERS, adc, tim};
 use rigless::soc::{Layout, Width};
-use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
 /// The stream whose interrupt says that a frame is complete.
@@ -25,7 +23,7 @@ const DATA_REGISTER: u64 = 0x4c;
 /// An access's token: the stream, and whether it was the read of a word on its way to a peripheral.
 const FETCH: u64 = 0x100;
 
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Stream {
     /// Items of a round, and how many of them are still to come.
     items: u64,
@@ -44,8 +42,6 @@ pub struct Streams {
     streams: [Stream; STREAMS],
     front_end: Shared,
 }
-
-store!(Streams { values: [streams], parts: [], built: [front_end] });
 
 impl Streams {
     /// Out of reset.

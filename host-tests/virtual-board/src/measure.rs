@@ -1,6 +1,5 @@
 //! Measurements of a run: latency, edges, and a digest of all duties and bytes.
 
-
 /// Time from the last conversion of a frame to the new duty.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Latency {

@@ -10,14 +10,12 @@ use crate::flash::SECTOR;
 use crate::front_end::{ScanCounts, Shared};
 use crate::image::Firmware;
 use crate::inside;
-use crate::link::Listening;
 use crate::scene::finger::Finger;
-use crate::stand::{Hall, Stand};
 use crate::surroundings::Surroundings;
 use fingertip::chip::Factory;
 use fingertip::params::Params;
 use fingertip::shipped::Record;
-use rigless::emulator::{self, Start};
+use rigless::emulator::{self, Driver, Host, Settled, Start, Stop};
 use rigless::image::Image;
 use rigless::session::Session;
 use rigless::time::VirtualNanos;
@@ -60,11 +58,9 @@ fn images(image: &Firmware, options: &Options) -> Result<Vec<Image>, Error> {
 type Job = Box<dyn FnOnce(&mut Stand<'_>) + Send>;
 
 /// Orders to the emulator's thread.
-pub(crate) enum Order {
+enum Order {
     /// Run to an instant of the grid.
     Run(u64),
-    /// Run until an answer has come.
-    Listen(Listening),
     /// Do this at the present halt.
     Do(Job),
 }
@@ -153,7 +149,7 @@ impl Rig {
     {
         self.with(|stand| match &mut stand.bench.front_end.lock().world {
             Surroundings::Plant(world) => Ok(job(world)),
-            Surroundings::Scene(_) => Err(Error::InAScene),
+            Surroundings::Scene(_) => Err(Error::OtherWorld),
         })?
     }
 
@@ -168,7 +164,7 @@ impl Rig {
     {
         self.with(|stand| match &mut stand.bench.front_end.lock().world {
             Surroundings::Scene(finger) => Ok(job(finger)),
-            Surroundings::Plant(_) => Err(Error::NoScene),
+            Surroundings::Plant(_) => Err(Error::OtherWorld),
         })?
     }
 
@@ -209,7 +205,7 @@ impl Rig {
         asked.recv().map_err(|_| self.broken())
     }
 
-    pub(crate) fn order(&mut self, order: Order) -> Result<(), Error> {
+    fn order(&mut self, order: Order) -> Result<(), Error> {
         let sent = self.orders.as_ref().is_some_and(|orders| orders.send(order).is_ok());
         if sent { Ok(()) } else { Err(self.broken()) }
     }
@@ -243,4 +239,80 @@ impl Drop for Rig {
 
 fn failure(error: emulator::Error) -> Error {
     Error::Emulator { at_ns: 0, why: error.to_string() }
+}
+
+/// The run at a halt, between two instructions.
+pub struct Stand<'a> {
+    /// The board, its registers and the emulator's reports.
+    pub session: &'a mut Session<FingerBoard>,
+    /// The guest's memory and interrupt lines.
+    pub host: &'a mut dyn Host,
+    /// The instant.
+    pub stop: Stop,
+    /// All around the board.
+    pub bench: &'a mut Bench,
+}
+
+/// Drives a run by orders.
+#[derive(Debug)]
+struct Hall {
+    bench: Bench,
+    orders: mpsc::Receiver<Order>,
+    reached: mpsc::Sender<u64>,
+    until_ns: u64,
+}
+
+impl Hall {
+    fn new(bench: Bench, orders: mpsc::Receiver<Order>, reached: mpsc::Sender<u64>) -> Self {
+        let until_ns = bench.next_ns;
+        Self { bench, orders, reached, until_ns }
+    }
+
+    /// Executes orders until one continues the run; returns false after the last order.
+    fn halt(&mut self, session: &mut Session<FingerBoard>, stop: Stop, host: &mut dyn Host) -> bool {
+        let Self { bench, orders, reached, until_ns } = self;
+        if reached.send(bench.next_ns).is_err() {
+            return false;
+        }
+        while let Ok(order) = orders.recv() {
+            match order {
+                Order::Run(until) => {
+                    *until_ns = until;
+                    return true;
+                }
+                Order::Do(job) => job(&mut Stand { session, host, stop, bench }),
+            }
+        }
+        false
+    }
+}
+
+impl Driver<FingerBoard> for Hall {
+    fn on_settled(&mut self, session: &mut Session<FingerBoard>, host: &mut dyn Host, settled: Settled) {
+        if let Settled::Stop(stop) = &settled
+            && self.bench.flash.word_done(stop.at.0)
+        {
+            host.hold(self.bench.core_held);
+        }
+        match settled {
+            Settled::Access { access, .. } => {
+                self.bench.accessed(session.board_mut(), &access);
+                self.bench.flash.stored(session, host, &access);
+                self.bench.clock.accessed(session, host, &access);
+            }
+            Settled::Stop(stop) => self.bench.stopped(session.board_mut(), stop.at.0),
+            _ => {}
+        }
+    }
+
+    fn on_stop(&mut self, session: &mut Session<FingerBoard>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
+        if stop.at.0 >= self.bench.next_ns {
+            self.bench.step(session, host);
+            if self.bench.next_ns >= self.until_ns && !self.halt(session, stop, host) {
+                return None;
+            }
+            self.bench.go_on();
+        }
+        Some(self.bench.next_stop(session.board_mut(), stop.at))
+    }
 }

@@ -207,7 +207,7 @@ fn a_store_just_below_ram_is_a_hard_fault_there_and_then(rig: &mut Rig) {
     assert_eq!(resets_since(rig, from_ns).first().map(|(cause, _)| cause.as_str()), Some("software"));
     // The patch outlives the reset, so the board cannot come up to be asked: its record says where it was.
     let record = rig.image().item("crash", "RECORD").expect("the image has a crash record");
-    let words = move |stand: &mut virtual_board::stand::Stand<'_>| {
+    let words = move |stand: &mut virtual_board::rig::Stand<'_>| {
         [4, 12].map(|offset| stand.host.read(record + offset, Width::W32).unwrap_or(0))
     };
     let [cause, pc] = rig.with(words).expect("it runs");

@@ -2,7 +2,8 @@
 //! it holds a requested level back, and misses no deadline.
 
 use crate::common::{
-    away, force_n, read_u8, read_u16, read_u32, register, run_checks, running, write_and_run_ms, write_goal, write_u8, write_u32,
+    away, force_n, read_u8, read_u16, read_u32, register, run_checks, running, write_and_run_ms, write_goal, write_u8,
+    write_u32,
 };
 use fingertip::contact::FitLevel;
 use fingertip::shipped::address;
@@ -74,11 +75,7 @@ fn the_highest_fit_level_is_held_back_before_a_deadline_is_missed(rig: &mut Rig)
         // indentation, by the travel since the touch: that the touch was seen late, too, is left.
         let (from_below, expected) = if asked < 2 { (true, 1.0..1.25) } else { (false, 0.95..1.05) };
         assert!(expected.contains(&force_n), "fit level {asked}: {force_n} N");
-        assert_eq!(
-            Limits(read_u16(rig, address::LIMITS)).has(Limits::FROM_BELOW),
-            from_below,
-            "fit level {asked}"
-        );
+        assert_eq!(Limits(read_u16(rig, address::LIMITS)).has(Limits::FROM_BELOW), from_below, "fit level {asked}");
     }
 }
 

@@ -229,5 +229,8 @@ fn two_runs_have_one_trace_also_on_a_slow_machine() {
     let records = quick.with(|stand| stand.bench.trace.records()).expect("it runs");
     assert!(records > 2 * duties, "{records} records");
     let mut slow = eventful(Duration::from_secs(4));
-    assert_eq!((slow.trace_hash().expect("it runs"), slow.now_ns()), (quick.trace_hash().expect("it runs"), quick.now_ns()));
+    assert_eq!(
+        (slow.trace_hash().expect("it runs"), slow.now_ns()),
+        (quick.trace_hash().expect("it runs"), quick.now_ns())
+    );
 }

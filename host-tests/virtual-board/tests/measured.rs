@@ -2,9 +2,7 @@
 //! host's solver.
 
 use crate::capture::fetch;
-use crate::common::{
-    away, let_go, read_u8, read_u16, read_u32, running, write_and_run_ms, write_goal, write_param,
-};
+use crate::common::{away, let_go, read_u8, read_u16, read_u32, running, write_and_run_ms, write_goal, write_param};
 use fingertip::measure::{MeasureState, Task};
 use fingertip::params::Params;
 use fingertip::shipped::address;

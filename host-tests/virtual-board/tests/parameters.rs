@@ -9,7 +9,7 @@ use rigless::soc::Width;
 use sim::encode;
 use sim::plant::Setup;
 use virtual_board::flash::{OTHER_SECTOR, SECTOR};
-use virtual_board::stand::Stand;
+use virtual_board::rig::Stand;
 use virtual_board::{Options, Rig};
 
 const SECTOR_BYTES: usize = 128 << 10;

@@ -70,7 +70,7 @@ fn true_c(rig: &mut Rig) -> f64 {
 #[test]
 fn the_board_measures_its_temperature_and_the_force_s_drift() {
     let mut rig = warming();
-    assert!(matches!(rig.world(|world| world.force_n()), Err(Error::InAScene)));
+    assert!(matches!(rig.world(|world| world.force_n()), Err(Error::OtherWorld)));
     codes_that_stay_away_are_no_temperature_and_the_finger_holds_on(&mut rig);
     the_means_go_on_where_the_scan_starts_again(&mut rig);
     hold(&mut rig);

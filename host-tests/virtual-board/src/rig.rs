@@ -25,10 +25,12 @@ use std::sync::mpsc;
 use std::thread::JoinHandle;
 
 /// Settings of a run.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Options {
     /// Addresses and bytes that memory holds beside the image, for example a parameter sector.
     pub presets: Vec<(u64, Vec<u8>)>,
+    /// Factory codes of the reference and of the temperature sensor.
+    pub factory: Factory,
 }
 
 impl Options {
@@ -36,7 +38,13 @@ impl Options {
     pub fn confirmed() -> Self {
         let params = Params { direction_confirmed: 1, ..Params::DEFAULT };
         let record = sim::encode(&Record { params, ..Record::DEFAULT }, 0);
-        Self { presets: vec![(SECTOR.start, record)] }
+        Self { presets: vec![(SECTOR.start, record)], ..Self::default() }
+    }
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { presets: Vec::new(), factory: inside::factory() }
     }
 }
 
@@ -46,7 +54,7 @@ fn images(image: &Firmware, options: &Options) -> Result<Vec<Image>, Error> {
         Image::new(path, bytes, at).map_err(|why| Error::NotAnImage { path: path.into(), why: why.to_string() })
     };
     let mut images = vec![read(image.path(), image.elf().to_vec(), None)?];
-    let Factory { reference, sensor: [cold, hot] } = inside::factory();
+    let Factory { reference, sensor: [cold, hot] } = options.factory;
     let factory = [reference, cold, hot].map(u16::to_le_bytes).concat();
     images.push(read(Path::new("factory"), factory, Some(inside::FACTORY_AT))?);
     for (address, bytes) in &options.presets {

@@ -89,7 +89,7 @@ impl Boards {
         let start_ns = (BOOT_NS + tare_ns + SET_UP_NS).next_multiple_of(MS);
         let moves_from_s = -(MS as f64) * 1e-9;
         let record = Record { params, baud_code: BAUD_CODE, return_delay_2us: 0, ..Record::DEFAULT };
-        let options = Options { presets: vec![(flash::SECTOR.start, encode(&record, 0))] };
+        let options = Options { presets: vec![(flash::SECTOR.start, encode(&record, 0))], ..Options::default() };
         let mut rigs = Vec::new();
         let clock = Clock::new(start_ns);
         for (number, finger) in Finger::all(scene, clock, moves_from_s)?.into_iter().enumerate() {

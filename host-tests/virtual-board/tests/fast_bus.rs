@@ -22,7 +22,7 @@ fn no_byte_of_a_fast_bus_is_lost_and_nothing_that_is_wrong_moves_the_finger() {
     let params = Params { direction_confirmed: 1, ..Params::DEFAULT };
     let record = Record { params, baud_code: BAUD_CODE, return_delay_2us: 0, ..Record::DEFAULT };
     let presets = vec![(SECTOR.start, sim::encode(&record, 0))];
-    let mut rig = holding(&Options { presets });
+    let mut rig = holding(&Options { presets, ..Options::default() });
     a_million_bytes_of_noise_move_nothing(&mut rig);
     no_byte_of_a_fast_bus_is_lost(&mut rig);
     no_register_takes_a_value_out_of_its_range(&mut rig);

@@ -21,12 +21,12 @@ fn the_image_boots_scans_and_tells_how_the_board_is() {
         ("the scan's rate", frames_arrive_at_the_scans_rate),
         ("a ping", it_answers_a_ping_at_its_baud_rate),
         ("health", the_bus_tells_how_the_board_is),
-        ("the first tare", before_the_first_tare_no_force_is_told),
         ("the frame pin", the_frame_pin_is_high_for_a_slot_in_each_frame),
         ("the control pin", the_control_pin_is_high_while_control_is_busy),
         ("the settle time", a_settle_time_that_is_lowered_leaves_the_rows_in_step),
         ("the bridge's period", the_bridge_keeps_step_with_the_scan),
         ("short frames", frames_shorter_than_the_three_conversions_find_the_supply_too),
+        ("the first tare", before_the_first_tare_no_force_is_told),
         ("the guard pin", the_guard_pin_pulses_where_the_guard_trips),
     ];
     run_checks(&mut rig, &checks);

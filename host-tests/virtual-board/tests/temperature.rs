@@ -1,13 +1,10 @@
 //! The microcontroller's temperature and the analogue supply as the board measures them while it runs, and the part of a
 //! held force's error that the temperature term removes.
 
-use crate::common::{
-    image, let_go, poke, read_u16, read_u32, reboot, running, write_and_run_ms, write_goal, write_param, write_u8,
-};
+use crate::common::{image, poke, read_u16, read_u32, running, write_and_run_ms, write_goal, write_param, write_u8};
 use fingertip::chip::Factory;
 use fingertip::params::Params;
 use fingertip::shipped::{Record, address};
-use rigless::soc::Width;
 use sim::encode;
 use sim::plant::Setup;
 use sim::run::run;
@@ -36,7 +33,7 @@ fn drift_mn(rig: &mut Rig) -> i32 {
 }
 
 /// A finger whose array and microcontroller warm by 20 K: an hour in the hot in seconds.
-fn warming() -> Rig {
+fn warming(factory: Factory) -> Rig {
     let params = Params {
         direction_confirmed: 1,
         array_gain_ppm_per_k: GAIN_PPM_PER_K,
@@ -48,7 +45,7 @@ fn warming() -> Rig {
     let scene = sim::cli::load("hot_hour", &keys, None).unwrap_or_else(|error| panic!("{error}"));
     let clock = Clock::new(START_MS * 1_000_000);
     let finger = Finger::all(&scene, clock, -0.001).expect("the world is simulated").remove(0);
-    let mut rig = Rig::new(&image(), finger, &Options { presets }).expect("the image starts");
+    let mut rig = Rig::new(&image(), finger, &Options { presets, factory }).expect("the image starts");
     rig.run_until_ns(20_000_000).expect("it runs");
     write_u8(&mut rig, address::TARE, 1);
     rig.run_until_ns(START_MS * 1_000_000).expect("it runs");
@@ -69,13 +66,12 @@ fn true_c(rig: &mut Rig) -> f64 {
 
 #[test]
 fn the_board_measures_its_temperature_and_the_force_s_drift() {
-    let mut rig = warming();
+    let mut rig = warming(inside::factory());
     assert!(matches!(rig.world(|world| world.force_n()), Err(Error::OtherWorld)));
     codes_that_stay_away_are_no_temperature_and_the_finger_holds_on(&mut rig);
     the_means_go_on_where_the_scan_starts_again(&mut rig);
     hold(&mut rig);
     the_bus_tells_the_chip_s_temperature_and_the_drift(&mut rig);
-    without_the_factory_s_codes_there_is_no_temperature_and_no_term(&mut rig);
     // The emulated converter reports inputs that are sampled for too short a time.
     rig.check_gaps().expect("nothing is missing");
     poke(&mut rig, ADC1_SMPR1, 0);
@@ -126,29 +122,19 @@ fn the_bus_tells_the_chip_s_temperature_and_the_drift(rig: &mut Rig) {
     assert_eq!(read_u16(rig, address::ANALOGUE_SUPPLY_MV), 3_300);
 }
 
-fn without_the_factory_s_codes_there_is_no_temperature_and_no_term(rig: &mut Rig) {
+#[test]
+fn without_the_factory_s_codes_there_is_no_temperature_and_no_term() {
     let sound = inside::factory();
-    // The factory's codes are in memory; the image reads them when it starts.
     let cases = [
         (Factory { reference: 0xffff, sensor: [0xffff; 2] }, 0),
         (Factory { sensor: [sound.sensor[0]; 2], ..sound }, 3_300),
     ];
     for (factory, supply_mv) in cases {
-        let_go(rig);
-        rig.with(move |stand| {
-            for (place, code) in (0..).zip([factory.reference, factory.sensor[0], factory.sensor[1]]) {
-                let programmed = stand.host.program(inside::FACTORY_AT + 2 * place, Width::W16, code.into());
-                programmed.expect("the factory's codes can be programmed");
-            }
-        })
-        .expect("it runs");
-        reboot(rig, 20);
-        write_and_run_ms(rig, address::TARE, 1, 40);
-        hold(rig);
+        let mut rig = warming(factory);
         rig.run_ms(200).expect("it runs");
-        assert_eq!((chip_mc(rig), drift_mn(rig)), (UNMEASURED_MC, 0), "{factory:?}");
-        assert_eq!(read_u16(rig, address::ANALOGUE_SUPPLY_MV), supply_mv, "{factory:?}");
-        assert!(read_u32(rig, address::PRESENT_FORCE_MN) > 900, "it holds its goal all the same");
+        assert_eq!((chip_mc(&mut rig), drift_mn(&mut rig)), (UNMEASURED_MC, 0), "{factory:?}");
+        assert_eq!(read_u16(&mut rig, address::ANALOGUE_SUPPLY_MV), supply_mv, "{factory:?}");
+        assert!(read_u32(&mut rig, address::PRESENT_FORCE_MN) > 900, "it holds its goal all the same");
     }
 }
 

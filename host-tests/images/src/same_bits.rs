@@ -9,6 +9,7 @@ pub mod machines;
 pub mod made;
 pub mod model;
 
+use core::fmt::{Debug, Write};
 use fingertip::config::ConfigError;
 use fingertip::shipped::Config;
 use machines::Machines;
@@ -82,9 +83,22 @@ impl Mix {
         self.0 = (self.0.rotate_left(23) ^ number.cast_unsigned()).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     }
 
+    /// Adds every field of a value, as its text.
+    pub fn add_fields(&mut self, value: &impl Debug) {
+        // A digest takes every text.
+        let _ = write!(self, "{value:?}");
+    }
+
     /// The digest so far.
     pub const fn value(self) -> u64 {
         self.0
+    }
+}
+
+impl Write for Mix {
+    fn write_str(&mut self, text: &str) -> core::fmt::Result {
+        text.bytes().for_each(|byte| self.add(byte));
+        Ok(())
     }
 }
 

@@ -2,17 +2,16 @@
 
 use crate::board::FingerBoard;
 use crate::clock::ExternalClock;
-use crate::flash::Kept;
-use crate::front_end::{FrontEnd, Shared};
+use crate::flash::Programmer;
+use crate::front_end::Shared;
 use crate::image::Firmware;
-use crate::log::{Frames, Log};
+use crate::log::Log;
 use crate::measure::{BridgeEdge, Latency, Record, Trace};
 use crate::scene::host::Host as SceneHost;
 use crate::surroundings::Surroundings;
 use crate::wire::TimedByte;
 use rigless::emulator::{Access, AccessKind, Host};
 use rigless::session::Session;
-use rigless::snapshot::{self, Reader, Store, Writer};
 use rigless::soc::stm32f427::generated::{DAC, GPIOC, TIM1, USART2};
 use rigless::time::VirtualNanos;
 use sim::bridge::Bridge;
@@ -28,7 +27,7 @@ const DUTY_REGISTERS: [u64; 2] = [0x34, 0x38];
 const CR3: u64 = 0x14;
 const HDSEL: u64 = 1 << 3;
 
-/// State around the board; a snapshot includes it.
+/// State around the board.
 #[derive(Debug)]
 pub struct Bench {
     /// Next instant of the world's grid, ns; all stops of the bench itself lie on this grid.
@@ -41,7 +40,7 @@ pub struct Bench {
     pub latency: Latency,
     /// Times at which the bridge turned on and off.
     pub bridge_edges: Vec<BridgeEdge>,
-    /// Times at which the transmit enable went high and low; a snapshot does not include them.
+    /// Times at which the transmit enable went high and low.
     pub transmit_edges: Vec<BridgeEdge>,
     /// The image's log.
     pub log: Log,
@@ -50,8 +49,8 @@ pub struct Bench {
     /// True while the core is held, until the next reset.
     pub core_held: bool,
     /// Flash content that the image wrote.
-    pub flash: Kept,
-    /// The external clock; a snapshot does not include it.
+    pub flash: Programmer,
+    /// The external clock.
     pub clock: ExternalClock,
     /// The host of a scene, once the board is set up.
     pub host: Option<Box<SceneHost>>,
@@ -82,7 +81,7 @@ impl Bench {
             log: Log::new(image),
             received: Vec::new(),
             core_held: false,
-            flash: Kept::default(),
+            flash: Programmer::default(),
             clock: ExternalClock::default(),
             host: None,
             world_ns: 0,
@@ -207,25 +206,5 @@ impl Bench {
     pub fn next_stop(&self, board: &mut FingerBoard, now: VirtualNanos) -> VirtualNanos {
         let sends_ns = board.wire().sends_ns().filter(|sends_ns| *sends_ns > now.0);
         VirtualNanos(sends_ns.map_or(self.next_ns, |sends_ns| sends_ns.min(self.next_ns)))
-    }
-}
-
-impl Store for Bench {
-    fn store(&self, to: &mut Writer) -> Result<(), snapshot::Error> {
-        let Self { next_ns, front_end, trace, latency, bridge_edges, log, received, core_held, flash, .. } = self;
-        let Self { world_ns, bridge, encoder, encoder_ns, resets, .. } = self;
-        to.put(&(next_ns, trace, latency, bridge_edges, log.state(), received, core_held, flash))?;
-        to.put(&(world_ns, bridge, encoder, encoder_ns, resets))?;
-        to.put(&*front_end.lock())
-    }
-
-    fn load(&mut self, from: &mut Reader) -> Result<(), snapshot::Error> {
-        let log: (Vec<u8>, Vec<Frames>);
-        (self.next_ns, self.trace, self.latency, self.bridge_edges, log, self.received, self.core_held, self.flash) =
-            from.take()?;
-        self.log.set_state(log.0, log.1);
-        (self.world_ns, self.bridge, self.encoder, self.encoder_ns, self.resets) = from.take()?;
-        *self.front_end.lock() = from.take::<FrontEnd>()?;
-        Ok(())
     }
 }

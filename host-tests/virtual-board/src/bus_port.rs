@@ -6,7 +6,6 @@
 
 use crate::wire::Wire;
 use rigless::device::{Device, DeviceContext, RegisterFile};
-use rigless::snapshot::store;
 use rigless::soc::RegisterSpec;
 use rigless::soc::stm32f427::generated::usart6::{Register, cr3, sr};
 use rigless::soc::stm32f427::peripherals::usart::{Kind, Usart};
@@ -22,8 +21,6 @@ pub struct BusPort {
     port: Usart,
     fetch: Option<EventId>,
 }
-
-store!(BusPort { values: [fetch], parts: [port], built: [] });
 
 impl BusPort {
     /// Out of reset, with the host on its far end.

@@ -1,6 +1,6 @@
-//! The crate `dynamixel2` as the bus's host.
+//! The bus from the host's side: bytes at their time, whole transactions, and the crate `dynamixel2` as a client.
 //!
-//! It talks to a serial port of the operating system, so it gets one end of a pseudo-terminal; at the other end each
+//! The client talks to a serial port of the operating system, so it gets one end of a pseudo-terminal; at the other end each
 //! packet that it sends becomes a transaction of the rig. Virtual time passes only inside transactions, so what the
 //! client does repeats exactly. The client measures its timeouts on the wall clock, by the time that a packet takes at
 //! the port's speed. Its end is opened at 1 baud, which a pseudo-terminal ignores: the shortest of these timeouts is
@@ -8,8 +8,8 @@
 //! once, by a device that does not exist.
 
 use crate::error::Error;
-use crate::link::{is_whole, packet_length};
-use crate::rig::Rig;
+use crate::rig::{Rig, Stand};
+use crate::wire::TimedByte;
 use dynamixel2::Bus;
 use serial2::SerialPort;
 use std::io::ErrorKind;
@@ -27,7 +27,44 @@ const BUFFER: usize = 2048;
 /// The `errno` of a pseudo-terminal whose other end is closed.
 const EIO: i32 = 5;
 
+/// Time between two looks at the bytes that the image sent, ns.
+const LOOK_NS: u64 = 50_000;
+
 impl Rig {
+    /// Sends bytes from now on, one after another at the port's baud rate.
+    pub fn send(&mut self, bytes: &[u8]) -> Result<(), Error> {
+        let bytes = bytes.to_vec();
+        self.with(move |stand| {
+            let from_ns = stand.bench.next_ns;
+            stand.session.board_mut().wire().send(from_ns, &bytes);
+        })
+    }
+
+    /// Takes the bytes that the image has sent.
+    pub fn take_received(&mut self) -> Result<Vec<TimedByte>, Error> {
+        self.with(|stand| std::mem::take(&mut stand.bench.received))
+    }
+
+    /// Sends a packet and runs until a whole status packet has come back, or nothing has for the wait's time after the
+    /// last byte either way. What came back is not checked.
+    pub fn transact(&mut self, packet: &[u8], wait_ns: u64) -> Result<Vec<u8>, Error> {
+        self.take_received()?;
+        self.send(packet)?;
+        let (mut reply, mut quiet_since_ns) = (Vec::new(), self.now_ns());
+        while !is_whole(&reply) && self.now_ns() < quiet_since_ns + wait_ns {
+            self.run_until_ns(self.now_ns() + LOOK_NS)?;
+            let look = |stand: &mut Stand<'_>| {
+                (std::mem::take(&mut stand.bench.received), stand.session.board_mut().wire().pending())
+            };
+            let (received, unsent) = self.with(look)?;
+            if !received.is_empty() || unsent > 0 {
+                quiet_since_ns = self.now_ns();
+            }
+            reply.extend(received.iter().map(|timed| timed.byte));
+        }
+        Ok(reply)
+    }
+
     /// Runs a client on the bus. An unanswered packet costs the wait's virtual time.
     ///
     /// # Errors
@@ -74,4 +111,19 @@ impl Rig {
             }
         }
     }
+}
+
+/// Returns true if the bytes hold a whole packet of the protocol: FF FF FD 00, ID, length of the rest.
+fn is_whole(bytes: &[u8]) -> bool {
+    packet_length(bytes).is_some_and(|length| bytes.len() >= length)
+}
+
+/// Length of the packet at the start of the bytes, once its header is complete; 1 if they begin no packet.
+fn packet_length(bytes: &[u8]) -> Option<usize> {
+    const HEADER: [u8; 4] = [0xff, 0xff, 0xfd, 0x00];
+    if bytes.iter().zip(HEADER).any(|(byte, header)| *byte != header) {
+        return Some(1);
+    }
+    let length = bytes.get(5..7)?;
+    Some(7 + usize::from(u16::from_le_bytes([length[0], length[1]])))
 }

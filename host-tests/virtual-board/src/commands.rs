@@ -2,12 +2,12 @@
 
 use output::{kept, say};
 use serve::{Place, Port};
-use sim::demo::figures;
+use sim::demo::{DemoError, figures};
 use sim::plant::{Plant, Setup};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-use virtual_board::demo::{self, DemoError, Plan};
+use virtual_board::demo::{self, Plan};
 use virtual_board::serve::Board;
 use virtual_board::{Error, Options, Rig};
 
@@ -85,7 +85,7 @@ pub fn bringup(image: &Path, frames: u32, estimates: Option<&Path>, json: Option
 }
 
 /// Runs it, prints the table, writes figures and pictures.
-pub fn demo(image: PathBuf, json: Option<&Path>, out: &Path, quick: bool) -> Result<(), DemoError> {
+pub fn demo(image: PathBuf, json: Option<&Path>, out: &Path, quick: bool) -> Result<(), Error> {
     let (figures, run) = demo::run(&Plan { image, quick })?;
     // The files first: the reader of the output may close the pipe.
     let drawn = figures::draw(&run, &figures.forces, out);
@@ -108,7 +108,7 @@ pub fn demo(image: PathBuf, json: Option<&Path>, out: &Path, quick: bool) -> Res
     }
     match figures::missed(&figures.checks) {
         0 => Ok(()),
-        missed => Err(DemoError::Missed(missed)),
+        missed => Err(Error::Missed(missed)),
     }
 }
 

@@ -12,13 +12,11 @@ use crate::inside;
 use crate::scan_timer::COMPARE_1;
 use crate::sequence::{self, CONVERSION_CYCLES, Injected};
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
-use rigless::snapshot::store;
 use rigless::soc::stm32f427::generated::adc1::{Register, cr1, cr2, sr};
 use rigless::soc::stm32f427::generated::{ADC2, ADC3};
 use rigless::soc::stm32f427::peripherals::adc::DMA_REQUEST;
 use rigless::soc::{Layout, Width};
 use rigless::time::{EventId, VirtualNanos};
-use serde::{Deserialize, Serialize};
 
 /// `EXTSEL` of TIM8_CC1, 13.13.3.
 const TIM8_CC1: u64 = 13;
@@ -28,7 +26,7 @@ const GLOBAL: usize = 0;
 const ROW_PORT: (&str, usize) = ("GPIOB", 10);
 
 /// Conversions under way, all of them over at the event.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug)]
 struct Running {
     event: Option<EventId>,
     begun_ns: u64,
@@ -51,12 +49,6 @@ pub struct Converter {
     /// True if the reference and the temperature sensor are on, by the register that the converters share.
     pub inside_on: bool,
 }
-
-store!(Converter {
-    values: [clock_hz, status, running, rank, injected, interrupt],
-    parts: [],
-    built: [nth, front_end, inside_on]
-});
 
 impl Converter {
     /// Out of reset, its inputs on a front end.

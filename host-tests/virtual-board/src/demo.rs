@@ -25,33 +25,11 @@ pub struct Plan {
     pub quick: bool,
 }
 
-/// The demonstration failed, or could not be done.
-#[derive(Debug, thiserror::Error)]
-pub enum DemoError {
-    /// The board could not run.
-    #[error(transparent)]
-    Board(#[from] Error),
-    /// The run has no figures or no pictures.
-    #[error(transparent)]
-    Judged(#[from] demo::DemoError),
-    /// A file could not be written.
-    #[error("cannot write {}: {source}", path.display())]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// Some bound was missed.
-    #[error("{0} of the bounds missed; see the table")]
-    Missed(usize),
-}
-
 /// Runs the demonstration and takes its figures.
 ///
 /// # Errors
 /// The image does not run, or does not reach the goals.
-pub fn run(plan: &Plan) -> Result<(Figures, Run), DemoError> {
+pub fn run(plan: &Plan) -> Result<(Figures, Run), Error> {
     let begun = Instant::now();
     let scene = demo::scene(plan.quick)?;
     let repeat = (!plan.quick).then(|| {
@@ -77,13 +55,8 @@ pub fn run(plan: &Plan) -> Result<(Figures, Run), DemoError> {
     };
     screen.finish();
     let run = trace.finish()?;
-    let mut figures = Figures::of(&run, [&from, &to], rig)?;
-    figures.image_sha256 = flash.sha256();
-    figures.image_bytes = flash.bytes.len();
-    figures.virtual_time_s = summary.virtual_s;
+    let mut figures = Figures::of(&run, [&from, &to], rig, &flash, summary, repeated)?;
     figures.wall_time_s = begun.elapsed().as_secs_f64();
-    (figures.trace_sha256, figures.repeated_trace_sha256) = (summary.digest, repeated);
-    figures.check();
     Ok((figures, run))
 }
 

@@ -32,17 +32,6 @@ pub enum Error {
         /// Reason reported by the emulator.
         why: String,
     },
-    /// A snapshot could not be taken or read.
-    #[error("snapshot: {0}")]
-    Snapshot(#[from] rigless::snapshot::Error),
-    /// A snapshot could not be written.
-    #[error("cannot write the snapshot {}: {source}", path.display())]
-    WriteSnapshot {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
     /// A fault could not be injected.
     #[error("cannot inject the fault: {0}")]
     Fault(String),
@@ -55,12 +44,15 @@ pub enum Error {
     /// Some of its checks fail.
     #[error("{0} checks fail; see the table")]
     Failed(usize),
-    /// The plant was requested, but the board runs in a scene.
-    #[error("the board runs in a scene: it has no plant")]
-    InAScene,
-    /// A scene was requested, but the board runs in the plant.
-    #[error("there is no scene around the board")]
-    NoScene,
+    /// The plant was requested, but the board runs in a scene, or the other way round.
+    #[error("the world around the board is another one")]
+    OtherWorld,
+    /// The demonstration has no figures or no pictures.
+    #[error(transparent)]
+    Demo(#[from] sim::demo::DemoError),
+    /// The demonstration misses bounds.
+    #[error("{0} of the bounds missed; see the table")]
+    Missed(usize),
     /// A scene cannot be simulated.
     #[error(transparent)]
     Scene(#[from] sim::SimError),

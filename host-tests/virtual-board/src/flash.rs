@@ -14,7 +14,6 @@ use rigless::soc::stm32f427::generated::flash::{Register, cr};
 use rigless::soc::stm32f427::{CPU, MEMORY};
 use rigless::soc::{Bus, Error, Layout as _, Region, Width};
 use rigless::time::VirtualNanos;
-use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// Sector 7: the first of the two for stored parameters.
@@ -23,10 +22,6 @@ pub const SECTOR: Range<u64> = 0x0806_0000..0x0808_0000;
 pub const OTHER_SECTOR: Range<u64> = 0x0804_0000..0x0806_0000;
 /// Both.
 pub const SECTORS: Range<u64> = OTHER_SECTOR.start..SECTOR.end;
-/// Sector of this number; `None` for any but the two.
-fn sector(number: u64) -> Option<Range<u64>> {
-    [(6, OTHER_SECTOR), (7, SECTOR)].into_iter().find_map(|(own, sector)| (own == number).then_some(sector))
-}
 /// Flash of the F446, which has less than the emulated part.
 const FLASH_BYTES: u64 = 512 << 10;
 
@@ -45,11 +40,9 @@ pub fn layout(of: &Bus) -> Result<Bus, Error> {
     Bus::builder(CPU, &PROGRAMMABLE, of.peripherals().copied()).build()
 }
 
-/// Changes of the flash sectors. A snapshot includes the bytes.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Kept {
-    changed: bool,
-    bytes: Vec<u8>,
+/// Flash that the image programs.
+#[derive(Clone, Debug)]
+pub struct Programmer {
     /// Time for which the core stalls while a word is programmed, ns: typically 16 us, at most 100 us (DS10693).
     pub word_ns: u64,
     /// Number of words programmed.
@@ -60,40 +53,43 @@ pub struct Kept {
     stands_until_ns: Option<u64>,
 }
 
-impl Default for Kept {
+impl Default for Programmer {
     fn default() -> Self {
-        Self { changed: false, bytes: Vec::new(), word_ns: 16_000, words: 0, erases: 0, stands_until_ns: None }
+        Self { word_ns: 16_000, words: 0, erases: 0, stands_until_ns: None }
     }
 }
 
-impl Kept {
+impl Programmer {
     /// The core stored something somewhere.
     pub fn stored(&mut self, session: &mut Session<FingerBoard>, host: &mut dyn Host, access: &Access) {
         if access.kind != AccessKind::Write {
             return;
         }
-        let control = |session: &mut Session<FingerBoard>| {
-            session.mcu().registers("FLASH").map_or(0, |registers| registers.get(Register::Cr))
+        let to_sectors = SECTORS.contains(&access.address);
+        if !to_sectors && access.address != FLASH.base + u64::from(Register::Cr.spec().offset) {
+            return;
+        }
+        let control = session.mcu().registers("FLASH").map_or(0, |registers| registers.get(Register::Cr));
+        let program = |host: &mut dyn Host, address, width, value| {
+            host.program(address, width, value).expect("the flash can be programmed");
         };
-        if SECTORS.contains(&access.address) {
-            if cr::PG.is_set(control(session)) {
-                let before = host.read(access.address, access.width).unwrap_or(0);
-                self.program(host, access.address, access.width, before & access.value);
-                self.words += 1;
-                let until_ns = access.virtual_time.0 + self.word_ns;
-                self.stands_until_ns = Some(until_ns);
-                host.hold(true);
-                session.pause_at(Some(VirtualNanos(until_ns)));
-            }
-        } else if access.address == FLASH.base + u64::from(Register::Cr.spec().offset) {
-            let control = control(session);
-            if cr::STRT.is_set(control) && cr::SER.is_set(control) {
-                let erased = sector(cr::SNB.get(control));
-                self.erases += u64::from(erased.is_some());
-                for address in erased.into_iter().flat_map(|sector| sector.step_by(8)) {
-                    self.program(host, address, Width::W64, u64::MAX);
-                }
-            }
+        if to_sectors && cr::PG.is_set(control) {
+            // Programming only clears bits.
+            let before = host.read(access.address, access.width).unwrap_or(0);
+            program(host, access.address, access.width, before & access.value);
+            self.words += 1;
+            let until_ns = access.virtual_time.0 + self.word_ns;
+            self.stands_until_ns = Some(until_ns);
+            host.hold(true);
+            session.pause_at(Some(VirtualNanos(until_ns)));
+        } else if !to_sectors && cr::STRT.is_set(control) && cr::SER.is_set(control) {
+            let erased = match cr::SNB.get(control) {
+                6 => OTHER_SECTOR,
+                7 => SECTOR,
+                _ => return,
+            };
+            self.erases += 1;
+            erased.step_by(8).for_each(|address| program(host, address, Width::W64, u64::MAX));
         }
     }
 
@@ -102,22 +98,5 @@ impl Kept {
         let done = self.stands_until_ns.is_some_and(|until_ns| until_ns <= now_ns);
         self.stands_until_ns = self.stands_until_ns.filter(|_| !done);
         done
-    }
-
-    fn program(&mut self, host: &mut dyn Host, address: u64, width: Width, value: u64) {
-        self.changed |= host.program(address, width, value).is_ok();
-    }
-
-    /// Takes the bytes in, before a snapshot.
-    pub fn keep(&mut self, host: &mut dyn Host) {
-        let byte = |address| host.read(address, Width::W8).unwrap_or(0xff) as u8;
-        self.bytes = if self.changed { SECTORS.map(byte).collect() } else { Vec::new() };
-    }
-
-    /// Puts the bytes back, after a snapshot or into a fresh run.
-    pub fn put_back(&mut self, host: &mut dyn Host) {
-        for (address, byte) in SECTORS.zip(std::mem::take(&mut self.bytes)) {
-            self.program(host, address, Width::W8, u64::from(byte));
-        }
     }
 }

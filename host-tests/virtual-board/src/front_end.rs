@@ -4,7 +4,6 @@ use crate::inside;
 use crate::measure::PinEdge;
 use crate::surroundings::Surroundings;
 use fingertip::shipped::COLUMNS;
-use serde::{Deserialize, Serialize};
 use sim::mechanics::decay;
 use sim::plant::Plant;
 use std::collections::VecDeque;
@@ -23,7 +22,7 @@ const SUPPLY_RATIO: f64 = 11.0;
 const CODES: f64 = 4096.0;
 
 /// Rows driven, and the time since which they are.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default)]
 struct RowDrive {
     rows: u16,
     since_ns: u64,
@@ -31,7 +30,7 @@ struct RowDrive {
 
 /// A slot of a scene's scan. The update that moves the rows begins it, and the converters are triggered a fixed time
 /// later.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Slot {
     /// Start time of the conversions, ns.
     pub begun_ns: u64,
@@ -42,7 +41,7 @@ pub struct Slot {
 /// Scan of a scene. The image gets an interrupt when half of the rows are driven, reads the progress, and gets another
 /// interrupt when a frame is complete. Nothing else that it can observe depends on when the slots in between are
 /// simulated. So they are simulated all at once, at these times: four events a frame instead of three a slot.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default)]
 pub struct Scan {
     /// Time from an update to the trigger, ns.
     pub edge_ns: u64,
@@ -77,7 +76,7 @@ const DAC_CR: u64 = 0;
 const DAC_DHR12R1: u64 = 8;
 
 /// Counts of the converters.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ScanCounts {
     /// Words converted by the two scanning converters.
     pub conversions: u64,
@@ -90,7 +89,7 @@ pub struct ScanCounts {
 }
 
 /// The board's analogue side, with the world behind it. Converters and stepping share it.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug)]
 pub struct FrontEnd {
     /// Simulated world around the board.
     pub world: Surroundings,
@@ -102,11 +101,9 @@ pub struct FrontEnd {
     pub counts: ScanCounts,
     /// Scan of a scene; `None` outside a scene.
     pub scan: Option<Scan>,
-    /// Edges of the other pins of the rows' port, if they are recorded; a snapshot does not include them.
-    #[serde(skip)]
+    /// Edges of the other pins of the rows' port, if they are recorded.
     pub pin_edges: Option<Vec<PinEdge>>,
-    /// Output of the DAC's first channel; `None` while it is off. A snapshot does not include it.
-    #[serde(skip)]
+    /// Output of the DAC's first channel; `None` while it is off.
     pub dac: Option<Dac>,
     /// Words of each converter that are not fetched yet.
     pub waiting: [VecDeque<u16>; 3],

@@ -22,7 +22,6 @@ pub mod flash;
 pub mod front_end;
 pub mod image;
 pub mod inside;
-pub mod link;
 pub mod log;
 #[cfg(feature = "log")]
 pub mod log_text;
@@ -35,7 +34,6 @@ pub mod scan_timer;
 pub mod scene;
 mod sequence;
 pub mod serve;
-pub mod stand;
 pub mod streams;
 pub mod surroundings;
 mod window_watchdog;

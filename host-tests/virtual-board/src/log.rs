@@ -3,7 +3,6 @@
 use crate::image::Firmware;
 use rigless::emulator::Host;
 use rigless::soc::Width;
-use serde::{Deserialize, Serialize};
 
 /// Offsets in the RTT control block: the first up-channel's buffer, size, write and read position.
 const BUFFER: u64 = 28;
@@ -12,7 +11,7 @@ const WRITTEN: u64 = 36;
 const READ: u64 = 40;
 
 /// Whole frames, still encoded.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frames {
     /// Virtual time at which they were read, ns.
     pub at_ns: u64,
@@ -62,15 +61,5 @@ impl Log {
     /// All frames so far.
     pub fn frames(&self) -> &[Frames] {
         &self.frames
-    }
-
-    /// State that a snapshot includes.
-    pub fn state(&self) -> (&[u8], &[Frames]) {
-        (&self.partial, &self.frames)
-    }
-
-    /// Puts that back.
-    pub fn set_state(&mut self, partial: Vec<u8>, frames: Vec<Frames>) {
-        (self.partial, self.frames) = (partial, frames);
     }
 }

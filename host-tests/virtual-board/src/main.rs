@@ -97,19 +97,17 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let result: Result<(), Box<dyn std::error::Error>> = match Arguments::parse().command {
+    let result = match Arguments::parse().command {
         #[cfg(feature = "log")]
-        Command::Run { image, ms } => commands::run(&image, ms).map_err(Into::into),
+        Command::Run { image, ms } => commands::run(&image, ms),
         #[cfg(feature = "bringup")]
         Command::Bringup { image, frames, estimates, json } => {
-            commands::bringup(&image, frames, estimates.as_deref(), json.as_deref()).map_err(Into::into)
+            commands::bringup(&image, frames, estimates.as_deref(), json.as_deref())
         }
-        Command::Demo { image, json, out, quick } => {
-            commands::demo(image, json.as_deref(), &out, quick).map_err(Into::into)
-        }
+        Command::Demo { image, json, out, quick } => commands::demo(image, json.as_deref(), &out, quick),
         Command::Serve { image, pty, tcp, distance_mm } => {
             let place = tcp.map_or_else(|| Place::Pty(pty), Place::Tcp);
-            commands::serve(&image, &place, distance_mm).map_err(Into::into)
+            commands::serve(&image, &place, distance_mm)
         }
         #[cfg(feature = "scenes")]
         Command::Sim { image, scene } => {

@@ -1,9 +1,7 @@
 //! Measurements of a run: latency, edges, and a digest of all duties and bytes.
 
-use serde::{Deserialize, Serialize};
-
 /// Time from the last conversion of a frame to the new duty.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Latency {
     /// Number of frames that got a duty.
     pub frames: u64,
@@ -55,7 +53,7 @@ pub struct PinEdge {
 }
 
 /// Change of the bridge between on and off.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BridgeEdge {
     /// Virtual time.
     pub at_ns: u64,
@@ -63,8 +61,8 @@ pub struct BridgeEdge {
     pub on: bool,
 }
 
-/// A chained SHA-256 of every duty and every byte on the bus, with their times. A snapshot keeps it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// A chained SHA-256 of every duty and every byte on the bus, with their times.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Trace {
     state: [u8; 32],
     records: u64,

@@ -18,7 +18,6 @@ use crate::window_watchdog::WindowWatchdog;
 use crate::wire::Wire;
 use rigless::device::{Device, ErasedDevice, Level, RegisterFile, ResetCause};
 use rigless::mcu::Mcu;
-use rigless::snapshot::store;
 use rigless::soc::stm32f427::Stm32f427;
 use rigless::soc::stm32f427::generated::c_adc::{self, ccr};
 use rigless::soc::stm32f427::generated::rcc::{Register, apb1enr, csr};
@@ -27,7 +26,6 @@ use rigless::soc::stm32f427::peripherals::tim::Channel;
 use rigless::soc::stm32f427::peripherals::{CONVERTERS, SERIAL_INTERFACES};
 use rigless::soc::{Bus, Error};
 use rigless::time::VirtualNanos;
-use serde::{Deserialize, Serialize};
 
 /// Clock of the buses after reset, Hz: the internal oscillator.
 const RESET_HZ: u64 = 16_000_000;
@@ -53,15 +51,6 @@ enum Model {
     None,
 }
 
-/// The levels that the board holds on pins, through every reset of the part.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct Inputs {
-    /// Phase of the encoder in its quadrature cycle, 0 to 3.
-    pub quarter: u8,
-    /// nFAULT of the bridge.
-    pub bridge_well: bool,
-}
-
 /// The microcontroller.
 #[derive(Debug)]
 pub struct Part {
@@ -73,7 +62,10 @@ pub struct Part {
     scan_timer: ScanTimer,
     streams: Streams,
     window_watchdog: WindowWatchdog,
-    inputs: Inputs,
+    /// Phase of the encoder in its quadrature cycle, 0 to 3.
+    quarter: u8,
+    /// nFAULT of the bridge.
+    bridge_well: bool,
     front_end: Shared,
     layout: Bus,
     laying_out: bool,
@@ -83,12 +75,6 @@ pub struct Part {
     pwm_slot: usize,
     common_slot: usize,
 }
-
-store!(Part {
-    values: [inputs],
-    parts: [chip, bus_port, converters, pwm_timer, scan_timer, streams, window_watchdog],
-    built: [front_end, layout, laying_out, wiring, port_slot, pwm_slot, common_slot],
-});
 
 impl Part {
     /// Out of power-on, the converters on a front end.
@@ -121,7 +107,8 @@ impl Part {
             scan_timer: ScanTimer::new(RESET_HZ, front_end.clone()),
             streams: Streams::new(front_end.clone()),
             window_watchdog: WindowWatchdog::default(),
-            inputs: Inputs { quarter: 0, bridge_well: true },
+            quarter: 0,
+            bridge_well: true,
             front_end,
             layout,
             laying_out: false,
@@ -166,7 +153,7 @@ impl Part {
         let edges = u64::from(moved.unsigned_abs());
         for edge in 1..=edges {
             let step = if moved > 0 { 1 } else { 3 };
-            self.inputs.quarter = (self.inputs.quarter + step) % 4;
+            self.quarter = (self.quarter + step) % 4;
             self.drive_encoder(VirtualNanos(from_ns + (to_ns - from_ns) * edge / (edges + 1)));
         }
         moved
@@ -174,7 +161,7 @@ impl Part {
 
     /// Sets the bridge's nFAULT: the pin and the timer's break behind it.
     pub fn set_bridge_well(&mut self, at: VirtualNanos, well: bool) {
-        self.inputs.bridge_well = well;
+        self.bridge_well = well;
         let level = Level::from(well);
         self.hold_pin(at, 1, 12, level);
         let (registers, mut context) = self.chip.bus_mut().drive(at, self.pwm_slot);
@@ -182,7 +169,7 @@ impl Part {
     }
 
     fn drive_encoder(&mut self, at: VirtualNanos) {
-        let (a, b) = [(false, false), (true, false), (true, true), (false, true)][usize::from(self.inputs.quarter)];
+        let (a, b) = [(false, false), (true, false), (true, true), (false, true)][usize::from(self.quarter)];
         self.chip.drive_timer(at, TIM3, |timer, registers, context| {
             for (number, level) in [(1, a), (2, b)] {
                 let channel = Channel::new(number).expect("timers have channels 1 and 2");
@@ -203,7 +190,7 @@ impl Part {
     }
 
     fn drive_inputs(&mut self, at: VirtualNanos) {
-        self.set_bridge_well(at, self.inputs.bridge_well);
+        self.set_bridge_well(at, self.bridge_well);
         self.drive_encoder(at);
         // nSLEEP is pulled down outside; the bus idles high.
         self.hold_pin(at, 2, 9, Level::Low);

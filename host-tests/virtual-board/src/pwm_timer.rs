@@ -6,12 +6,10 @@
 //! then sleeps until it is read or written; it then catches up by itself.
 
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
-use rigless::snapshot::store;
 use rigless::soc::RegisterSpec;
 use rigless::soc::stm32f427::generated::tim1::{bdtr, cr1, egr};
 use rigless::soc::stm32f427::peripherals::tim::{Advanced, Channel, Counter, Family, Tim};
 use rigless::time::{EventId, VirtualNanos};
-use serde::{Deserialize, Serialize};
 
 type Register = <Advanced as Family>::Register;
 
@@ -26,15 +24,13 @@ pub struct PwmTimer {
 }
 
 /// Events that can shift the phase of the PWM. The image must not shift it while it turns the outputs on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Number of times that the main output enable was set.
     pub turned_on: u64,
     /// Number of times that the image restarted the running counter, by an update event or by writing it.
     pub restarted: u64,
 }
-
-store!(PwmTimer { values: [timer, clock_hz, awake_until_ns, on, counts], parts: [], built: [] });
 
 impl PwmTimer {
     /// Out of reset, on a clock.

@@ -10,20 +10,16 @@ use crate::flash::SECTOR;
 use crate::front_end::{ScanCounts, Shared};
 use crate::image::Firmware;
 use crate::inside;
-use crate::link::Listening;
 use crate::scene::finger::Finger;
-use crate::stand::{Hall, Stand};
 use crate::surroundings::Surroundings;
 use fingertip::chip::Factory;
 use fingertip::params::Params;
 use fingertip::shipped::Record;
-use rigless::emulator::{self, Start};
+use rigless::emulator::{self, Driver, Host, Settled, Start, Stop};
 use rigless::image::Image;
 use rigless::session::Session;
-use rigless::snapshot::Snapshot;
 use rigless::time::VirtualNanos;
 use sim::plant::Plant;
-use std::num::NonZeroU64;
 use std::path::Path;
 use std::sync::mpsc;
 use std::thread::JoinHandle;
@@ -31,14 +27,8 @@ use std::thread::JoinHandle;
 /// Settings of a run.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Instructions that the core retires in a second, constant: 125 million is a CPI of 1.34 at 168 MHz, as in the
-    /// cycle estimate of the control step.
-    pub instructions_per_second: NonZeroU64,
     /// Addresses and bytes that memory holds beside the image, for example a parameter sector.
     pub presets: Vec<(u64, Vec<u8>)>,
-    /// Bits 3:2 of the option bytes: 0 is the brown-out level 3, as `cargo xtask flash` leaves them, and 3 is off, as
-    /// the factory does.
-    pub brown_out_bits: u8,
     /// Factory codes of the reference and of the temperature sensor.
     pub factory: Factory,
 }
@@ -54,12 +44,7 @@ impl Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self {
-            instructions_per_second: NonZeroU64::new(125_000_000).expect("the core runs"),
-            presets: Vec::new(),
-            brown_out_bits: 0,
-            factory: inside::factory(),
-        }
+        Self { presets: Vec::new(), factory: inside::factory() }
     }
 }
 
@@ -81,11 +66,9 @@ fn images(image: &Firmware, options: &Options) -> Result<Vec<Image>, Error> {
 type Job = Box<dyn FnOnce(&mut Stand<'_>) + Send>;
 
 /// Orders to the emulator's thread.
-pub(crate) enum Order {
+enum Order {
     /// Run to an instant of the grid.
     Run(u64),
-    /// Run until an answer has come.
-    Listen(Listening),
     /// Do this at the present halt.
     Do(Job),
 }
@@ -106,34 +89,18 @@ impl Rig {
     /// # Errors
     /// The image cannot be read or placed.
     pub fn new(image: &Path, world: impl Into<Surroundings>, options: &Options) -> Result<Self, Error> {
-        Self::start(image, world.into(), options, None)
-    }
-
-    /// The board as a snapshot kept it: the same image and options, at the instant at which it was taken.
-    ///
-    /// # Errors
-    /// Like [`Rig::new`]; also if the snapshot is of another image or other options.
-    pub fn restore(image: &Path, snapshot: &Path, options: &Options) -> Result<Self, Error> {
-        let world = Plant::new(&sim::setup::Setup::default());
-        Self::start(image, world.into(), options, Some(Snapshot::read(snapshot)?))
-    }
-
-    fn start(path: &Path, world: Surroundings, options: &Options, kept: Option<Snapshot>) -> Result<Self, Error> {
-        let image = Firmware::read(path)?;
+        let image = Firmware::read(image)?;
         let images = images(&image, options)?;
-        let front_end = Shared::new(world);
-        let board = FingerBoard::new(front_end.clone(), options)?;
-        let mut session = Session::new(Box::new(board), 0, VirtualNanos(STEP_NS)).map_err(failure(0))?;
-        let mut bench = Bench::new(front_end, &image);
+        let front_end = Shared::new(world.into());
+        let board = FingerBoard::new(front_end.clone())?;
+        let session = Session::new(Box::new(board), 0, VirtualNanos(STEP_NS)).map_err(failure)?;
+        let bench = Bench::new(front_end, &image);
         let (orders, ordered) = mpsc::channel();
         let (reaching, reached) = mpsc::channel();
-        let resume = kept.map(|kept| kept.restore(&mut session, &digest(&images), &mut bench)).transpose()?;
-        let hall = Hall::new(bench, ordered, reaching, digest(&images));
-        let thread = std::thread::Builder::new().name("board".into()).spawn(move || {
-            let mut start = Start::new(&images);
-            start.resume = resume.as_ref();
-            emulator::run(session, &start, hall).map(drop).map_err(failure(0))
-        })?;
+        let hall = Hall::new(bench, ordered, reaching);
+        let thread = std::thread::Builder::new()
+            .name("board".into())
+            .spawn(move || emulator::run(session, &Start::new(&images), hall).map(drop).map_err(failure))?;
         let mut rig = Self { image, orders: Some(orders), reached, thread: Some(thread), now_ns: 0 };
         rig.await_reached()?;
         Ok(rig)
@@ -190,7 +157,7 @@ impl Rig {
     {
         self.with(|stand| match &mut stand.bench.front_end.lock().world {
             Surroundings::Plant(world) => Ok(job(world)),
-            Surroundings::Scene(_) => Err(Error::InAScene),
+            Surroundings::Scene(_) => Err(Error::OtherWorld),
         })?
     }
 
@@ -205,7 +172,7 @@ impl Rig {
     {
         self.with(|stand| match &mut stand.bench.front_end.lock().world {
             Surroundings::Scene(finger) => Ok(job(finger)),
-            Surroundings::Plant(_) => Err(Error::NoScene),
+            Surroundings::Plant(_) => Err(Error::OtherWorld),
         })?
     }
 
@@ -217,15 +184,6 @@ impl Rig {
     /// The digest of every duty and every byte so far.
     pub fn trace_hash(&mut self) -> Result<String, Error> {
         self.with(|stand| stand.bench.trace.hash())
-    }
-
-    /// Writes the run's whole state to a file.
-    ///
-    /// # Errors
-    /// The state cannot be kept just now, or the file cannot be written.
-    pub fn snapshot(&mut self, path: &Path) -> Result<(), Error> {
-        let file = self.with(|stand| stand.snapshot())??;
-        std::fs::write(path, file).map_err(|source| Error::WriteSnapshot { path: path.into(), source })
     }
 
     /// Does something where the run will then stand, and does not wait.
@@ -255,7 +213,7 @@ impl Rig {
         asked.recv().map_err(|_| self.broken())
     }
 
-    pub(crate) fn order(&mut self, order: Order) -> Result<(), Error> {
+    fn order(&mut self, order: Order) -> Result<(), Error> {
         let sent = self.orders.as_ref().is_some_and(|orders| orders.send(order).is_ok());
         if sent { Ok(()) } else { Err(self.broken()) }
     }
@@ -287,10 +245,82 @@ impl Drop for Rig {
     }
 }
 
-fn failure(at_ns: u64) -> impl Fn(emulator::Error) -> Error {
-    move |error| Error::Emulator { at_ns, why: error.to_string() }
+fn failure(error: emulator::Error) -> Error {
+    Error::Emulator { at_ns: 0, why: error.to_string() }
 }
 
-fn digest(images: &[Image]) -> [u8; 32] {
-    rigless::image::digest(images, None)
+/// The run at a halt, between two instructions.
+pub struct Stand<'a> {
+    /// The board, its registers and the emulator's reports.
+    pub session: &'a mut Session<FingerBoard>,
+    /// The guest's memory and interrupt lines.
+    pub host: &'a mut dyn Host,
+    /// The instant.
+    pub stop: Stop,
+    /// All around the board.
+    pub bench: &'a mut Bench,
+}
+
+/// Drives a run by orders.
+#[derive(Debug)]
+struct Hall {
+    bench: Bench,
+    orders: mpsc::Receiver<Order>,
+    reached: mpsc::Sender<u64>,
+    until_ns: u64,
+}
+
+impl Hall {
+    fn new(bench: Bench, orders: mpsc::Receiver<Order>, reached: mpsc::Sender<u64>) -> Self {
+        let until_ns = bench.next_ns;
+        Self { bench, orders, reached, until_ns }
+    }
+
+    /// Executes orders until one continues the run; returns false after the last order.
+    fn halt(&mut self, session: &mut Session<FingerBoard>, stop: Stop, host: &mut dyn Host) -> bool {
+        let Self { bench, orders, reached, until_ns } = self;
+        if reached.send(bench.next_ns).is_err() {
+            return false;
+        }
+        while let Ok(order) = orders.recv() {
+            match order {
+                Order::Run(until) => {
+                    *until_ns = until;
+                    return true;
+                }
+                Order::Do(job) => job(&mut Stand { session, host, stop, bench }),
+            }
+        }
+        false
+    }
+}
+
+impl Driver<FingerBoard> for Hall {
+    fn on_settled(&mut self, session: &mut Session<FingerBoard>, host: &mut dyn Host, settled: Settled) {
+        if let Settled::Stop(stop) = &settled
+            && self.bench.flash.word_done(stop.at.0)
+        {
+            host.hold(self.bench.core_held);
+        }
+        match settled {
+            Settled::Access { access, .. } => {
+                self.bench.accessed(session.board_mut(), &access);
+                self.bench.flash.stored(session, host, &access);
+                self.bench.clock.accessed(session, host, &access);
+            }
+            Settled::Stop(stop) => self.bench.stopped(session.board_mut(), stop.at.0),
+            _ => {}
+        }
+    }
+
+    fn on_stop(&mut self, session: &mut Session<FingerBoard>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
+        if stop.at.0 >= self.bench.next_ns {
+            self.bench.step(session, host);
+            if self.bench.next_ns >= self.until_ns && !self.halt(session, stop, host) {
+                return None;
+            }
+            self.bench.go_on();
+        }
+        Some(self.bench.next_stop(session.board_mut(), stop.at))
+    }
 }

@@ -6,12 +6,10 @@
 
 use crate::front_end::Shared;
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
-use rigless::snapshot::{Error, Reader, Store, Writer};
 use rigless::soc::RegisterSpec;
 use rigless::soc::stm32f427::generated::tim1::{ccer, ccmr1_output, cr1};
 use rigless::soc::stm32f427::peripherals::tim::{Advanced, Channel, Counter, Family, Tim, UPDATE_REQUEST};
 use rigless::time::{EventId, VirtualNanos};
-use serde::{Deserialize, Serialize};
 
 /// The request output on which the rising edge of channel 1's reference is announced: beyond the timer's own.
 pub const COMPARE_1: usize = 32;
@@ -20,8 +18,7 @@ const PWM_MODE_2: u64 = 0b111;
 const CHANNEL_1: Channel = Channel::new(1).expect("timers have a channel 1");
 
 /// TIM8 of the part.
-#[derive(Debug, Serialize, Deserialize)]
-#[serde(bound(deserialize = "'de: 'static"))]
+#[derive(Debug)]
 pub struct ScanTimer {
     timer: Tim<Advanced>,
     updates_seen: u64,
@@ -31,8 +28,7 @@ pub struct ScanTimer {
     updates: Updates,
     /// In a scene: the next scheduled wake-up, and the number of updates until then.
     wake: Option<(EventId, usize)>,
-    #[serde(skip)]
-    front_end: Option<Shared>,
+    front_end: Shared,
 }
 
 type Register = <Advanced as Family>::Register;
@@ -48,14 +44,13 @@ impl ScanTimer {
             clock_hz,
             updates: Updates::default(),
             wake: None,
-            front_end: Some(front_end),
+            front_end,
         }
     }
 
     /// Keeps the first channel's compare from the timer in a scene: it would be an event in each slot.
     fn take_edge(&mut self, ticks: u64, registers: &mut RegisterFile) -> bool {
-        let Some(front_end) = &self.front_end else { return false };
-        let mut front_end = front_end.lock();
+        let mut front_end = self.front_end.lock();
         let Some(scan) = &mut front_end.scan else { return false };
         scan.edge_ns = (ticks * 1_000_000_000).div_ceil(self.clock_hz.max(1));
         registers.set(Register::Ccr1, 0);
@@ -104,8 +99,7 @@ impl ScanTimer {
     /// In a scene: queues the `passed` updates; while the timer is stopped, the one update that the image generated.
     fn tell_due(&mut self, passed: usize, now_ns: u64) {
         self.updates_served += passed as u64;
-        let Some(front_end) = &self.front_end else { return };
-        if let Some(scan) = &mut front_end.lock().scan {
+        if let Some(scan) = &mut self.front_end.lock().scan {
             scan.due_ns.extend(self.updates.next_ns(passed));
             if !self.updates.running() {
                 scan.due_ns.push_back(now_ns);
@@ -116,8 +110,7 @@ impl ScanTimer {
 
     /// In a scene: sleeps until the next update that raises an interrupt.
     fn sleep(&mut self, context: &mut DeviceContext<'_>) {
-        let Some(front_end) = &self.front_end else { return };
-        let mut front_end = front_end.lock();
+        let mut front_end = self.front_end.lock();
         self.wake = front_end.updates_to_sleep().and_then(|count| {
             let at_ns = self.updates.next_ns(count).next_back()?;
             front_end.expect(self.updates.next_ns(count));
@@ -209,23 +202,10 @@ impl Device for ScanTimer {
     }
 }
 
-impl Store for ScanTimer {
-    fn store(&self, to: &mut Writer) -> Result<(), Error> {
-        to.put(self)
-    }
-
-    fn load(&mut self, from: &mut Reader) -> Result<(), Error> {
-        let front_end = self.front_end.take();
-        *self = from.take()?;
-        self.front_end = front_end;
-        Ok(())
-    }
-}
-
 const NS: u128 = 1_000_000_000;
 
 /// Times of the updates of a running timer, exact to a cycle of its clock.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Updates {
     hz: u64,
     /// Time at which the count of cycles begins, ns.

@@ -4,9 +4,7 @@
 //! registers when the core reads them after the last conversion.
 
 use rigless::device::RegisterFile;
-use rigless::soc::FieldSpec;
-use rigless::soc::stm32f427::generated::adc1::{Register, cr1, jsqr, sqr1, sqr2, sqr3, sr};
-use serde::{Deserialize, Serialize};
+use rigless::soc::stm32f427::generated::adc1::{Register, cr1, jsqr, sqr1, sr};
 
 /// Cycles of a 12-bit conversion after sampling, RM0090 13.7.
 pub const CONVERSION_CYCLES: u64 = 12;
@@ -15,25 +13,6 @@ pub const RANKS: usize = 16;
 
 /// `SMPx`, 13.13.4, in converter cycles.
 const SAMPLING_CYCLES: [u64; 8] = [3, 15, 28, 56, 84, 112, 144, 480];
-
-const SEQUENCE: [(Register, &FieldSpec); RANKS] = [
-    (Register::Sqr3, sqr3::SQ1),
-    (Register::Sqr3, sqr3::SQ2),
-    (Register::Sqr3, sqr3::SQ3),
-    (Register::Sqr3, sqr3::SQ4),
-    (Register::Sqr3, sqr3::SQ5),
-    (Register::Sqr3, sqr3::SQ6),
-    (Register::Sqr2, sqr2::SQ7),
-    (Register::Sqr2, sqr2::SQ8),
-    (Register::Sqr2, sqr2::SQ9),
-    (Register::Sqr2, sqr2::SQ10),
-    (Register::Sqr2, sqr2::SQ11),
-    (Register::Sqr2, sqr2::SQ12),
-    (Register::Sqr1, sqr1::SQ13),
-    (Register::Sqr1, sqr1::SQ14),
-    (Register::Sqr1, sqr1::SQ15),
-    (Register::Sqr1, sqr1::SQ16),
-];
 
 /// Conversions of a regular sequence.
 pub fn length(registers: &RegisterFile) -> usize {
@@ -46,8 +25,9 @@ pub fn length(registers: &RegisterFile) -> usize {
 
 /// The input that a rank converts.
 pub fn input(registers: &RegisterFile, rank: usize) -> usize {
-    let (register, field) = SEQUENCE[rank % RANKS];
-    field.get(registers.get(register)) as usize
+    // Six ranks of five bits in a register, the last register first.
+    let register = [Register::Sqr3, Register::Sqr2, Register::Sqr1][rank / 6 % 3];
+    (registers.get(register) >> (5 * (rank % 6)) & 0b1_1111) as usize
 }
 
 /// Converter cycles for which an input is sampled.
@@ -67,7 +47,7 @@ pub fn injected_inputs(registers: &RegisterFile) -> Vec<usize> {
 }
 
 /// Words of a group under way.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default)]
 pub struct Injected {
     words: Vec<u16>,
     done_ns: u64,

@@ -5,17 +5,12 @@
 //! not, the requests below, half and full transfer, transfer errors, the registers' protection while a stream runs.
 //! Asking for more is told to the run.
 
-mod registers;
-
 use crate::front_end::Shared;
-use registers::*;
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
-use rigless::snapshot::store;
-use rigless::soc::stm32f427::generated::dma2::{Register, s0cr};
+use rigless::soc::stm32f427::generated::dma2::{Register, s0cr, s0fcr};
 use rigless::soc::stm32f427::generated::{ADC2, ADC3};
 use rigless::soc::stm32f427::peripherals::{CONVERTERS, adc, tim};
 use rigless::soc::{Layout, Width};
-use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
 /// The stream whose interrupt says that a frame is complete.
@@ -25,7 +20,7 @@ const DATA_REGISTER: u64 = 0x4c;
 /// An access's token: the stream, and whether it was the read of a word on its way to a peripheral.
 const FETCH: u64 = 0x100;
 
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Stream {
     /// Items of a round, and how many of them are still to come.
     items: u64,
@@ -44,8 +39,6 @@ pub struct Streams {
     streams: [Stream; STREAMS],
     front_end: Shared,
 }
-
-store!(Streams { values: [streams], parts: [], built: [front_end] });
 
 impl Streams {
     /// Out of reset.
@@ -273,4 +266,91 @@ impl Device for Streams {
     fn reset(&mut self) {
         *self = Self::new(self.front_end.clone());
     }
+}
+
+// The registers as the streams have them, and who may ask on which stream.
+
+const STREAMS: usize = 8;
+/// Registers of a stream, and the first stream's first.
+const STREAM_ROWS: usize = 6;
+const FIRST_ROW: usize = 4;
+/// A stream's flags in the status registers.
+const TRANSFER_ERROR: u64 = 1 << 3;
+const HALF: u64 = 1 << 4;
+const COMPLETE: u64 = 1 << 5;
+/// First bit of each stream's flags, RM0390 9.5.1.
+const FLAG_SHIFT: [u32; 4] = [0, 6, 16, 22];
+
+/// Source of a DMA request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Source {
+    /// A converter: its words wait.
+    Converter(usize),
+    /// TIM8: a row's word is to be moved.
+    ScanTimer,
+}
+
+/// Stream, channel, who asks there: the rows of RM0390 table 29 that are wired.
+const REQUESTS: [(usize, u64, Source); 7] = [
+    (0, 0, Source::Converter(0)),
+    (4, 0, Source::Converter(0)),
+    (2, 1, Source::Converter(1)),
+    (3, 1, Source::Converter(1)),
+    (0, 2, Source::Converter(2)),
+    (1, 2, Source::Converter(2)),
+    (1, 7, Source::ScanTimer),
+];
+
+/// A stream's registers that matter, by their place among its six.
+#[derive(Clone, Copy)]
+enum Row {
+    Control = 0,
+    Count = 1,
+    Peripheral = 2,
+    Memory0 = 3,
+    Fifo = 5,
+}
+
+/// A stream's register.
+fn register(stream: usize, row: Row) -> Register {
+    Register::from_index(FIRST_ROW + STREAM_ROWS * stream + row as usize).expect("eight streams of six registers")
+}
+
+/// Value of a stream's register.
+fn get(registers: &RegisterFile, stream: usize, row: Row) -> u64 {
+    registers.get(register(stream, row))
+}
+
+/// Register of a stream's flags, and their first bit in it.
+fn status(stream: usize) -> (Register, u32) {
+    (if stream < 4 { Register::Lisr } else { Register::Hisr }, FLAG_SHIFT[stream % 4])
+}
+
+/// Sets flags of a stream.
+fn raise(registers: &mut RegisterFile, stream: usize, flags: u64) {
+    let (register, shift) = status(stream);
+    registers.set(register, registers.get(register) | flags << shift);
+}
+
+/// Who asks on a stream, by its channel.
+fn source(registers: &RegisterFile, stream: usize) -> Option<Source> {
+    let channel = s0cr::CHSEL.get(get(registers, stream, Row::Control));
+    REQUESTS.iter().find(|(at, on, _)| *at == stream && *on == channel).map(|(_, _, source)| *source)
+}
+
+/// Returns true if the setup of a stream is modelled.
+fn fits(registers: &RegisterFile, stream: usize) -> bool {
+    let control = get(registers, stream, Row::Control);
+    let plain = s0cr::MINC.is_set(control)
+        && !s0cr::PINC.is_set(control)
+        && !s0cr::DBM.is_set(control)
+        && !s0cr::PFCTRL.is_set(control)
+        && !s0fcr::DMDIS.is_set(get(registers, stream, Row::Fifo));
+    let shape = (s0cr::DIR.get(control), s0cr::PSIZE.get(control));
+    plain
+        && match source(registers, stream) {
+            Some(Source::Converter(_)) => shape == (0, 1),
+            Some(Source::ScanTimer) => shape == (1, 2),
+            None => false,
+        }
 }

@@ -3,17 +3,15 @@
 use crate::bench::STEP_NS;
 use crate::inside::ROOM_C;
 use crate::scene::finger::Finger;
-use serde::{Deserialize, Serialize};
 use sim::bridge::Bridge;
 use sim::plant::Plant;
 
 /// The world behind the board's pins.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug)]
 pub enum Surroundings {
-    /// The plant. A snapshot keeps it.
+    /// The plant.
     Plant(Box<Plant>),
-    /// A scene's. It has no snapshot: asking for one is an error.
-    #[serde(skip)]
+    /// A scene's.
     Scene(Box<Finger>),
 }
 

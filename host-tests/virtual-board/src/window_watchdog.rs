@@ -5,10 +5,8 @@
 //! feeding, so a count lasts up to a tick less than it says. Nothing stops it. Its early interrupt is not modelled.
 
 use rigless::device::{Device, DeviceContext, RegisterFile};
-use rigless::snapshot::store;
 use rigless::soc::stm32f427::generated::wwdg::{Register, cfr, cr};
 use rigless::time::{EventId, VirtualNanos};
-use serde::{Deserialize, Serialize};
 
 /// The least count that does not bite.
 const END: u64 = 0x40;
@@ -16,7 +14,7 @@ const END: u64 = 0x40;
 const CYCLES: u64 = 4_096;
 
 /// WWDG of the part.
-#[derive(Debug, Default, Serialize, Deserialize)]
+#[derive(Debug, Default)]
 pub struct WindowWatchdog {
     clock_hz: u64,
     divider: u32,
@@ -25,8 +23,6 @@ pub struct WindowWatchdog {
     /// The one scheduled event, which checks for a time-out.
     pending: Option<EventId>,
 }
-
-store!(WindowWatchdog);
 
 impl WindowWatchdog {
     /// Sets the clock of APB1, Hz.

@@ -2,13 +2,12 @@
 
 use rigless::chip::Timeline;
 use rigless::chip::uart::Peer;
-use rigless::snapshot::store;
+use rigless::snapshot::Store;
 use rigless::time::VirtualNanos;
-use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
 /// A byte and the instant at which its stop bit ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TimedByte {
     /// Virtual time of the end of its stop bit, ns.
     pub at_ns: u64,
@@ -17,13 +16,15 @@ pub struct TimedByte {
 }
 
 /// The host's end of USART2. The port times each byte by its baud rate, both ways.
-#[derive(Debug, Default, Serialize, Deserialize)]
+#[derive(Debug, Default)]
 pub struct Wire {
     outgoing: VecDeque<(u64, u8)>,
     incoming: Vec<TimedByte>,
     single: bool,
 }
-store!(Wire);
+
+// A run has no snapshot.
+impl Store for Wire {}
 
 impl Wire {
     /// Queues bytes that start no earlier than an instant; each follows the one before it.

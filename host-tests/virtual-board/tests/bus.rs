@@ -1,20 +1,33 @@
 //! What ROBOTIS' own drivers expect of the bus, from the flash image: time, recovery, goals that end with torque.
 
 use crate::common::{
-    WAIT_NS, away, holding, holding_on_a_bus, let_go, on_bus, poke, read_u8, read_u16, read_u32, running,
-    write_and_run_ms, write_goal, write_u8,
+    PING, WAIT_NS, force_n, hold_again, holding, let_go, on_bus, read_u8, read_u32, run_checks, write_and_run_ms,
+    write_u8,
 };
-use dynamixel2::{ReadError, TransferError};
 use fingertip::link::Reply;
 use fingertip::link::packet::{CRC_START, Sender, update_crc};
 use fingertip::params::Params;
-use fingertip::shipped::{CLOCKS, Config, TAXELS, address};
-use fingertip::state::{Fault, Limits, Mode};
-use fingertip::store::BAUD_RATES;
-use rigless::soc::stm32f427::generated::USART2;
+use fingertip::shipped::{CLOCKS, Config, REGISTERS, TAXELS, address};
+use fingertip::state::Mode;
+use virtual_board::client::Client;
 use virtual_board::{Options, Rig};
 
-fn read(rig: &mut Rig, register: u16, bytes: u16) -> Vec<u8> {
+#[test]
+fn a_host_finds_what_it_expects_on_the_bus_of_a_board_that_holds_1_n() {
+    let mut rig = holding(&Options::confirmed());
+    let checks: [(&str, fn(&mut Rig)); 7] = [
+        ("the frames' times", frames_have_true_times),
+        ("a fast bulk read", fast_bulk_read_is_answered_in_one_packet),
+        ("the line's direction", the_line_is_given_back_right_after_the_last_stop_bit),
+        ("silence", silence_is_told_in_virtual_time),
+        ("torque off", torque_off_ends_the_goal),
+        ("the phase of the PWM", turning_the_bridge_on_keeps_the_phase_of_the_pwm),
+        ("the stack", at_least_half_of_the_stack_is_never_used),
+    ];
+    run_checks(&mut rig, &checks);
+}
+
+pub fn read(rig: &mut Rig, register: u16, bytes: u16) -> Vec<u8> {
     on_bus(rig, move |bus| bus.read(1, register, bytes).map(|reply| reply.data))
 }
 
@@ -34,16 +47,14 @@ impl Seen {
 }
 
 /// A frame's time is when it ended, by the crystal: as far from another's as their numbers say, to the microsecond.
-#[test]
-fn frames_have_true_times() {
-    let mut rig = holding();
+fn frames_have_true_times(rig: &mut Rig) {
     let period_ns = Config::shipped(&Params::DEFAULT).expect("the defaults").timing.frame_ns;
     assert_eq!(CLOCKS.timer_hz, 168_000_000);
-    let first = Seen::of(&mut rig);
+    let first = Seen::of(rig);
     assert_eq!(first.word(address::PICTURE_PERIOD_NS), period_ns);
     for wait_ms in [1, 7, 100, 350] {
         rig.run_ms(wait_ms).expect("it runs");
-        let later = Seen::of(&mut rig);
+        let later = Seen::of(rig);
         let frames = later.word(address::PICTURE_FRAME) - first.word(address::PICTURE_FRAME);
         let time_us = later.word(address::PICTURE_TIME_US) - first.word(address::PICTURE_TIME_US);
         let expected_us = f64::from(frames) * f64::from(period_ns) * 1e-3;
@@ -57,73 +68,9 @@ fn frames_have_true_times() {
     assert!((980..=1_020).contains(&force_mn), "{force_mn} mN");
 }
 
-#[test]
-fn before_the_first_tare_no_force_is_told() {
-    let mut rig = running(&away(0.5), &Options::default());
-    let told = |rig: &mut Rig| {
-        let pressures = read(rig, address::PRESSURES, 2 * TAXELS as u16);
-        (read_u32(rig, address::PRESENT_FORCE_MN), pressures.iter().all(|&byte| byte == 0))
-    };
-    assert_eq!(told(&mut rig), (0, true));
-    assert!(Limits(read_u16(&mut rig, address::LIMITS)).has(Limits::NOT_TARED));
-    assert!(read(&mut rig, address::RAW_CODES, 2) != [0, 0], "the array itself is seen");
-    write_and_run_ms(&mut rig, address::TARE, 1, 20);
-    assert!(!Limits(read_u16(&mut rig, address::LIMITS)).has(Limits::NOT_TARED));
-    assert!(told(&mut rig).0 <= 20, "now it is a force: none");
-}
-
-#[test]
-fn torque_off_ends_the_goal() {
-    let mut rig = holding();
-    write_u8(&mut rig, address::TORQUE_ENABLE, 0);
-    assert_eq!(read_u32(&mut rig, address::GOAL_FORCE_MN), 0);
-    rig.run_ms(50).expect("it runs");
-    write_u8(&mut rig, address::TORQUE_ENABLE, 1);
-    for _ in 0..20 {
-        rig.run_ms(10).expect("it runs");
-        let force_n = rig.world(|world| world.force_n()).expect("it runs");
-        assert!(force_n < 1.0, "{force_n} N: nothing is pressed");
-    }
-    assert_eq!(read_u8(&mut rig, address::PRESENT_MODE), Mode::Release as u8);
-    let force_n = rig.world(|world| world.force_n()).expect("it runs");
-    assert_eq!(force_n, 0.0, "it has let go");
-    write_goal(&mut rig, 1_000);
-    rig.run_ms(200).expect("it runs");
-    let force_n = rig.world(|world| world.force_n()).expect("it runs");
-    assert!((0.98..1.02).contains(&force_n), "{force_n} N");
-}
-
-#[test]
-fn one_write_recovers_from_a_silent_bus() {
-    let mut rig = holding();
-    write_and_run_ms(&mut rig, address::BUS_WATCHDOG, 1, 200);
-    assert_eq!(read_u8(&mut rig, address::FAULT), Fault::BusSilent as u8);
-    assert_eq!(rig.world(|world| world.force_n()).expect("it runs"), 0.0, "released before the fault");
-    let refused = |rig: &mut Rig, register: u16, bytes: &'static [u8]| {
-        let written = rig.client(WAIT_NS, move |bus| bus.write(1, register, bytes).map(drop));
-        match written.expect("the client runs") {
-            Err(TransferError::ReadError(ReadError::MotorError(error))) => error.raw,
-            other => panic!("not refused: {other:?}"),
-        }
-    };
-    // Range and result, with the alert.
-    assert_eq!(refused(&mut rig, address::GOAL_FORCE_MN, &[0xE8, 3, 0, 0]), 0x84);
-    assert_eq!(refused(&mut rig, address::TORQUE_ENABLE, &[1]), 0x81);
-    assert_eq!(read_u8(&mut rig, address::RECOVER_HINDRANCE), 0);
-    write_and_run_ms(&mut rig, address::RECOVER, 1, 2);
-    assert_eq!((read_u8(&mut rig, address::FAULT), read_u8(&mut rig, address::BUS_WATCHDOG)), (0, 0));
-    assert_eq!(read_u8(&mut rig, address::PRESENT_MODE), Mode::Off as u8);
-    write_u8(&mut rig, address::TORQUE_ENABLE, 1);
-    write_goal(&mut rig, 1_000);
-    rig.run_ms(300).expect("it runs");
-    let force_n = rig.world(|world| world.force_n()).expect("it runs");
-    assert!((0.98..1.02).contains(&force_n), "{force_n} N");
-}
-
-#[test]
-fn fast_bulk_read_is_answered_in_one_packet() {
-    let mut rig = holding();
+fn fast_bulk_read_is_answered_in_one_packet(rig: &mut Rig) {
     let [low, high] = address::PRESENT_MODE.to_le_bytes();
+    rig.take_received().expect("it runs");
     rig.send(&broadcast(0x9A, &[1, low, high, 62, 0])).expect("it runs");
     rig.run_ms(5).expect("it runs");
     let wire: Vec<u8> = rig.take_received().expect("it runs").iter().map(|timed| timed.byte).collect();
@@ -133,8 +80,8 @@ fn fast_bulk_read_is_answered_in_one_packet() {
     assert_eq!(body[10], Mode::Force as u8);
 }
 
-/// A packet for all devices, which none answers.
-fn broadcast(instruction: u8, params: &[u8]) -> Vec<u8> {
+/// A packet for all devices.
+pub fn broadcast(instruction: u8, params: &[u8]) -> Vec<u8> {
     let mut packet = Reply::new();
     let mut sender = Sender::new(&mut packet, 254, instruction);
     params.iter().for_each(|byte| sender.push(*byte));
@@ -142,55 +89,89 @@ fn broadcast(instruction: u8, params: &[u8]) -> Vec<u8> {
     packet.to_vec()
 }
 
-/// Packets at each speed.
-const PACKETS: u64 = 1_000;
-
-/// Reads with pauses of 10 to 110 us: the image takes some of them while the next one arrives.
-#[test]
-fn no_byte_of_a_fast_bus_is_lost() {
-    const { assert!(BAUD_RATES[5] == 3_000_000) };
-    let mut rig = holding_on_a_bus(5, 0);
-    // 42 MHz / 10 is the fastest below 5.25 Mbaud: both ends of the line go by the register.
-    for (baud, divider) in [(3_000_000, None), (4_200_000, Some(0x12))] {
-        if let Some(divider) = divider {
-            poke(&mut rig, USART2.base + 8, divider);
-        }
-        let before = read_u32(&mut rig, address::GOOD_PACKETS);
-        let end_ns = rig
-            .with(move |stand| {
-                let packet = broadcast(2, &[0, 0, 4, 0]);
-                let packet_ns = packet.len() as u64 * 10 * 1_000_000_000 / baud;
-                (0..PACKETS).fold(stand.bench.next_ns, |at_ns, nth| {
-                    stand.session.board_mut().wire().send(at_ns, &packet);
-                    at_ns + packet_ns + 10_000 + nth * 7_919 % 100_000
-                })
-            })
-            .expect("it runs");
-        rig.run_until_ns(end_ns + 1_000_000).expect("it runs");
-        let good = u64::from(read_u32(&mut rig, address::GOOD_PACKETS) - before - 1);
-        println!("{baud} baud: {} of {PACKETS} packets lost", PACKETS - good);
-        assert_eq!(good, PACKETS, "at {baud} baud");
+/// The stop bit ends at many instants of a frame, also while control computes a fit.
+fn the_line_is_given_back_right_after_the_last_stop_bit(rig: &mut Rig) {
+    let mut late_ns = Vec::new();
+    for turn in 0..40 {
+        rig.run_until_ns(rig.now_ns() + 10_000 * (turn % 10)).expect("it runs");
+        rig.take_received().expect("it runs");
+        rig.with(|stand| stand.bench.transmit_edges.clear()).expect("it runs");
+        rig.send(&PING).expect("it runs");
+        rig.run_ms(2).expect("it runs");
+        let end_ns = rig.take_received().expect("it runs").last().expect("it answers").at_ns;
+        let edges = rig.with(|stand| std::mem::take(&mut stand.bench.transmit_edges)).expect("it runs");
+        assert_eq!(edges.iter().map(|edge| edge.on).collect::<Vec<_>>(), [true, false]);
+        assert!(edges[1].at_ns >= end_ns, "{} ns before the last stop bit's end", end_ns - edges[1].at_ns);
+        late_ns.push(edges[1].at_ns - end_ns);
     }
+    late_ns.sort_unstable();
+    println!("given back {} to {} ns after the last stop bit, half within {}", late_ns[0], late_ns[39], late_ns[20]);
+    assert!(late_ns[39] <= 5_000, "{} ns", late_ns[39]);
+}
+
+/// A packet without an answer costs virtual time only, and the client goes on.
+fn silence_is_told_in_virtual_time(rig: &mut Rig) {
+    let begun_ns = rig.now_ns();
+    let asked = rig.client(WAIT_NS, |bus| {
+        (bus.ping(7).is_err(), bus.ping(1).map(|reply| reply.motor_id), bus.read_u8(8, 0).is_err())
+    });
+    let (unknown, known, none) = asked.expect("the client runs");
+    assert!(unknown && none);
+    assert_eq!(known.expect("the image answers"), 1);
+    let took_ns = rig.now_ns() - begun_ns;
+    assert!((2 * WAIT_NS..4 * WAIT_NS).contains(&took_ns), "{took_ns} ns");
+}
+
+fn torque_off_ends_the_goal(rig: &mut Rig) {
+    write_u8(rig, address::TORQUE_ENABLE, 0);
+    assert_eq!(read_u32(rig, address::GOAL_FORCE_MN), 0);
+    rig.run_ms(50).expect("it runs");
+    write_u8(rig, address::TORQUE_ENABLE, 1);
+    for _ in 0..20 {
+        rig.run_ms(10).expect("it runs");
+        let force_n = force_n(rig);
+        assert!(force_n < 1.0, "{force_n} N: nothing is pressed");
+    }
+    assert_eq!(read_u8(rig, address::PRESENT_MODE), Mode::Release as u8);
+    assert_eq!(force_n(rig), 0.0, "it has let go");
+    hold_again(rig);
 }
 
 /// Number of times that the bridge is turned on. The motor is shorted until it rests between two of them.
 const TURNS: u64 = 10;
 
 /// The edges of a duty meet the same rows of the scan as long as no period of the PWM is begun out of turn.
-#[test]
-fn turning_the_bridge_on_keeps_the_phase_of_the_pwm() {
-    let mut rig = holding();
-    let_go(&mut rig);
+fn turning_the_bridge_on_keeps_the_phase_of_the_pwm(rig: &mut Rig) {
+    let_go(rig);
     rig.run_ms(100).expect("it runs");
     let counts = |rig: &mut Rig| rig.with(|stand| stand.session.board_mut().part.pwm_timer().0.counts());
-    let before = counts(&mut rig).expect("it runs");
+    let before = counts(rig).expect("it runs");
     for _ in 0..TURNS {
         for (torque, ms) in [(1, 1), (0, 40)] {
-            write_and_run_ms(&mut rig, address::TORQUE_ENABLE, torque, ms);
+            write_and_run_ms(rig, address::TORQUE_ENABLE, torque, ms);
         }
     }
-    let after = counts(&mut rig).expect("it runs");
+    let after = counts(rig).expect("it runs");
     let (turned_on, restarted) = (after.turned_on - before.turned_on, after.restarted - before.restarted);
     println!("turned on {turned_on} times, a period begun out of turn {restarted} times");
     assert_eq!((turned_on, restarted), (TURNS, 0));
+}
+
+/// The deepest calls: all pictures read at once, then with torque off a parameter changed, which makes a configuration,
+/// and everything saved.
+fn at_least_half_of_the_stack_is_never_used(rig: &mut Rig) {
+    hold_again(rig);
+    let read = |bus: &mut Client| {
+        for register in REGISTERS {
+            bus.read(1, register.address, register.bytes()).expect("it answers");
+        }
+        bus.write_u8(1, address::TORQUE_ENABLE, 0).expect("it obeys");
+        bus.write_u32(1, address::PARAMS, Params::DEFAULT.to_array()[0].unsigned_abs()).expect("it obeys");
+        bus.write_u8(1, address::SAVE_PARAMETERS, 1).expect("it obeys");
+    };
+    rig.client(WAIT_NS, read).expect("the client runs");
+    rig.run_ms(50).expect("it runs");
+    let stack = rig.stack_use().expect("it runs").expect("the image names its stack");
+    println!("stack: {} of {} bytes used", stack.used, stack.size);
+    assert!(stack.used > 2_000 && 2 * stack.used <= stack.size, "{stack:?}");
 }

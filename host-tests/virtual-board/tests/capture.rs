@@ -2,9 +2,10 @@
 //! what becomes of one that is asked for out of turn, interrupted, or read while it is under way.
 
 use crate::common::{
-    away, let_go, on_bus, read_u8, read_u16, read_u32, reboot, refused, running, write_and_run_ms, write_goal,
+    away, let_go, on_bus, read_u8, read_u16, read_u32, reboot, refused, restart, running, write_and_run_ms, write_goal,
     write_param, write_u8, write_u16,
 };
+use crate::measured::a_press_completes_and_the_modulus_is_solved;
 use fingertip::capture::Ended;
 use fingertip::shipped::{CAPTURE_BYTES, CLOCKS, COLUMNS, ROWS, address};
 use fingertip::state::Mode;
@@ -23,9 +24,13 @@ const WAIT_NS: u64 = 20_000_000;
 /// Bytes of a read.
 const WINDOW: u16 = 248;
 
-/// A board whose tip is 0.4 mm away from a plate.
-fn start() -> Rig {
-    running(&away(0.4), &Options::confirmed())
+#[test]
+fn captures_replay_and_a_press_is_solved() {
+    let mut rig = running(&away(0.4), &Options::confirmed());
+    out_of_turn_and_interrupted(&mut rig);
+    a_press_replays_to_the_bit_also_with_calibrated_gains(&mut rig);
+    restart(&mut rig);
+    a_press_completes_and_the_modulus_is_solved(&mut rig);
 }
 
 /// Arms, tares, and presses with half a newton from then on.
@@ -56,7 +61,7 @@ fn window(rig: &mut Rig, offset: u32) -> Vec<u8> {
     })
 }
 
-fn fetch(rig: &mut Rig) -> Vec<u8> {
+pub fn fetch(rig: &mut Rig) -> Vec<u8> {
     let length = read_u32(rig, address::CAPTURE_BYTES);
     let mut bytes = Vec::new();
     while bytes.len() < length as usize {
@@ -83,93 +88,90 @@ fn same(rig: &mut Rig, bytes: &[u8]) -> (Replayed<ROWS, COLUMNS>, Vec<Mode>) {
     (replayed, modes)
 }
 
-#[test]
-fn a_press_replays_to_the_bit_also_with_calibrated_gains() {
-    let mut rig = start();
+fn a_press_replays_to_the_bit_also_with_calibrated_gains(rig: &mut Rig) {
+    let count = read_u8(rig, address::CAPTURE_COUNT);
     // What the finger did before is no part of it.
-    write_and_run_ms(&mut rig, address::TARE, 1, 20);
-    write_u8(&mut rig, address::TORQUE_ENABLE, 1);
-    write_goal(&mut rig, 1_000);
+    write_and_run_ms(rig, address::TARE, 1, 20);
+    write_u8(rig, address::TORQUE_ENABLE, 1);
+    write_goal(rig, 1_000);
     rig.run_ms(60).expect("it runs");
-    let_go(&mut rig);
+    let_go(rig);
     rig.run_ms(300).expect("it runs");
-    let missed = read_u32(&mut rig, address::MISSED_FRAMES);
-    let before_us = read_u16(&mut rig, address::LOOP_TIME_MAX_US);
-    press(&mut rig);
-    assert_eq!((read_u8(&mut rig, address::CAPTURE_STATE), read_u32(&mut rig, address::CAPTURE_BYTES)), (RECORDING, 0));
+    let missed = read_u32(rig, address::MISSED_FRAMES);
+    let before_us = read_u16(rig, address::LOOP_TIME_MAX_US);
+    press(rig);
+    assert_eq!((read_u8(rig, address::CAPTURE_STATE), read_u32(rig, address::CAPTURE_BYTES)), (RECORDING, 0));
     // Read while it is under way: nothing, and no harm.
-    assert_eq!(window(&mut rig, 0), [0; WINDOW as usize]);
-    assert_eq!(refused(&mut rig, address::CAPTURE, 1), ACCESS, "with torque on");
-    until_done(&mut rig);
+    assert_eq!(window(rig, 0), [0; WINDOW as usize]);
+    assert_eq!(refused(rig, address::CAPTURE, &[1]), ACCESS, "with torque on");
+    until_done(rig);
     // Keeping frames costs none.
-    assert_eq!((read_u8(&mut rig, address::FAULT), read_u32(&mut rig, address::MISSED_FRAMES)), (0, missed));
-    let bytes = fetch(&mut rig);
-    let (replayed, modes) = same(&mut rig, &bytes);
+    assert_eq!((read_u8(rig, address::FAULT), read_u32(rig, address::MISSED_FRAMES)), (0, missed));
+    let bytes = fetch(rig);
+    let (replayed, modes) = same(rig, &bytes);
     assert_eq!((replayed.head.ended, replayed.head.missed_frames), (Ended::Full, missed));
     assert_eq!(modes, [Mode::Tare, Mode::Off, Mode::Approach, Mode::Force]);
     let per_frame = bytes.len() as f64 / f64::from(replayed.head.frames);
     println!("{} frames in {} bytes, {per_frame:.1} a frame", replayed.head.frames, bytes.len());
     assert!(bytes.len() <= CAPTURE_BYTES && replayed.head.frames > 600);
-    let longest_us = read_u16(&mut rig, address::LOOP_TIME_MAX_US);
+    let longest_us = read_u16(rig, address::LOOP_TIME_MAX_US);
     println!("the longest loop time: {before_us} us before, {longest_us} us with the capture");
 
     // The same with gains that are not 1.
-    let_go(&mut rig);
+    let_go(rig);
     let taxels = [(44, 20_480_u16), (35, 12_288), (0, 8_192), (99, 32_767)];
     for (taxel, gain) in taxels {
-        write_u16(&mut rig, address::GAINS + 2 * taxel, gain);
+        write_u16(rig, address::GAINS + 2 * taxel, gain);
     }
     rig.run_ms(5).expect("it runs");
-    press(&mut rig);
-    until_done(&mut rig);
-    let again = fetch(&mut rig);
-    let (replayed, modes) = same(&mut rig, &again);
+    press(rig);
+    until_done(rig);
+    let again = fetch(rig);
+    let (replayed, modes) = same(rig, &again);
     assert_eq!(modes.last(), Some(&Mode::Force));
     assert_eq!(taxels.map(|(taxel, _)| replayed.head.gains.get(taxel.into())), taxels.map(|(_, gain)| gain));
-    assert_eq!(read_u8(&mut rig, address::CAPTURE_COUNT), 2);
+    assert_eq!(read_u8(rig, address::CAPTURE_COUNT), count + 2);
 }
 
-#[test]
-fn out_of_turn_and_interrupted() {
-    let mut rig = start();
+fn out_of_turn_and_interrupted(rig: &mut Rig) {
     // Armed twice is armed; called off is off.
-    write_and_run_ms(&mut rig, address::CAPTURE, 1, 1);
-    write_and_run_ms(&mut rig, address::CAPTURE, 1, 1);
-    assert_eq!(read_u8(&mut rig, address::CAPTURE_STATE), ARMED);
-    write_and_run_ms(&mut rig, address::CAPTURE, 0, 1);
-    assert_eq!(read_u8(&mut rig, address::CAPTURE_STATE), NONE);
+    write_and_run_ms(rig, address::CAPTURE, 1, 1);
+    write_and_run_ms(rig, address::CAPTURE, 1, 1);
+    assert_eq!(read_u8(rig, address::CAPTURE_STATE), ARMED);
+    write_and_run_ms(rig, address::CAPTURE, 0, 1);
+    assert_eq!(read_u8(rig, address::CAPTURE_STATE), NONE);
 
     // Parameters between arming and the tare: those of the tare count.
-    write_and_run_ms(&mut rig, address::CAPTURE, 1, 1);
-    write_param(&mut rig, "modulus_pa", 260_000);
-    assert_eq!(read_u8(&mut rig, address::CAPTURE_STATE), ARMED);
-    write_and_run_ms(&mut rig, address::TARE, 1, 8);
-    assert_eq!(read_u8(&mut rig, address::CAPTURE_STATE), RECORDING);
-    assert_eq!(refused(&mut rig, address::CAPTURE, 1), RESULT, "frames are being kept");
-    write_and_run_ms(&mut rig, address::CAPTURE, 0, 1);
-    let bytes = fetch(&mut rig);
-    let (replayed, _) = same(&mut rig, &bytes);
+    write_and_run_ms(rig, address::CAPTURE, 1, 1);
+    write_param(rig, "modulus_pa", 260_000);
+    assert_eq!(read_u8(rig, address::CAPTURE_STATE), ARMED);
+    write_and_run_ms(rig, address::TARE, 1, 8);
+    assert_eq!(read_u8(rig, address::CAPTURE_STATE), RECORDING);
+    assert_eq!(refused(rig, address::CAPTURE, &[1]), RESULT, "frames are being kept");
+    write_and_run_ms(rig, address::CAPTURE, 0, 1);
+    let bytes = fetch(rig);
+    let (replayed, _) = same(rig, &bytes);
     assert_eq!((replayed.head.ended, replayed.head.params.modulus_pa), (Ended::Asked, 260_000));
     assert!((60..160).contains(&replayed.head.frames), "{} frames", replayed.head.frames);
 
     // Parameters in the middle end it; what is there replays with those before.
-    write_and_run_ms(&mut rig, address::CAPTURE, 1, 1);
-    write_and_run_ms(&mut rig, address::TARE, 1, 20);
-    write_param(&mut rig, "modulus_pa", 250_000);
-    let bytes = fetch(&mut rig);
-    let (replayed, modes) = same(&mut rig, &bytes);
+    write_and_run_ms(rig, address::CAPTURE, 1, 1);
+    write_and_run_ms(rig, address::TARE, 1, 20);
+    write_param(rig, "modulus_pa", 250_000);
+    let bytes = fetch(rig);
+    let (replayed, modes) = same(rig, &bytes);
     assert_eq!((replayed.head.ended, replayed.head.params.modulus_pa), (Ended::Configured, 260_000));
     assert_eq!(modes, [Mode::Tare, Mode::Off]);
 
     // A reset in the middle leaves nothing.
-    write_and_run_ms(&mut rig, address::CAPTURE, 1, 1);
-    write_and_run_ms(&mut rig, address::TARE, 1, 5);
-    reboot(&mut rig, 30);
-    assert_eq!((read_u8(&mut rig, address::CAPTURE_STATE), read_u8(&mut rig, address::CAPTURE_COUNT)), (NONE, 0));
-    assert_eq!((read_u32(&mut rig, address::CAPTURE_BYTES), window(&mut rig, 0)), (0, vec![0; WINDOW.into()]));
-    write_and_run_ms(&mut rig, address::CAPTURE, 1, 1);
-    write_u8(&mut rig, address::TARE, 1);
-    until_done(&mut rig);
-    let bytes = fetch(&mut rig);
-    same(&mut rig, &bytes);
+    write_and_run_ms(rig, address::CAPTURE, 1, 1);
+    write_and_run_ms(rig, address::TARE, 1, 5);
+    reboot(rig, 30);
+    assert_eq!((read_u8(rig, address::CAPTURE_STATE), read_u8(rig, address::CAPTURE_COUNT)), (NONE, 0));
+    assert_eq!((read_u32(rig, address::CAPTURE_BYTES), window(rig, 0)), (0, vec![0; WINDOW.into()]));
+    write_and_run_ms(rig, address::CAPTURE, 1, 1);
+    write_u8(rig, address::TARE, 1);
+    until_done(rig);
+    let bytes = fetch(rig);
+    same(rig, &bytes);
 }

@@ -8,16 +8,14 @@
 #[allow(dead_code, reason = "the link's tests take more of it")]
 mod bench;
 
-use crate::common::{PING, WAIT_NS, holding};
+use crate::common::PING;
 use bench::Bench;
-use fingertip::shipped::address;
 use serial2::SerialPort;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::os::fd::AsRawFd;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::time::Duration;
 
 /// A pseudo-terminal: the device's end, and the name of the client's, which is held open.
 fn terminal() -> (SerialPort, SerialPort, PathBuf) {
@@ -78,37 +76,6 @@ fn robotis_and_pollens_clients_drive_the_finger() {
     for client in ["dynamixel-sdk: ", "dynamixel_easy_sdk: ", "rustypot: "] {
         assert!(said.lines().any(|line| line.starts_with(client) && line.ends_with(" operations")), "{said}");
     }
-}
-
-// The client of this crate waits in virtual time, not by the wall clock.
-
-/// The board's thread does nothing for longer than the client would wait at any common baud rate.
-#[test]
-fn a_slow_machine_changes_nothing() {
-    let [quick, slow] = [Duration::ZERO, Duration::from_secs(4)].map(|pause| {
-        let mut rig = holding();
-        rig.post(move |_| std::thread::sleep(pause)).expect("it runs");
-        let read = rig.client(WAIT_NS, |bus| bus.read_u32(1, address::PRESENT_FORCE_MN).map(|reply| reply.data));
-        let force_mn =
-            read.expect("the client runs").expect("the image answers, however late by the clock on the wall");
-        (force_mn, rig.now_ns())
-    });
-    assert_eq!(quick, slow);
-}
-
-/// A packet without an answer costs virtual time only, and the client goes on.
-#[test]
-fn silence_is_told_in_virtual_time() {
-    let mut rig = holding();
-    let begun_ns = rig.now_ns();
-    let asked = rig.client(WAIT_NS, |bus| {
-        (bus.ping(7).is_err(), bus.ping(1).map(|reply| reply.motor_id), bus.read_u8(8, 0).is_err())
-    });
-    let (unknown, known, none) = asked.expect("the client runs");
-    assert!(unknown && none);
-    assert_eq!(known.expect("the image answers"), 1);
-    let took_ns = rig.now_ns() - begun_ns;
-    assert!((2 * WAIT_NS..4 * WAIT_NS).contains(&took_ns), "{took_ns} ns");
 }
 
 // The board behind a port.

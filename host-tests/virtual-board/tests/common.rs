@@ -1,16 +1,13 @@
 //! What the tests of the flash image share.
 
 use dynamixel2::{ReadError, TransferError};
-use fingertip::shipped::{REGISTERS, Record, address};
+use fingertip::shipped::{REGISTERS, address};
 use rigless::emulator::{Access, AccessKind};
 use rigless::soc::Width;
-use sim::encode;
 use sim::plant::{Plant, Setup};
 use std::fmt::Debug;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, OnceLock, PoisonError};
 use virtual_board::client::Client;
-use virtual_board::flash::SECTOR;
 use virtual_board::{Options, Rig};
 
 /// Virtual time that an answer may take.
@@ -78,12 +75,11 @@ pub fn reboot(rig: &mut Rig, ms: u64) {
     rig.run_ms(ms).expect("it runs");
 }
 
-/// Error with which a write is refused.
-pub fn refused(rig: &mut Rig, register: u16, value: u8) -> u8 {
-    let written = rig.client(WAIT_NS, move |bus| bus.write_u8(1, register, value).map(drop));
-    match written.expect("the client runs") {
-        Err(TransferError::ReadError(ReadError::MotorError(error))) => error.raw & 0x7F,
-        other => panic!("{other:?}"),
+/// Error byte of a packet with which a write is refused; its top bit says that the board has a fault.
+pub fn refused(rig: &mut Rig, register: u16, bytes: &[u8]) -> u8 {
+    match rig.client(WAIT_NS, |bus| bus.write(1, register, bytes).map(drop)).expect("the client runs") {
+        Err(TransferError::ReadError(ReadError::MotorError(error))) => error.raw,
+        other => panic!("not refused: {other:?}"),
     }
 }
 
@@ -115,13 +111,12 @@ pub fn away(distance_mm: f64) -> Setup {
     setup
 }
 
-/// A board that serves one test after another, in any order: to start one costs more than most of what is asked of it.
-/// Runs a test on a board that several tests share. After a test has failed, the next one gets a new board.
-pub fn on_a_shared(board: &Mutex<Option<Rig>>, start: impl FnOnce() -> Rig, test: impl FnOnce(&mut Rig)) {
-    let mut shared = board.lock().unwrap_or_else(PoisonError::into_inner);
-    let mut rig = shared.take().unwrap_or_else(start);
-    test(&mut rig);
-    *shared = Some(rig);
+/// Runs named checks one after another on one board: to start a board costs more than most of them.
+pub fn run_checks(rig: &mut Rig, checks: &[(&str, fn(&mut Rig))]) {
+    for (name, check) in checks {
+        println!("check: {name}");
+        check(rig);
+    }
 }
 
 /// A file of this test program's in the build folder.
@@ -139,39 +134,60 @@ pub fn write_param(rig: &mut Rig, name: &str, value: u32) {
     rig.run_ms(5).expect("it runs");
 }
 
-/// Says that the motor goes the right way, as after a jog: torque is refused before.
-pub fn confirm_direction(rig: &mut Rig) {
-    write_param(rig, "direction_confirmed", 1);
+/// Tares a board whose tip touches nothing, then holds 1 N.
+pub fn tare_and_hold(rig: &mut Rig) {
+    write_and_run_ms(rig, address::TARE, 1, 20);
+    write_u8(rig, address::TORQUE_ENABLE, 1);
+    write_goal(rig, 1_000);
+    rig.run_ms(150).expect("it runs");
+    let force_n = force_n(rig);
+    assert!((0.99..1.01).contains(&force_n), "{force_n} N");
 }
 
-/// Starts a board, which then holds 1 N against a wall 0.5 mm away.
-fn hold(options: &Options) -> Rig {
+/// A board that holds 1 N against a wall 0.5 mm away.
+pub fn holding(options: &Options) -> Rig {
     let mut rig = running(&away(0.5), options);
-    confirm_direction(&mut rig);
-    write_and_run_ms(&mut rig, address::TARE, 1, 20);
-    write_u8(&mut rig, address::TORQUE_ENABLE, 1);
-    write_goal(&mut rig, 1_000);
-    rig.run_ms(150).expect("it runs");
-    let force_n = rig.world(|world| world.force_n()).expect("it runs");
-    assert!((0.99..1.01).contains(&force_n), "{force_n} N");
+    tare_and_hold(&mut rig);
     rig
 }
 
-/// A board that holds 1 N against a wall 0.5 mm away: the first one that was started, and after it what its snapshot
-/// kept.
-pub fn holding() -> Rig {
-    static SNAPSHOT: OnceLock<PathBuf> = OnceLock::new();
-    let mut started = None;
-    let snapshot = SNAPSHOT.get_or_init(|| {
-        let path = scratch("holding.snapshot");
-        started.insert(hold(&Options::default())).snapshot(&path).expect("a snapshot is taken");
-        path
-    });
-    started.unwrap_or_else(|| Rig::restore(&image(), snapshot, &Options::default()).expect("the snapshot is restored"))
+/// Has a board hold 1 N again.
+pub fn hold_again(rig: &mut Rig) {
+    write_u8(rig, address::TORQUE_ENABLE, 1);
+    write_goal(rig, 1_000);
+    let mut held_ms = 0;
+    for _ in 0..40 {
+        rig.run_ms(5).expect("it runs");
+        held_ms = if (0.98..1.02).contains(&force_n(rig)) { held_ms + 5 } else { 0 };
+        if held_ms >= 15 {
+            return;
+        }
+    }
+    panic!("1 N is not held again within 200 ms");
 }
 
-/// The same on a bus of another speed, by its code, or with another pause before an answer: for what has much to say.
-pub fn holding_on_a_bus(baud_code: u8, return_delay_2us: u8) -> Rig {
-    let record = Record { baud_code, return_delay_2us, ..Record::DEFAULT };
-    hold(&Options { presets: vec![(SECTOR.start, encode(&record, 0))], ..Options::default() })
+/// Reboots a board whose tip is back where it was at power-on.
+pub fn restart(rig: &mut Rig) {
+    rig.world(|world| world.place(0.0)).expect("it runs");
+    reboot(rig, 20);
+}
+
+/// True force of the tip.
+pub fn force_n(rig: &mut Rig) -> f64 {
+    rig.world(|world| world.force_n()).expect("it runs")
+}
+
+/// Travel of the tip.
+pub fn travel_mm(rig: &mut Rig) -> f64 {
+    rig.world(|world| world.travel_mm()).expect("it runs")
+}
+
+/// Causes and times of the resets after an instant.
+pub fn resets_since(rig: &mut Rig, from_ns: u64) -> Vec<(String, u64)> {
+    let resets = rig.resets().expect("it runs").into_iter().filter(|reset| reset.at_ns > from_ns);
+    resets.map(|reset| (reset.cause, reset.at_ns)).collect()
+}
+
+pub fn frames(rig: &mut Rig) -> u64 {
+    rig.scan_counts().expect("it runs").frames
 }

@@ -2,7 +2,8 @@
 //! it holds a requested level back, and misses no deadline.
 
 use crate::common::{
-    away, read_u8, read_u16, read_u32, register, running, write_and_run_ms, write_goal, write_u8, write_u32,
+    away, force_n, read_u8, read_u16, read_u32, register, run_checks, running, write_and_run_ms, write_goal, write_u8,
+    write_u32,
 };
 use fingertip::contact::FitLevel;
 use fingertip::shipped::address;
@@ -14,7 +15,7 @@ fn hold(rig: &mut Rig) {
     write_u8(rig, address::TORQUE_ENABLE, 1);
     write_goal(rig, 1_000);
     rig.run_ms(150).expect("it runs");
-    let force_n = rig.world(|world| world.force_n()).expect("it runs");
+    let force_n = force_n(rig);
     assert!((0.95..1.05).contains(&force_n), "{force_n} N");
 }
 
@@ -39,16 +40,25 @@ fn said(rig: &mut Rig) -> (u8, bool, u16) {
 }
 
 #[test]
-fn the_highest_fit_level_is_held_back_before_a_deadline_is_missed() {
+fn the_fit_level_keeps_within_its_time() {
     let mut rig = holding_over_the_edge();
-    let (in_use, held_back, before_us) = said(&mut rig);
+    let checks: [(&str, fn(&mut Rig)); 3] = [
+        ("time", the_highest_fit_level_is_held_back_before_a_deadline_is_missed),
+        ("changes", a_change_of_the_fit_level_does_not_stop_the_scan),
+        ("slower frames", slower_frames_leave_room_for_the_highest_fit_level),
+    ];
+    run_checks(&mut rig, &checks);
+}
+
+fn the_highest_fit_level_is_held_back_before_a_deadline_is_missed(rig: &mut Rig) {
+    let (in_use, held_back, before_us) = said(rig);
     assert_eq!((in_use, held_back), (FitLevel::default() as u8, false), "the default has its time");
     for asked in [5, 4, 3] {
-        write_and_run_ms(&mut rig, address::FIT_LEVEL, asked, 300);
-        let (in_use, held_back, longest_us) = said(&mut rig);
+        write_and_run_ms(rig, address::FIT_LEVEL, asked, 300);
+        let (in_use, held_back, longest_us) = said(rig);
         println!("asked {asked}: in use {in_use}, longest loop time {longest_us} us ({before_us} us with the default)");
         assert_eq!(held_back, in_use < asked, "{in_use} of {asked}");
-        assert_eq!(read_u32(&mut rig, address::MISSED_FRAMES), 0);
+        assert_eq!(read_u32(rig, address::MISSED_FRAMES), 0);
         // A frame takes 99.8 us; a deadline missed would be a fault as well.
         assert!(longest_us <= 74, "{longest_us} us");
         if asked == 5 {
@@ -56,54 +66,46 @@ fn the_highest_fit_level_is_held_back_before_a_deadline_is_missed() {
         }
     }
     for asked in [0, 1, 2] {
-        write_and_run_ms(&mut rig, address::FIT_LEVEL, asked, 50);
-        let (in_use, held_back, _) = said(&mut rig);
+        write_and_run_ms(rig, address::FIT_LEVEL, asked, 50);
+        let (in_use, held_back, _) = said(rig);
         assert_eq!((in_use, held_back), (asked, false));
-        assert_eq!(read_u32(&mut rig, address::MISSED_FRAMES), 0);
-        let force_n = rig.world(|world| world.force_n()).expect("it runs");
+        assert_eq!(read_u32(rig, address::MISSED_FRAMES), 0);
+        let force_n = force_n(rig);
         // By the sums half of the force is not seen, and the board says so. It presses no deeper than the goal's
         // indentation, by the travel since the touch: that the touch was seen late, too, is left.
         let (from_below, expected) = if asked < 2 { (true, 1.0..1.25) } else { (false, 0.95..1.05) };
         assert!(expected.contains(&force_n), "fit level {asked}: {force_n} N");
-        assert_eq!(
-            Limits(read_u16(&mut rig, address::LIMITS)).has(Limits::FROM_BELOW),
-            from_below,
-            "fit level {asked}"
-        );
+        assert_eq!(Limits(read_u16(rig, address::LIMITS)).has(Limits::FROM_BELOW), from_below, "fit level {asked}");
     }
 }
 
-#[test]
-fn slower_frames_leave_room_for_the_highest_fit_level() {
-    let mut rig = holding_over_the_edge();
-    write_and_run_ms(&mut rig, address::FIT_LEVEL, 5, 100);
-    let (in_use, held_back, _) = said(&mut rig);
+fn slower_frames_leave_room_for_the_highest_fit_level(rig: &mut Rig) {
+    write_and_run_ms(rig, address::FIT_LEVEL, 5, 100);
+    let (in_use, held_back, _) = said(rig);
     assert!(in_use < 5 && held_back, "{in_use}");
-    write_u8(&mut rig, address::TORQUE_ENABLE, 0);
-    write_u32(&mut rig, register("settle_ns"), 13_000);
+    write_u8(rig, address::TORQUE_ENABLE, 0);
+    write_u32(rig, register("settle_ns"), 13_000);
     rig.run_ms(100).expect("it runs");
     // The new scan has cost some.
-    let missed = read_u32(&mut rig, address::MISSED_FRAMES);
-    hold(&mut rig);
-    let (in_use, held_back, longest_us) = said(&mut rig);
+    let missed = read_u32(rig, address::MISSED_FRAMES);
+    hold(rig);
+    let (in_use, held_back, longest_us) = said(rig);
     println!("at 4.6 kHz: in use {in_use}, longest loop time {longest_us} us");
-    assert_eq!(read_u32(&mut rig, address::MISSED_FRAMES), missed);
+    assert_eq!(read_u32(rig, address::MISSED_FRAMES), missed);
     assert_eq!((in_use, held_back), (5, false));
     // Longer than a frame at 10 kHz would allow, and within three quarters of one of 216 us.
     assert!((75..153).contains(&longest_us), "{longest_us} us");
 }
 
-#[test]
-fn a_change_of_the_fit_level_does_not_stop_the_scan() {
-    let mut rig = holding_over_the_edge();
+fn a_change_of_the_fit_level_does_not_stop_the_scan(rig: &mut Rig) {
     let frame_ns = 99_750;
-    let (from_ns, from) = (rig.now_ns(), read_u32(&mut rig, address::FRAME_COUNTER));
+    let (from_ns, from) = (rig.now_ns(), read_u32(rig, address::FRAME_COUNTER));
     for asked in [0, 5, 1, 3, 2, 4, 2] {
-        write_u8(&mut rig, address::FIT_LEVEL, asked);
+        write_u8(rig, address::FIT_LEVEL, asked);
     }
-    let (to_ns, to) = (rig.now_ns(), read_u32(&mut rig, address::FRAME_COUNTER));
+    let (to_ns, to) = (rig.now_ns(), read_u32(rig, address::FRAME_COUNTER));
     let (scanned, stepped) = ((to_ns - from_ns) / frame_ns, u64::from(to - from));
     assert!(stepped > 20 && scanned.abs_diff(stepped) <= 12, "{stepped} of {scanned} frames");
-    assert_eq!(read_u8(&mut rig, address::PRESENT_MODE), fingertip::state::Mode::Force as u8);
-    said(&mut rig);
+    assert_eq!(read_u8(rig, address::PRESENT_MODE), fingertip::state::Mode::Force as u8);
+    said(rig);
 }

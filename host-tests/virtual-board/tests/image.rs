@@ -1,193 +1,236 @@
-//! The flash image on the emulated board: it boots, scans, repeats, and survives a snapshot.
+//! The flash image on the emulated board: it boots, scans, and repeats; the trace pins show what `docs/board.md` says.
 
+use crate::bus::read;
 use crate::common::{
-    PING, WAIT_NS, away, holding, image, on_a_shared, read_u8, read_u16, read_u32, register, running, scratch,
-    write_goal, write_u8, write_u32,
+    PING, WAIT_NS, away, force_n, image, read_u8, read_u16, read_u32, register, run_checks, running, write_and_run_ms,
+    write_goal, write_param, write_u8, write_u32,
 };
 use fingertip::params::Params;
-use fingertip::shipped::{REGISTERS, address};
+use fingertip::shipped::{Config, TAXELS, address};
+use fingertip::state::Limits;
 use sim::plant::Plant;
-use std::sync::Mutex;
-use virtual_board::{Options, Rig};
-
-fn rig() -> Rig {
-    Rig::new(&image(), Plant::new(&away(0.5)), &Options::confirmed()).expect("the image starts")
-}
-
-/// The same, up.
-fn up() -> Rig {
-    running(&away(0.5), &Options::confirmed())
-}
-
-/// A board that is up, for one test after another.
-fn with_one_that_is_up(test: impl FnOnce(&mut Rig)) {
-    static UP: Mutex<Option<Rig>> = Mutex::new(None);
-    on_a_shared(&UP, up, test);
-}
-
-/// 300 ms in which the array is tared and the tip goes for the wall, 0.5 mm away, with a ping in the middle.
-fn eventful(rig: &mut Rig) {
-    rig.run_until_ns(50_000_000).expect("it runs");
-    write_u8(rig, address::TARE, 1);
-    rig.run_until_ns(150_000_000).expect("it runs");
-    write_u8(rig, address::TORQUE_ENABLE, 1);
-    write_goal(rig, 1_000);
-    rig.run_until_ns(250_000_000).expect("it runs");
-    rig.transact(&PING, WAIT_NS).expect("it runs");
-    rig.run_until_ns(300_000_000).expect("it runs");
-}
+use std::time::Duration;
+use virtual_board::measure::PinEdge;
+use virtual_board::{Fault, Options, Rig};
 
 #[test]
-fn it_boots_and_frames_arrive_at_the_scans_rate() {
-    with_one_that_is_up(|rig| {
-        rig.run_ms(80).expect("it runs");
-        let before = rig.scan_counts().expect("it runs");
-        rig.run_ms(100).expect("it runs");
-        let after = rig.scan_counts().expect("it runs");
-        let frames = after.frames - before.frames;
-        assert!((1_000..=1_005).contains(&frames), "{frames} frames in 100 ms");
-        let conversions = after.conversions - before.conversions;
-        assert!(conversions.abs_diff(frames * 110) <= 110, "{conversions} conversions for {frames} frames");
-        assert_eq!(rig.miswired_pins().expect("it runs"), Vec::<String>::new());
-        assert_eq!(rig.resets().expect("it runs"), vec![]);
-        rig.check_gaps().expect("no unknown gap");
-    });
+fn the_image_boots_scans_and_tells_how_the_board_is() {
+    let mut rig = running(&away(0.5), &Options::default());
+    let checks: [(&str, fn(&mut Rig)); 11] = [
+        ("the clock", its_clock_begins_at_zero_and_never_falls_back),
+        ("the scan's rate", frames_arrive_at_the_scans_rate),
+        ("a ping", it_answers_a_ping_at_its_baud_rate),
+        ("health", the_bus_tells_how_the_board_is),
+        ("the frame pin", the_frame_pin_is_high_for_a_slot_in_each_frame),
+        ("the control pin", the_control_pin_is_high_while_control_is_busy),
+        ("the settle time", a_settle_time_that_is_lowered_leaves_the_rows_in_step),
+        ("the bridge's period", the_bridge_keeps_step_with_the_scan),
+        ("short frames", frames_shorter_than_the_three_conversions_find_the_supply_too),
+        ("the first tare", before_the_first_tare_no_force_is_told),
+        ("the guard pin", the_guard_pin_pulses_where_the_guard_trips),
+    ];
+    run_checks(&mut rig, &checks);
 }
 
-#[test]
-fn its_clock_begins_at_zero_and_never_falls_back() {
+fn its_clock_begins_at_zero_and_never_falls_back(rig: &mut Rig) {
     // A turn of the timer behind the clock is 65.536 ms.
-    let mut rig = up();
     for _ in 0..400 {
         let true_ms = rig.now_ns() / 1_000_000;
-        let tick_ms = u64::from(read_u16(&mut rig, address::REALTIME_TICK));
+        let tick_ms = u64::from(read_u16(rig, address::REALTIME_TICK));
         assert!((true_ms.saturating_sub(5)..=true_ms + 1).contains(&tick_ms), "{tick_ms} ms at {true_ms} ms");
         rig.run_until_ns(rig.now_ns() + 170_000).expect("it runs");
     }
 }
 
-#[test]
-fn it_answers_a_ping_at_its_baud_rate() {
-    with_one_that_is_up(|rig| {
-        rig.send(&PING).expect("it runs");
-        rig.run_ms(5).expect("it runs");
-        let reply = rig.take_received().expect("it runs");
-        let bytes: Vec<u8> = reply.iter().map(|timed| timed.byte).collect();
-        assert_eq!(bytes[..9], [0xff, 0xff, 0xfd, 0x00, 0x01, 0x07, 0x00, 0x55, 0x00]);
-        assert_eq!(bytes.len(), 14);
-        // 14 bytes of 10 bits at 1 Mbaud, from the end of the first to the end of the last.
-        let took_ns = reply[13].at_ns - reply[0].at_ns;
-        assert!((129_000..=131_000).contains(&took_ns), "{took_ns} ns");
-    });
+fn frames_arrive_at_the_scans_rate(rig: &mut Rig) {
+    let before = rig.scan_counts().expect("it runs");
+    rig.run_ms(100).expect("it runs");
+    let after = rig.scan_counts().expect("it runs");
+    let frames = after.frames - before.frames;
+    assert!((1_000..=1_005).contains(&frames), "{frames} frames in 100 ms");
+    let conversions = after.conversions - before.conversions;
+    assert!(conversions.abs_diff(frames * 110) <= 110, "{conversions} conversions for {frames} frames");
+    assert_eq!(rig.miswired_pins().expect("it runs"), Vec::<String>::new());
+    assert_eq!(rig.resets().expect("it runs"), vec![]);
+    rig.check_gaps().expect("no unknown gap");
 }
 
-/// The stop bit ends at many instants of a frame, also while control computes a fit.
-#[test]
-fn the_line_is_given_back_right_after_the_last_stop_bit() {
-    let mut rig = holding();
-    let mut late_ns = Vec::new();
-    for turn in 0..40 {
-        rig.run_until_ns(rig.now_ns() + 10_000 * (turn % 10)).expect("it runs");
-        rig.take_received().expect("it runs");
-        rig.with(|stand| stand.bench.transmit_edges.clear()).expect("it runs");
-        rig.send(&PING).expect("it runs");
-        rig.run_ms(2).expect("it runs");
-        let end_ns = rig.take_received().expect("it runs").last().expect("it answers").at_ns;
-        let edges = rig.with(|stand| std::mem::take(&mut stand.bench.transmit_edges)).expect("it runs");
-        assert_eq!(edges.iter().map(|edge| edge.on).collect::<Vec<_>>(), [true, false]);
-        assert!(edges[1].at_ns >= end_ns, "{} ns before the last stop bit's end", end_ns - edges[1].at_ns);
-        late_ns.push(edges[1].at_ns - end_ns);
+fn it_answers_a_ping_at_its_baud_rate(rig: &mut Rig) {
+    rig.take_received().expect("it runs");
+    rig.send(&PING).expect("it runs");
+    rig.run_ms(5).expect("it runs");
+    let reply = rig.take_received().expect("it runs");
+    let bytes: Vec<u8> = reply.iter().map(|timed| timed.byte).collect();
+    assert_eq!(bytes[..9], [0xff, 0xff, 0xfd, 0x00, 0x01, 0x07, 0x00, 0x55, 0x00]);
+    assert_eq!(bytes.len(), 14);
+    // 14 bytes of 10 bits at 1 Mbaud, from the end of the first to the end of the last.
+    let took_ns = reply[13].at_ns - reply[0].at_ns;
+    assert!((129_000..=131_000).contains(&took_ns), "{took_ns} ns");
+}
+
+fn the_bus_tells_how_the_board_is(rig: &mut Rig) {
+    // These are measured once a second.
+    rig.run_until_ns(1_120_000_000).expect("it runs");
+    assert_eq!(read_u32(rig, address::OPTION_BYTES) & 0xffff_fffe, 0x0fff_aae0);
+    assert!((3_295..=3_305).contains(&read_u16(rig, address::ANALOGUE_SUPPLY_MV)));
+    let deepest = rig.stack_use().expect("it runs").expect("the image names its stack").used;
+    let told = u64::from(read_u16(rig, address::STACK_BYTES));
+    assert!(told > 2_000 && told <= deepest, "{told} of {deepest} bytes");
+    // A packet that arrives at the end of a frame delays its processing; an idle bus delays no frame.
+    for _ in 0..50 {
+        read_u8(rig, address::PRESENT_MODE);
     }
-    late_ns.sort_unstable();
-    println!("given back {} to {} ns after the last stop bit, half within {}", late_ns[0], late_ns[39], late_ns[20]);
-    assert!(late_ns[39] <= 5_000, "{} ns", late_ns[39]);
+    let late_ns = read_u16(rig, address::FRAME_LATE_NS);
+    println!("a frame's end came {late_ns} ns late");
+    assert!((1..5_000).contains(&late_ns), "{late_ns} ns");
+    for count in [address::BANK_MISSING, address::OUT_OF_STEP, address::CONVERTER_OVERRUN, address::OVERWRITTEN] {
+        assert_eq!(read_u16(rig, count), 0);
+    }
+    for count in [address::TRANSFER_BUS_ERRORS, address::TRANSFER_STREAM_ERRORS, address::LINE_FRAMING] {
+        assert_eq!(read_u16(rig, count), 0);
+    }
+}
+
+fn before_the_first_tare_no_force_is_told(rig: &mut Rig) {
+    let told = |rig: &mut Rig| {
+        let pressures = read(rig, address::PRESSURES, 2 * TAXELS as u16);
+        (read_u32(rig, address::PRESENT_FORCE_MN), pressures.iter().all(|&byte| byte == 0))
+    };
+    assert_eq!(told(rig), (0, true));
+    assert!(Limits(read_u16(rig, address::LIMITS)).has(Limits::NOT_TARED));
+    assert!(read(rig, address::RAW_CODES, 2) != [0, 0], "the array itself is seen");
+    write_and_run_ms(rig, address::TARE, 1, 20);
+    assert!(!Limits(read_u16(rig, address::LIMITS)).has(Limits::NOT_TARED));
+    assert!(told(rig).0 <= 20, "now it is a force: none");
 }
 
 /// A compare value below the counter triggers the converters once too often, if it is set before the timer restarts and
 /// leaves them time until the first row: each row would then be read a slot late.
-#[test]
-fn a_settle_time_that_is_lowered_leaves_the_rows_in_step() {
-    let mut rig = up();
+fn a_settle_time_that_is_lowered_leaves_the_rows_in_step(rig: &mut Rig) {
     for (turn, settle_ns) in [100_000, 20_000, 90_000, 15_000, 100_000, 10_000].into_iter().enumerate() {
         rig.run_until_ns(rig.now_ns() + 10_000 * turn as u64).expect("it runs");
-        write_u32(&mut rig, register("settle_ns"), settle_ns);
+        write_u32(rig, register("settle_ns"), settle_ns);
         rig.run_ms(20).expect("it runs");
-        let bad = read_u8(&mut rig, address::BAD_TAXELS);
+        let bad = read_u8(rig, address::BAD_TAXELS);
         assert_eq!(bad, 0, "taxels that read nothing, with {settle_ns} ns");
     }
 }
 
-#[test]
-fn the_bus_tells_how_the_board_is() {
-    with_one_that_is_up(|rig| {
-        rig.run_ms(1_100).expect("it runs");
-        assert_eq!(read_u32(rig, address::OPTION_BYTES) & 0xffff_fffe, 0x0fff_aae0);
-        assert!((3_295..=3_305).contains(&read_u16(rig, address::ANALOGUE_SUPPLY_MV)));
-        let deepest = rig.stack_use().expect("it runs").expect("the image names its stack").used;
-        let told = u64::from(read_u16(rig, address::STACK_BYTES));
-        assert!(told > 2_000 && told <= deepest, "{told} of {deepest} bytes");
-        // A packet that arrives at the end of a frame delays its processing; an idle bus delays no frame.
-        for _ in 0..50 {
-            read_u8(rig, address::PRESENT_MODE);
-        }
-        let late_ns = read_u16(rig, address::FRAME_LATE_NS);
-        println!("a frame's end came {late_ns} ns late");
-        assert!((1..5_000).contains(&late_ns), "{late_ns} ns");
-        for count in [address::BANK_MISSING, address::OUT_OF_STEP, address::CONVERTER_OVERRUN, address::OVERWRITTEN] {
-            assert_eq!(read_u16(rig, count), 0);
-        }
-        for count in [address::TRANSFER_BUS_ERRORS, address::TRANSFER_STREAM_ERRORS, address::LINE_FRAMING] {
-            assert_eq!(read_u16(rig, count), 0);
-        }
-    });
-}
-
-#[test]
-fn three_runs_and_one_cut_by_a_snapshot_have_one_trace() {
-    let mut whole = rig();
-    eventful(&mut whole);
-    let hash = whole.trace_hash().expect("it runs");
-    let force_n = whole.world(|world| world.force_n()).expect("it runs");
-    assert!((0.9..1.1).contains(&force_n), "{force_n} N: the tip holds what was asked for");
-    let duties = whole.latency().expect("it runs").frames;
-    assert!(duties > 1_000, "{duties} duties");
-    let records = whole.with(|stand| stand.bench.trace.records()).expect("it runs");
-    assert!(records > 2 * duties, "{records} records");
-    drop(whole);
-    for _ in 0..2 {
-        let mut again = rig();
-        eventful(&mut again);
-        assert_eq!(again.trace_hash().expect("it runs"), hash);
+fn frames_shorter_than_the_three_conversions_find_the_supply_too(rig: &mut Rig) {
+    write_u8(rig, address::FIT_LEVEL, 0);
+    write_param(rig, "sample_cycles", 3);
+    write_param(rig, "settle_ns", 500);
+    rig.run_ms(80).expect("it runs");
+    for _ in 0..200 {
+        rig.run_ms(1).expect("it runs");
+        let mv = read_u16(rig, address::SUPPLY_MV);
+        assert!((5_900..=6_100).contains(&mv), "{mv} mV");
     }
-
-    let file = scratch("cut.snapshot");
-    let mut cut = rig();
-    cut.run_until_ns(33_000_000).expect("it runs");
-    cut.snapshot(&file).expect("a snapshot is taken");
-    drop(cut);
-    let mut rest = Rig::restore(&image(), &file, &Options::confirmed()).expect("the snapshot is restored");
-    std::fs::remove_file(&file).expect("the snapshot's file was there");
-    assert_eq!(rest.now_ns(), 33_000_000);
-    eventful(&mut rest);
-    assert_eq!(rest.trace_hash().expect("it runs"), hash);
+    rig.check_gaps().expect("nothing starts before what is under way ends");
+    assert!((read_u32(rig, address::CHIP_MC).cast_signed() - 25_000).abs() < 500);
+    write_param(rig, "sample_cycles", Params::DEFAULT.sample_cycles.cast_unsigned());
+    write_param(rig, "settle_ns", Params::DEFAULT.settle_ns.cast_unsigned());
 }
 
+// The trace pins.
+
+const GUARD: usize = 10;
+const FRAME: usize = 13;
+const CONTROL: usize = 15;
+/// 11 slots of 1524 ticks of 168 MHz.
+const FRAME_NS: u64 = 11 * 1_524 * 1_000 / 168;
+const SLOT_NS: u64 = 1_524 * 1_000 / 168;
+
+/// Runs on for some ms and takes the edges of these pins.
+fn edges(rig: &mut Rig, ms: u64) -> Vec<PinEdge> {
+    rig.with(|stand| stand.bench.front_end.lock().pin_edges = Some(Vec::new())).expect("it runs");
+    rig.run_ms(ms).expect("it runs");
+    rig.with(|stand| stand.bench.front_end.lock().pin_edges.take()).expect("it runs").expect("they were asked for")
+}
+
+/// Times from each rise of a pin to its fall, and to the next rise, ns.
+fn widths_ns(edges: &[PinEdge], pin: usize) -> Vec<[u64; 2]> {
+    let own: Vec<_> = edges.iter().filter(|edge| edge.pin == pin).skip_while(|edge| !edge.high).collect();
+    own.windows(3).step_by(2).map(|three| [three[1].at_ns - three[0].at_ns, three[2].at_ns - three[0].at_ns]).collect()
+}
+
+fn the_frame_pin_is_high_for_a_slot_in_each_frame(rig: &mut Rig) {
+    let widths = widths_ns(&edges(rig, 10), FRAME);
+    assert!(widths.len() >= 98, "{} frames", widths.len());
+    for [high, period] in widths {
+        assert!(high.abs_diff(SLOT_NS) <= 2 && period.abs_diff(FRAME_NS) <= 2, "{high} of {period} ns");
+    }
+}
+
+/// Two turns a frame: a short one when half of the rows are driven, and the step.
+fn the_control_pin_is_high_while_control_is_busy(rig: &mut Rig) {
+    let widths: Vec<u64> = widths_ns(&edges(rig, 10), CONTROL).into_iter().map(|[high, _]| high).collect();
+    assert!((198..=202).contains(&widths.len()), "{} turns in 10 ms", widths.len());
+    let steps: Vec<_> = widths.iter().filter(|width| **width > 5_000).collect();
+    let [least, most] = [steps.iter().min(), steps.iter().max()].map(|width| **width.expect("there are steps"));
+    println!("{} steps of {least} to {most} ns", steps.len());
+    assert!(steps.len().abs_diff(100) <= 2, "{} of them are steps", steps.len());
+    assert!(most < 75_000 && least > 10_000, "{least} to {most} ns");
+}
+
+fn the_guard_pin_pulses_where_the_guard_trips(rig: &mut Rig) {
+    rig.run_ms(20).expect("it runs");
+    assert_eq!(edges(rig, 5).iter().filter(|edge| edge.pin == GUARD).count(), 0, "a sound board");
+    rig.inject(Fault::ConvertersStall).expect("it runs");
+    let widths = widths_ns(&edges(rig, 2), GUARD);
+    assert!(widths.len() >= 8, "{} trips in 2 ms", widths.len());
+    for [high, period] in widths {
+        // It trips again each 1.75 frames.
+        assert!((100..30_000).contains(&high) && period.abs_diff(FRAME_NS * 7 / 4) < 5_000, "{high} of {period} ns");
+    }
+}
+
+/// The edges of a duty come at the same places of each frame, whatever the scan.
+fn the_bridge_keeps_step_with_the_scan(rig: &mut Rig) {
+    for settle_ns in [2_400, 1_001, 7_777, 60_000] {
+        write_param(rig, "settle_ns", settle_ns);
+        let params = Params { settle_ns: settle_ns as i32, ..Params::DEFAULT };
+        let frame = Config::shipped(&params).expect("a scan").timing.frame().0;
+        let period = rig
+            .with(|stand| {
+                let (timer, registers) = stand.session.board_mut().part.pwm_timer();
+                timer.period_ticks(registers) as u32
+            })
+            .expect("it runs");
+        let fits = frame.is_multiple_of(period) && (4_200..=8_400).contains(&period);
+        assert!(fits, "{period} ticks in a frame of {frame}");
+    }
+}
+
+/// 300 ms in which the array is tared and the tip goes for the wall, 0.5 mm away, with a ping in the middle. The board's
+/// thread pauses once for this long: the client waits in virtual time, not by the wall clock.
+fn eventful(pause: Duration) -> Rig {
+    let mut rig = Rig::new(&image(), Plant::new(&away(0.5)), &Options::confirmed()).expect("the image starts");
+    rig.run_until_ns(50_000_000).expect("it runs");
+    write_u8(&mut rig, address::TARE, 1);
+    rig.run_until_ns(150_000_000).expect("it runs");
+    rig.post(move |_| std::thread::sleep(pause)).expect("it runs");
+    write_u8(&mut rig, address::TORQUE_ENABLE, 1);
+    write_goal(&mut rig, 1_000);
+    rig.run_until_ns(250_000_000).expect("it runs");
+    rig.transact(&PING, WAIT_NS).expect("it runs");
+    rig.run_until_ns(300_000_000).expect("it runs");
+    rig
+}
+
+/// The pause of the second run is longer than the client would wait at any common baud rate.
 #[test]
-fn at_least_half_of_the_stack_is_never_used() {
-    let mut rig = holding();
-    // The deepest calls: all pictures read at once, then with torque off a parameter changed, which makes a
-    // configuration, and everything saved.
-    let read = |bus: &mut virtual_board::client::Client| {
-        for register in REGISTERS {
-            bus.read(1, register.address, register.bytes()).expect("it answers");
-        }
-        bus.write_u8(1, address::TORQUE_ENABLE, 0).expect("it obeys");
-        bus.write_u32(1, address::PARAMS, Params::DEFAULT.to_array()[0].unsigned_abs()).expect("it obeys");
-        bus.write_u8(1, address::SAVE_PARAMETERS, 1).expect("it obeys");
-    };
-    rig.client(WAIT_NS, read).expect("the client runs");
-    rig.run_ms(50).expect("it runs");
-    let stack = rig.stack_use().expect("it runs").expect("the image names its stack");
-    println!("stack: {} of {} bytes used", stack.used, stack.size);
-    assert!(stack.used > 2_000 && 2 * stack.used <= stack.size, "{stack:?}");
+fn two_runs_have_one_trace_also_on_a_slow_machine() {
+    let mut quick = eventful(Duration::ZERO);
+    let force_n = force_n(&mut quick);
+    assert!((0.9..1.1).contains(&force_n), "{force_n} N: the tip holds what was asked for");
+    let duties = quick.latency().expect("it runs").frames;
+    assert!(duties > 1_000, "{duties} duties");
+    let records = quick.with(|stand| stand.bench.trace.records()).expect("it runs");
+    assert!(records > 2 * duties, "{records} records");
+    let mut slow = eventful(Duration::from_secs(4));
+    assert_eq!(
+        (slow.trace_hash().expect("it runs"), slow.now_ns()),
+        (quick.trace_hash().expect("it runs"), quick.now_ns())
+    );
 }

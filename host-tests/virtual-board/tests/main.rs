@@ -10,15 +10,14 @@ mod capture;
 mod clients;
 mod common;
 mod corrected;
+mod fast_bus;
 mod fit_level;
 mod image;
 mod injected_faults;
 mod measured;
 mod parameters;
-mod refused_writes;
 mod scenes;
 mod temperature;
-mod trace_pins;
 
 /// A file that is not in the list above would never be compiled.
 #[test]

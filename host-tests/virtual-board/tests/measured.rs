@@ -1,9 +1,8 @@
 //! Jog, strokes and a press over the bus, on the flash image: each completes, and its record is read and parsed by the
 //! host's solver.
 
-use crate::common::{
-    away, let_go, on_bus, read_u8, read_u16, read_u32, running, write_and_run_ms, write_goal, write_param,
-};
+use crate::capture::fetch;
+use crate::common::{away, let_go, read_u8, read_u16, read_u32, running, write_and_run_ms, write_goal, write_param};
 use fingertip::measure::{MeasureState, Task};
 use fingertip::params::Params;
 use fingertip::shipped::address;
@@ -11,8 +10,6 @@ use fingertip::state::Mode;
 use solve::record;
 use virtual_board::{Options, Rig};
 
-/// Bytes of a read.
-const WINDOW: u16 = 248;
 /// The longest motion, ms.
 const LONGEST_MS: u64 = 20_000;
 
@@ -35,20 +32,6 @@ fn measure(rig: &mut Rig, task: Task) {
         rig.run_ms(20).expect("it runs");
     }
     panic!("it does not end: {} %", read_u8(rig, address::MEASURE_PROGRESS));
-}
-
-fn fetch(rig: &mut Rig) -> Vec<u8> {
-    let length = read_u32(rig, address::CAPTURE_BYTES) as usize;
-    let mut bytes = Vec::new();
-    while bytes.len() < length {
-        let offset = bytes.len() as u32;
-        bytes.extend(on_bus(rig, move |bus| {
-            bus.write_u32(1, address::CAPTURE_OFFSET, offset)?;
-            bus.read(1, address::CAPTURE_DATA, WINDOW).map(|reply| reply.data.to_vec())
-        }));
-    }
-    bytes.truncate(length);
-    bytes
 }
 
 fn tare(rig: &mut Rig) {
@@ -74,21 +57,19 @@ fn jog_and_strokes_complete_and_the_drive_is_solved() {
     rig.check_gaps().expect("no unknown gap");
 }
 
-#[test]
-fn a_press_completes_and_the_modulus_is_solved() {
-    let setup = away(0.5);
-    let mut rig = running(&setup, &Options::confirmed());
-    tare(&mut rig);
-    write_and_run_ms(&mut rig, address::TORQUE_ENABLE, 1, 2);
-    measure(&mut rig, Task::Press);
-    let press = record::press(&fetch(&mut rig), &Params::DEFAULT).expect("a press");
+pub fn a_press_completes_and_the_modulus_is_solved(rig: &mut Rig) {
+    tare(rig);
+    write_and_run_ms(rig, address::TORQUE_ENABLE, 1, 2);
+    measure(rig, Task::Press);
+    let press = record::press(&fetch(rig), &Params::DEFAULT).expect("a press");
     let kpa = solve::modulus(&[press]).expect("a modulus").kpa;
-    println!("modulus {kpa} kPa, true {}", setup.tip.modulus_kpa);
-    assert!((kpa / setup.tip.modulus_kpa - 1.0).abs() < 0.03, "{kpa}");
+    let true_kpa = rig.world(|world| world.setup().tip.modulus_kpa).expect("it runs");
+    println!("modulus {kpa} kPa, true {true_kpa}");
+    assert!((kpa / true_kpa - 1.0).abs() < 0.03, "{kpa}");
     // The finger holds forces afterwards.
-    write_goal(&mut rig, 500);
+    write_goal(rig, 500);
     rig.run_ms(300).expect("it runs");
-    assert_eq!(read_u8(&mut rig, address::PRESENT_MODE), Mode::Force as u8);
-    let_go(&mut rig);
+    assert_eq!(read_u8(rig, address::PRESENT_MODE), Mode::Force as u8);
+    let_go(rig);
     rig.check_gaps().expect("no unknown gap");
 }

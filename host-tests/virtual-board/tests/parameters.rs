@@ -1,15 +1,20 @@
 //! Parameters in the flash of the emulated board: sectors that take turns, and words that take as long as they may.
 
-use crate::common::{image, read_u8, read_u32, reboot, register, write_u8, write_u32};
+use crate::common::{frames, on_bus, read_u8, read_u32, reboot, refused, register, running, write_u8, write_u32};
 use fingertip::link::table::address;
 use fingertip::shipped::Record;
+use fingertip::state::Fault;
 use fingertip::store::SLOT_BYTES;
+use rigless::soc::Width;
 use sim::encode;
-use sim::plant::{Plant, Setup};
+use sim::plant::Setup;
 use virtual_board::flash::{OTHER_SECTOR, SECTOR};
+use virtual_board::rig::Stand;
 use virtual_board::{Options, Rig};
 
 const SECTOR_BYTES: usize = 128 << 10;
+/// Value of an erased byte.
+const ERASED: u8 = 0xff;
 const SLOTS: usize = SECTOR_BYTES / SLOT_BYTES;
 /// Start time of a board with full sectors to read, ms.
 const START_MS: u64 = 100;
@@ -29,12 +34,28 @@ fn filled(count: usize, first_sequence: u32) -> Vec<u8> {
     (0..count).flat_map(|place| encode(&record(1_000 + place as i32), first_sequence + place as u32)).collect()
 }
 
-fn start(presets: Vec<(u64, Vec<u8>)>) -> Rig {
-    let options = Options { presets, ..Options::default() };
-    let mut rig = Rig::new(&image(), Plant::new(&Setup::default()), &options).expect("the image starts");
+/// A board that needs the longest time for each word.
+fn start() -> Rig {
+    let mut rig = running(&Setup::default(), &Options::default());
     rig.with(|stand| stand.bench.flash.word_ns = WORD_MAX_NS).expect("it runs");
-    rig.run_ms(START_MS).expect("it runs");
     rig
+}
+
+/// Puts bytes at the begin of both sectors, and lets the board start with them.
+fn start_with(rig: &mut Rig, first: Vec<u8>, other: Vec<u8>) {
+    rig.with(|stand| {
+        for (sector, mut bytes) in [(SECTOR, first), (OTHER_SECTOR, other)] {
+            bytes.resize(SECTOR_BYTES, ERASED);
+            for (address, word) in sector.step_by(8).zip(bytes.as_chunks().0) {
+                let word = u64::from_le_bytes(*word);
+                if stand.host.read(address, Width::W64).ok() != Some(word) {
+                    stand.host.program(address, Width::W64, word).expect("the flash can be programmed");
+                }
+            }
+        }
+    })
+    .expect("it runs");
+    on_bus(rig, |bus| bus.reboot(1).map(drop));
 }
 
 fn set_and_save(rig: &mut Rig, pitch_um: u32) {
@@ -54,67 +75,89 @@ fn words_and_erases(rig: &mut Rig) -> (u64, u64) {
 }
 
 #[test]
-fn a_save_with_the_longest_times_is_no_fault_and_no_reset() {
-    let mut rig = start(Vec::new());
+fn stored_parameters_outlive_long_times_full_sectors_and_damage() {
+    let mut rig = start();
+    a_save_with_the_longest_times_is_no_fault_and_no_reset(&mut rig);
+    assert!(!tells_of_a_record(&mut rig, 0));
+    after_a_save_cut_short_the_old_values_count_and_fault_8_says_so(&mut rig);
+    damaged_parameters_are_a_fault_that_the_bus_tells(&mut rig);
+    nearly_full_sectors_take_turns(&mut rig);
+}
+
+fn a_save_with_the_longest_times_is_no_fault_and_no_reset(rig: &mut Rig) {
     for pitch in [1_600, 1_700] {
-        set_and_save(&mut rig, pitch);
-        assert_eq!(read_u8(&mut rig, address::SAVED_STATE), 0, "the same as the flash");
-        assert_eq!(read_u8(&mut rig, address::FAULT), 0);
-        assert_eq!(read_u8(&mut rig, address::PRESENT_MODE), 0, "off");
+        set_and_save(rig, pitch);
+        assert_eq!(read_u8(rig, address::SAVED_STATE), 0, "the same as the flash");
+        assert_eq!(read_u8(rig, address::FAULT), 0);
+        assert_eq!(read_u8(rig, address::PRESENT_MODE), 0, "off");
     }
     assert_eq!(rig.resets().expect("it runs"), vec![]);
     // A word that is blank anyway is not programmed.
-    let (words, erases) = words_and_erases(&mut rig);
+    let (words, erases) = words_and_erases(rig);
     assert!((196..=200).contains(&words), "{words} words");
     assert_eq!(erases, 0);
     // The scan goes on: torque can be enabled after a tare.
-    let before = rig.scan_counts().expect("it runs").frames;
+    let before = frames(rig);
     rig.run_ms(2).expect("it runs");
-    assert!(rig.scan_counts().expect("it runs").frames > before + 15);
-    reboot(&mut rig, START_MS);
-    assert_eq!((pitch_um(&mut rig), read_u8(&mut rig, address::FAULT)), (1_700, 0));
+    assert!(frames(rig) > before + 15);
+    reboot(rig, START_MS);
+    assert_eq!((pitch_um(rig), read_u8(rig, address::FAULT)), (1_700, 0));
     rig.check_gaps().expect("no unknown gap");
 }
 
-#[test]
-fn nearly_full_sectors_take_turns() {
+fn nearly_full_sectors_take_turns(rig: &mut Rig) {
+    let erases_before = words_and_erases(rig).1;
     // The newest record is the last but one of the first sector, the other sector has older ones.
-    let first = filled(SLOTS - 1, 10_000);
-    let mut rig = start(vec![(SECTOR.start, first), (OTHER_SECTOR.start, filled(SLOTS, 10_000 - SLOTS as u32))]);
+    start_with(rig, filled(SLOTS - 1, 10_000), filled(SLOTS, 10_000 - SLOTS as u32));
     // The start erases the sector with the older ones, at 32 bits: half of the time that it takes at 8.
+    let (from_ms, from) = (rig.now_ns() / 1_000_000, frames(rig));
     let mut frames_at = |ms: u64| {
-        rig.run_until_ns(ms * 1_000_000).expect("it runs");
-        rig.scan_counts().expect("it runs").frames
+        rig.run_until_ns((from_ms + ms) * 1_000_000).expect("it runs");
+        frames(rig) - from
     };
-    assert_eq!(frames_at(ERASE_MS / 2 - 100), 0, "no scan while it is erased");
-    assert!(frames_at(ERASE_MS / 2 + START_MS) > 0);
-    assert_eq!(words_and_erases(&mut rig).1, 1);
+    let while_it_boots = frames_at(START_MS);
+    assert_eq!(frames_at(ERASE_MS / 2 - 100), while_it_boots, "no scan while it is erased");
+    assert!(frames_at(ERASE_MS / 2 + START_MS) > while_it_boots);
+    assert_eq!(words_and_erases(rig).1, erases_before + 1);
     let newest = 1_000 + SLOTS as u32 - 2;
-    assert_eq!((pitch_um(&mut rig), read_u8(&mut rig, address::FAULT)), (newest, 0));
+    assert_eq!((pitch_um(rig), read_u8(rig, address::FAULT)), (newest, 0));
     // One fits, the other goes to the erased sector.
-    set_and_save(&mut rig, 2_001);
-    set_and_save(&mut rig, 2_002);
-    assert_eq!(read_u8(&mut rig, address::SAVED_STATE), 0, "the same as the flash");
-    let begins = |sector: u64| {
-        move |stand: &mut virtual_board::stand::Stand<'_>| {
-            [0, 1, 2, 3].map(|n| stand.host.read(sector + n, rigless::soc::Width::W8).unwrap_or(0) as u8)
-        }
-    };
-    assert_eq!(rig.with(begins(OTHER_SECTOR.start)).expect("it runs"), *b"FTPR");
-    reboot(&mut rig, START_MS);
-    assert_eq!((pitch_um(&mut rig), read_u8(&mut rig, address::FAULT)), (2_002, 0));
-    assert_eq!(words_and_erases(&mut rig).1, 1, "the sector with room is not erased");
+    set_and_save(rig, 2_001);
+    set_and_save(rig, 2_002);
+    assert_eq!(read_u8(rig, address::SAVED_STATE), 0, "the same as the flash");
+    let begins = |stand: &mut Stand<'_>| stand.host.read(OTHER_SECTOR.start, Width::W32).unwrap_or(0) as u32;
+    assert_eq!(rig.with(begins).expect("it runs").to_le_bytes(), *b"FTPR");
+    reboot(rig, START_MS);
+    assert_eq!((pitch_um(rig), read_u8(rig, address::FAULT)), (2_002, 0));
+    assert_eq!(words_and_erases(rig).1, erases_before + 1, "the sector with room is not erased");
     rig.check_gaps().expect("no unknown gap");
 }
 
-#[test]
-fn after_a_save_cut_short_the_old_values_count_and_fault_8_says_so() {
-    let mut presets = encode(&Record { id: 1, ..record(1_111) }, 1).to_vec();
-    presets.extend(&encode(&record(1_222), 2)[..200]);
-    let mut rig = start(vec![(SECTOR.start, presets)]);
-    assert_eq!((pitch_um(&mut rig), read_u8(&mut rig, address::FAULT)), (1_111, 8));
+fn after_a_save_cut_short_the_old_values_count_and_fault_8_says_so(rig: &mut Rig) {
+    let mut records = encode(&Record { id: 1, ..record(1_111) }, 1).to_vec();
+    records.extend(&encode(&record(1_222), 2)[..200]);
+    start_with(rig, records, Vec::new());
+    rig.run_ms(START_MS).expect("it runs");
+    assert_eq!((pitch_um(rig), read_u8(rig, address::FAULT)), (1_111, 8));
     // A save ends it.
-    set_and_save(&mut rig, 1_333);
-    reboot(&mut rig, START_MS);
-    assert_eq!((pitch_um(&mut rig), read_u8(&mut rig, address::FAULT)), (1_333, 0));
+    set_and_save(rig, 1_333);
+    reboot(rig, START_MS);
+    assert_eq!((pitch_um(rig), read_u8(rig, address::FAULT)), (1_333, 0));
+}
+
+fn damaged_parameters_are_a_fault_that_the_bus_tells(rig: &mut Rig) {
+    let from_ns = rig.now_ns();
+    start_with(rig, vec![0x55; 64], Vec::new());
+    rig.run_ms(START_MS).expect("it runs");
+    assert_eq!(read_u8(rig, address::FAULT), Fault::BrokenParameters as u8);
+    assert!(tells_of_a_record(rig, from_ns));
+    assert_ne!(refused(rig, address::TORQUE_ENABLE, &[1]) & 0x7f, 0, "torque stays off in a fault");
+    assert_eq!(read_u8(rig, address::PRESENT_MODE), 5);
+    assert!(rig.bridge_edges().expect("it runs").iter().all(|edge| edge.at_ns < from_ns || !edge.on));
+}
+
+/// True if the log has warned of a record since an instant.
+fn tells_of_a_record(rig: &mut Rig, from_ns: u64) -> bool {
+    let mut lines = rig.log().expect("it runs").into_iter().filter(|line| line.at_ns > from_ns);
+    lines.any(|line| line.level.as_deref() != Some("info") && line.text.contains("record"))
 }

@@ -6,12 +6,12 @@ use fingertip::chip::Factory;
 use fingertip::params::Params;
 use fingertip::shipped::{Record, address};
 use sim::encode;
-use sim::plant::{Plant, Setup};
+use sim::plant::Setup;
 use sim::run::run;
 use virtual_board::flash::SECTOR;
 use virtual_board::scene::finger::{Clock, Finger};
 use virtual_board::scene::simulate;
-use virtual_board::{Options, Rig, inside};
+use virtual_board::{Error, Options, Rig, inside};
 
 const GAIN_PPM_PER_K: i32 = 3_600;
 const ZERO_PA_PER_K: i32 = 10;
@@ -32,7 +32,8 @@ fn drift_mn(rig: &mut Rig) -> i32 {
     read_u32(rig, address::PRESENT_DRIFT_MN) as i32
 }
 
-fn options(factory: Factory) -> Options {
+/// A finger whose array and microcontroller warm by 20 K: an hour in the hot in seconds.
+fn warming(factory: Factory) -> Rig {
     let params = Params {
         direction_confirmed: 1,
         array_gain_ppm_per_k: GAIN_PPM_PER_K,
@@ -40,45 +41,85 @@ fn options(factory: Factory) -> Options {
         ..Params::DEFAULT
     };
     let presets = vec![(SECTOR.start, encode(&Record { params, ..Record::DEFAULT }, 0))];
-    Options { presets, factory, ..Options::default() }
-}
-
-/// A finger that holds 1 N while its array and its microcontroller warm by 20 K, an hour in the hot in seconds.
-fn warming(factory: Factory) -> Rig {
     let keys = ["effects.temperature_drift.time_constant_s=1.0".into(), "object.distance_mm=0.5".into()];
     let scene = sim::cli::load("hot_hour", &keys, None).unwrap_or_else(|error| panic!("{error}"));
     let clock = Clock::new(START_MS * 1_000_000);
     let finger = Finger::all(&scene, clock, -0.001).expect("the world is simulated").remove(0);
-    let mut rig = Rig::new(&image(), finger, &options(factory)).expect("the image starts");
+    let mut rig = Rig::new(&image(), finger, &Options { presets, factory }).expect("the image starts");
     rig.run_until_ns(20_000_000).expect("it runs");
     write_u8(&mut rig, address::TARE, 1);
     rig.run_until_ns(START_MS * 1_000_000).expect("it runs");
-    write_u8(&mut rig, address::TORQUE_ENABLE, 1);
-    write_goal(&mut rig, 1_000);
+    hold(&mut rig);
     rig
 }
 
+/// Asks for 1 N.
+fn hold(rig: &mut Rig) {
+    write_u8(rig, address::TORQUE_ENABLE, 1);
+    write_goal(rig, 1_000);
+}
+
+fn true_c(rig: &mut Rig) -> f64 {
+    let now_ns = rig.now_ns();
+    rig.finger(move |finger| finger.chip_c(now_ns)).expect("it runs")
+}
+
 #[test]
-fn the_bus_tells_the_chip_s_temperature_and_the_drift() {
+fn the_board_measures_its_temperature_and_the_force_s_drift() {
     let mut rig = warming(inside::factory());
+    assert!(matches!(rig.world(|world| world.force_n()), Err(Error::OtherWorld)));
+    codes_that_stay_away_are_no_temperature_and_the_finger_holds_on(&mut rig);
+    the_means_go_on_where_the_scan_starts_again(&mut rig);
+    hold(&mut rig);
+    the_bus_tells_the_chip_s_temperature_and_the_drift(&mut rig);
+    // The emulated converter reports inputs that are sampled for too short a time.
+    rig.check_gaps().expect("nothing is missing");
+    poke(&mut rig, ADC1_SMPR1, 0);
+    rig.run_ms(1).expect("it runs");
+    rig.check_gaps().expect_err("3 cycles are too few");
+}
+
+fn codes_that_stay_away_are_no_temperature_and_the_finger_holds_on(rig: &mut Rig) {
+    rig.run_ms(200).expect("it runs");
+    assert!(chip_mc(rig) > 25_000);
+    // No injected group behind the supply.
+    poke(rig, ADC1_CR1, SCAN);
+    rig.run_ms(80).expect("it runs");
+    assert_eq!((chip_mc(rig), read_u16(rig, address::ANALOGUE_SUPPLY_MV)), (UNMEASURED_MC, 0));
+    assert!((5_900..=6_100).contains(&read_u16(rig, address::SUPPLY_MV)), "the supply is read");
+    assert!(read_u32(rig, address::PRESENT_FORCE_MN) > 900, "it holds its goal all the same");
+    poke(rig, ADC1_CR1, SCAN | INJECTED_FOLLOWS);
+    rig.run_ms(80).expect("it runs");
+    assert!(chip_mc(rig) > 25_000);
+}
+
+fn the_means_go_on_where_the_scan_starts_again(rig: &mut Rig) {
+    write_and_run_ms(rig, address::TORQUE_ENABLE, 0, 40);
+    let before = chip_mc(rig);
+    write_param(rig, "settle_ns", 2_500);
+    rig.run_ms(400).expect("it runs");
+    let (true_mc, told) = (1e3 * true_c(rig), chip_mc(rig));
+    let follows = told > before + 2_000 && (f64::from(told) - true_mc).abs() < 1_000.0;
+    assert!(follows, "{told} after {before}, {true_mc} mC");
+}
+
+fn the_bus_tells_the_chip_s_temperature_and_the_drift(rig: &mut Rig) {
     let mut worst_c: f64 = 0.0;
     for _ in 0..15 {
         rig.run_ms(100).expect("it runs");
-        let now_ns = rig.now_ns();
-        let true_c = rig.finger(move |finger| finger.chip_c(now_ns)).expect("it runs");
-        let told_c = f64::from(chip_mc(&mut rig)) * 1e-3;
+        let true_c = true_c(rig);
+        let told_c = f64::from(chip_mc(rig)) * 1e-3;
         worst_c = worst_c.max((told_c - true_c).abs());
         assert!((told_c - true_c).abs() < 1.0, "{told_c} C of {true_c} C");
     }
-    let (told_c, drift) = (f64::from(chip_mc(&mut rig)) * 1e-3, drift_mn(&mut rig));
+    let (told_c, drift) = (f64::from(chip_mc(rig)) * 1e-3, drift_mn(rig));
     // 1 N of 3600 ppm/K, and 225 mm^2 of 10 Pa/K, since 25 C.
     let expected_mn = (told_c - 25.0) * (3.6 + 2.25);
     println!("within {worst_c:.2} C; at {told_c:.2} C {drift} mN, {expected_mn:.1} mN by the coefficients");
     assert!(told_c > 39.0, "it has warmed: {told_c} C");
     // The term goes after a reading by a tenth of a second.
     assert!((f64::from(drift) - expected_mn).abs() < 6.0, "{drift} mN of {expected_mn:.1} mN");
-    assert_eq!(read_u16(&mut rig, address::ANALOGUE_SUPPLY_MV), 3_300);
-    rig.check_gaps().expect("nothing is missing");
+    assert_eq!(read_u16(rig, address::ANALOGUE_SUPPLY_MV), 3_300);
 }
 
 #[test]
@@ -101,65 +142,12 @@ fn without_the_factory_s_codes_there_is_no_temperature_and_no_term() {
 fn a_low_analogue_supply_is_reported_and_does_not_change_the_temperature() {
     let mut setup = Setup::default();
     setup.array.reference_v = 3.1;
-    let mut rig = Rig::new(&image(), Plant::new(&setup), &Options::default()).expect("the image starts");
-    rig.run_until_ns(40_000_000).expect("it runs");
+    let mut rig = running(&setup, &Options::default());
+    rig.run_ms(20).expect("it runs");
     let mv = read_u16(&mut rig, address::ANALOGUE_SUPPLY_MV);
     assert!((3_095..=3_105).contains(&mv), "{mv} mV");
     let chip = chip_mc(&mut rig);
     assert!((chip - 25_000).abs() < 500, "{chip} mC");
-}
-
-#[test]
-fn the_means_go_on_where_the_scan_starts_anew() {
-    let mut rig = warming(inside::factory());
-    write_and_run_ms(&mut rig, address::TORQUE_ENABLE, 0, 40);
-    let before = chip_mc(&mut rig);
-    write_param(&mut rig, "settle_ns", 2_500);
-    rig.run_ms(400).expect("it runs");
-    let now_ns = rig.now_ns();
-    let true_mc = 1e3 * rig.finger(move |finger| finger.chip_c(now_ns)).expect("it runs");
-    let told = chip_mc(&mut rig);
-    assert!(
-        told > before + 2_000 && (f64::from(told) - true_mc).abs() < 1_000.0,
-        "{told} after {before}, {true_mc} mC"
-    );
-}
-
-#[test]
-fn codes_that_stay_away_are_no_temperature_and_the_finger_holds_on() {
-    let mut rig = warming(inside::factory());
-    rig.run_ms(200).expect("it runs");
-    assert!(chip_mc(&mut rig) > 25_000);
-    // No injected group behind the supply.
-    poke(&mut rig, ADC1_CR1, SCAN);
-    rig.run_ms(80).expect("it runs");
-    assert_eq!((chip_mc(&mut rig), read_u16(&mut rig, address::ANALOGUE_SUPPLY_MV)), (UNMEASURED_MC, 0));
-    assert!((5_900..=6_100).contains(&read_u16(&mut rig, address::SUPPLY_MV)), "the supply is read");
-    assert!(read_u32(&mut rig, address::PRESENT_FORCE_MN) > 900, "it holds its goal all the same");
-    poke(&mut rig, ADC1_CR1, SCAN | INJECTED_FOLLOWS);
-    rig.run_ms(80).expect("it runs");
-    assert!(chip_mc(&mut rig) > 25_000);
-    // The emulated converter reports inputs that are sampled for too short a time.
-    rig.check_gaps().expect("nothing is missing");
-    poke(&mut rig, ADC1_SMPR1, 0);
-    rig.run_ms(1).expect("it runs");
-    rig.check_gaps().expect_err("3 cycles are too few");
-}
-
-#[test]
-fn frames_shorter_than_the_three_conversions_find_the_supply_too() {
-    let mut rig = running(&Setup::default(), &Options::default());
-    write_u8(&mut rig, address::FIT_LEVEL, 0);
-    write_param(&mut rig, "sample_cycles", 3);
-    write_param(&mut rig, "settle_ns", 500);
-    rig.run_ms(80).expect("it runs");
-    for _ in 0..200 {
-        rig.run_ms(1).expect("it runs");
-        let mv = read_u16(&mut rig, address::SUPPLY_MV);
-        assert!((5_900..=6_100).contains(&mv), "{mv} mV");
-    }
-    rig.check_gaps().expect("nothing starts before what is under way ends");
-    assert!((chip_mc(&mut rig) - 25_000).abs() < 500);
 }
 
 /// Largest error of 3 N held through a hot hour, mN.

@@ -8,14 +8,6 @@ use crate::board::guard::Stopwatch;
 use crate::board::{scan, trace};
 use crate::{CYCLES_PER_US, passed, report};
 
-/// Names of the steps' figures, as the script has them.
-const NAMES: [[&str; 3]; 4] = [
-    ["rise_1_ms", "overshoot_1_percent", "settled_1_ms"],
-    ["rise_2_ms", "overshoot_2_percent", "settled_2_ms"],
-    ["rise_3_ms", "overshoot_3_percent", "settled_3_ms"],
-    ["rise_4_ms", "overshoot_4_percent", "settled_4_ms"],
-];
-
 /// Runs the script. The scan's own codes are left where they are.
 pub fn run(bench: &mut Bench, pipeline: &mut Pipeline) {
     report::say(format_args!("the loop on the simulated finger: touch, 0.2, 2, 5, 1 N, let go; 2 s"));
@@ -70,9 +62,9 @@ pub fn run(bench: &mut Bench, pipeline: &mut Pipeline) {
     report::figure("step_most_cycles", step_most as f32);
     report::figure("finger_most_cycles", finger_most as f32);
     for done in answers.iter().filter(|done| STEPS.contains(&done.goal)) {
-        let [rise, overshoot, settled] = NAMES[done.goal - STEPS.start];
-        report::figure(rise, done.rise_ms);
-        report::figure(overshoot, done.overshoot_percent);
-        report::figure(settled, done.settled_ms);
+        let step = done.goal - STEPS.start + 1;
+        report::figure(format_args!("rise_{step}_ms"), done.rise_ms);
+        report::figure(format_args!("overshoot_{step}_percent"), done.overshoot_percent);
+        report::figure(format_args!("settled_{step}_ms"), done.settled_ms);
     }
 }

@@ -1,7 +1,7 @@
 //! Lines on the virtual COM port, USART2 at 115,200 baud: any terminal shows them without a set-up or a probe's
 //! program.
 
-use core::fmt::{Arguments, Write};
+use core::fmt::{Arguments, Display, Write};
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::peripheral::DWT;
 use embassy_stm32::gpio::Pull;
@@ -57,7 +57,7 @@ pub fn begin() {
 }
 
 /// A figure of the report.
-pub fn figure(name: &str, value: f32) {
+pub fn figure(name: impl Display, value: f32) {
     line(format_args!("figure {name} {value:.4}"));
 }
 

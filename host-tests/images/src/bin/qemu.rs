@@ -14,6 +14,9 @@
 #![no_std]
 #![no_main]
 
+/// The flash image's copies, which `same-bits` compares.
+#[path = "../../../../src/board/copy.rs"]
+mod copy;
 mod host;
 
 use cortex_m::peripheral::{SYST, syst::SystClkSource};

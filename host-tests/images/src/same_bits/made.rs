@@ -3,16 +3,13 @@
 use super::machines::Machines;
 use super::model::Sample;
 use super::{Mix, Source};
-use fingertip::config::{self, ArrayDrift, ConfigError, Gains, Heat, Lag, Motions};
 use fingertip::contact::Contact;
 use fingertip::control::Reference;
 use fingertip::params::Params;
 use fingertip::pressure::{CalibrationError, GAIN_MAX};
-use fingertip::scan::ScanTiming;
 use fingertip::shipped::{COLUMNS, Calibration, Config, Frame, ROWS, SLOTS, TactileImage};
-use fingertip::units::Newtons;
 use paper::units::Ratio;
-use paper::{Relaxation, RelaxationError, RelaxationState, RelaxationTerm};
+use paper::{Relaxation, RelaxationState, RelaxationTerm};
 
 /// Name of a constructor, and function that calls it and adds the results to the digest.
 pub type Make = (&'static str, fn(&mut Machines, &mut Source, &mut Mix));
@@ -23,29 +20,21 @@ pub const MADE_EVERY: u32 = 1_024;
 /// The sampling times that the converter has.
 const SAMPLE_CYCLES: [i32; 8] = [3, 15, 28, 56, 84, 112, 144, 480];
 
-/// Machines that are made for every [`MADE_EVERY`]th input.
-pub const MADE: [Make; 3] = [
-    ("Config::new", |m, source, mix| match Config::shipped(&params(source)) {
-        Ok(config) => {
+/// Machines that are made for every [`MADE_EVERY`]th input. What they are made of, or why they are refused, is compared
+/// field by field.
+pub const MADE: [Make; 4] = [
+    ("Config::new", |m, source, mix| {
+        let made = Config::shipped(&params(source));
+        mix.add_fields(&made);
+        if let Ok(config) = made {
             m.config = config;
-            add_config(mix, &m.config);
         }
-        Err(ConfigError::Param(error)) => mix.add(error.value),
-        Err(ConfigError::Order([(_, low), (_, high)])) => mix.add(low - high),
-        // The scan.
-        Err(_) => mix.add(-1),
     }),
-    ("Calibration::new", |m, source, mix| match calibration(source) {
-        // The gains change the readings of the array.
-        Ok(calibration) => m.array.calibrate(&calibration),
-        Err(CalibrationError::Gain { row, column, value }) => {
-            mix.add(row as u32);
-            mix.add(column as u32);
-            mix.add(value);
-        }
-        Err(CalibrationError::Mask { row, value, .. }) => {
-            mix.add(row as u32);
-            mix.add(value);
+    ("Calibration::new", |m, source, mix| {
+        let made = calibration(source);
+        mix.add_fields(&made);
+        if let Ok(calibration) = made {
+            m.array.calibrate(&calibration);
         }
     }),
     ("Relaxation::new", |m, source, mix| {
@@ -54,16 +43,25 @@ pub const MADE: [Make; 3] = [
             share: Ratio::from_bits(source.within(0, 22_000)),
             time_constant_us: period_us.saturating_mul(1 << source.up_to(20)),
         });
-        match Relaxation::new(period_us, &terms) {
-            Ok(filter) => (m.filter, m.memory) = (Some(filter), RelaxationState::REST),
-            Err(RelaxationError::Sum(sum)) => mix.add(sum),
-            Err(_) => mix.add(-1),
+        let made = Relaxation::new(period_us, &terms);
+        mix.add_fields(&made);
+        if let Ok(filter) = made {
+            (m.filter, m.memory) = (Some(filter), RelaxationState::REST);
         }
-        // What it is made of shows in a step from rest.
-        let mut rest = RelaxationState::REST;
-        if let Some(filter) = &m.filter {
-            mix.add(filter.step(&mut rest, Newtons::from_bits(i32::MAX)).to_bits());
+    }),
+    // Not made, but as rare: the board's own functions against this machine's, at any alignment and overlap.
+    ("copy and fill", |_, source, mix| {
+        let mut bytes: [u8; 160] = core::array::from_fn(|_| source.word() as u8);
+        for _ in 0..64 {
+            let [from, to, length] = [90, 90, 69].map(|top| source.up_to(top) as usize);
+            let before = bytes;
+            match source.up_to(2) {
+                0 => bytes.copy_within(from..from + length, to),
+                1 => bytes[to..to + length].copy_from_slice(&before[from..from + length]),
+                _ => bytes[to..to + length].fill(source.word() as u8),
+            }
         }
+        bytes.into_iter().for_each(|byte| mix.add(byte));
     }),
 ];
 
@@ -81,148 +79,6 @@ fn params(source: &mut Source) -> Params {
     order(&mut params.supply_min_mv, &mut params.supply_max_mv);
     order(&mut params.approach_um_per_s, &mut params.speed_max_um_per_s);
     params
-}
-
-/// Every number of a configuration, but the parameters that it was made from and the array's geometry, which shows in
-/// the fit.
-fn add_config(mix: &mut Mix, config: &Config) {
-    // Taken apart, so that a field cannot be forgotten.
-    let config::Config {
-        params: _,
-        geometry: _,
-        timing: ScanTiming { settle, slot, sample_cycles, slots: _, idle, frame_ns, deadline },
-        tip,
-        sag_q32,
-        dead_codes,
-        saturated_codes,
-        newtons_per_sum_q48,
-        pascals_per_sum_q32,
-        curve,
-        creep_share_q32,
-        creep_leak_q32,
-        half_pitch,
-        contact_on,
-        contact_off,
-        touch_line,
-        frame_s_q37,
-        mm_per_count_q40,
-        count,
-        jump,
-        counts_max,
-        gain_sets,
-        settled_band,
-        settled_frames,
-        damping_q17_per_s,
-        voltage_max_q8_mm_per_s2,
-        current_max_q8_mm_per_s2,
-        supply_weak_mv,
-        slew_max_q8_mm_per_s2,
-        brake: [brake_least, brake_usual, brake_most],
-        share_per_mv_q32,
-        voltage_shift,
-        duty_gain,
-        speed_max,
-        approach,
-        near,
-        travel_max,
-        clearance,
-        bounds,
-        heat,
-        drift,
-        motions,
-        force_fault,
-        force_max,
-        force_seen,
-    } = &**config;
-    for ticks in
-        [settle.0, slot.0, idle.0, deadline.0, (*sample_cycles).into(), (*dead_codes).into(), (*saturated_codes).into()]
-    {
-        mix.add(ticks);
-    }
-    mix.add(u32::from(*sag_q32));
-    for force in [tip.force_max(), *contact_on, *contact_off, *force_fault, *force_max, *force_seen] {
-        mix.add(force.to_bits());
-    }
-    for length in [half_pitch, count, settled_band, travel_max, clearance, &bounds.back] {
-        mix.add(length.to_bits());
-    }
-    for number in [newtons_per_sum_q48, pascals_per_sum_q32, mm_per_count_q40] {
-        mix.add(*number);
-    }
-    mix.add(curve.least);
-    mix.add(curve.growth);
-    for number in [creep_share_q32, creep_leak_q32, frame_ns, jump, voltage_shift, duty_gain, share_per_mv_q32] {
-        mix.add(*number);
-    }
-    let ArrayDrift { gain_q32_per_k, gain_at_q16, zero_q24_per_k } = *drift;
-    for number in [gain_q32_per_k, gain_at_q16, zero_q24_per_k] {
-        mix.add(number);
-    }
-    let Heat { frames_bits, most, down, up, lags, start_q30, room_q30, ambient_q16 } = *heat;
-    for number in [most, ambient_q16] {
-        mix.add(number);
-    }
-    for shift in [frames_bits, down, up] {
-        mix.add(shift);
-    }
-    for kelvin in [start_q30, room_q30] {
-        mix.add(kelvin);
-    }
-    for Lag { gain, rise_q31, fall_q31 } in lags {
-        mix.add(gain);
-        mix.add(rise_q31);
-        mix.add(fall_q31);
-    }
-    for number in [*frame_s_q37, *counts_max, settled_frames.cast_signed()] {
-        mix.add(number);
-    }
-    for gains in gain_sets {
-        let Gains { observer, speed_q18_per_s, slope_per_s, half_over_slope_q32, half_over_slope2_q40 } = gains;
-        for number in observer {
-            mix.add(*number);
-        }
-        for number in [speed_q18_per_s, slope_per_s, half_over_slope_q32, half_over_slope2_q40] {
-            mix.add(*number);
-        }
-    }
-    mix.add(near.to_bits());
-    for speed in [speed_max, approach, &bounds.speed_loose, &bounds.speed_any] {
-        mix.add(speed.to_bits());
-    }
-    for number in [
-        damping_q17_per_s,
-        voltage_max_q8_mm_per_s2,
-        current_max_q8_mm_per_s2,
-        slew_max_q8_mm_per_s2,
-        supply_weak_mv,
-        touch_line,
-        &bounds.frames_per_s,
-        &bounds.leak,
-        &bounds.acceleration_per_n,
-        &bounds.change_per_n,
-        &bounds.change_least,
-        &bounds.change_free,
-        &bounds.change_unsure,
-    ] {
-        mix.add(*number);
-    }
-    for number in [brake_least, brake_usual, brake_most] {
-        mix.add(*number);
-    }
-    let Motions { felt, stroke, farthest, back, pulse, pulse_frames, jog_rise_uv, rise_uv, feel_uv, start_uv, .. } =
-        motions;
-    let Motions { fastest_uv, uv_per_count_q8, uv_per_newton, span_part, push, push_mn, roll_q8, .. } = motions;
-    let Motions { still, rest, longest, touch, .. } = motions;
-    for number in [felt, stroke, farthest, back, pulse, jog_rise_uv, rise_uv, feel_uv, start_uv, fastest_uv] {
-        mix.add(*number);
-    }
-    for number in [uv_per_count_q8, uv_per_newton, push, push_mn, roll_q8] {
-        mix.add(*number);
-    }
-    for frames in [pulse_frames, span_part, still, rest, longest] {
-        mix.add(*frames);
-    }
-    mix.add(touch.to_bits());
 }
 
 // Adds the outputs of the machines to a digest, number by number.

@@ -1,13 +1,14 @@
 //! The demonstration's figures, each against its bound.
 
-use super::DemoError;
 use crate::client::Client;
 use crate::front_end::ScanCounts;
+use crate::image::Flashable;
 use crate::scene::bus::ID;
 use crate::{Error, Rig};
 use fingertip::shipped::address;
 use serde::Serialize;
 use sim::demo::{Check, Forces, Run};
+use sim::watch::Summary;
 
 /// An answer takes at most this long.
 const WAIT_NS: u64 = 20_000_000;
@@ -66,12 +67,6 @@ pub struct Figures {
     pub repeated_trace_sha256: Option<String>,
     /// Every figure that has a bound.
     pub checks: Vec<Check>,
-    /// Frames that the scan finished and no duty answered.
-    #[serde(skip)]
-    unanswered: u64,
-    /// Emulator gaps that the run touched and that are not known.
-    #[serde(skip)]
-    unknown_gaps: usize,
 }
 
 /// The least and the largest.
@@ -84,11 +79,18 @@ pub struct Range {
 }
 
 impl Figures {
-    /// Computes the figures of a run between two instants; all other figures must be filled in later.
+    /// Computes the figures of a run between two instants, each against its bound.
     ///
     /// # Errors
     /// The run did not follow the script (no touch, or a force that was not reached), or the board does not answer.
-    pub fn of(run: &Run, [from, to]: [&Counts; 2], rig: &mut Rig) -> Result<Self, DemoError> {
+    pub fn of(
+        run: &Run,
+        [from, to]: [&Counts; 2],
+        rig: &mut Rig,
+        flash: &Flashable,
+        summary: Summary,
+        repeated_trace_sha256: Option<String>,
+    ) -> Result<Self, Error> {
         let forces = Forces::of(run)?;
         let frames = to.scans.frames - from.scans.frames;
         let latency = rig.latency()?;
@@ -97,12 +99,10 @@ impl Figures {
         rig.take_received()?;
         let answer = rig.client(WAIT_NS, |bus: &mut Client| bus.read_u16(ID, address::LOOP_TIME_MAX_US))?;
         let loop_time = answer.map_err(|why| Error::Client(std::io::Error::other(format!("loop time: {why}"))))?;
-        // The last may be under way at either instant.
-        let unanswered = (frames + from.duties).abs_diff(to.duties).saturating_sub(2);
-        Ok(Self {
-            image_sha256: String::new(),
-            image_bytes: 0,
-            virtual_time_s: 0.0,
+        let mut figures = Self {
+            image_sha256: flash.sha256(),
+            image_bytes: flash.bytes.len(),
+            virtual_time_s: summary.virtual_s,
             wall_time_s: 0.0,
             frames,
             frame_rate_hz: frames as f64 / ((to.at_ns - from.at_ns) as f64 * 1e-9),
@@ -111,31 +111,34 @@ impl Figures {
             loop_time_max_us: loop_time.data,
             instructions_a_frame: (to.instructions - from.instructions) as f64 / frames as f64,
             forces,
-            trace_sha256: String::new(),
-            repeated_trace_sha256: None,
+            trace_sha256: summary.digest,
+            repeated_trace_sha256,
             checks: Vec::new(),
-            unanswered,
-            unknown_gaps: rig.gaps()?.iter().filter(|gap| gap.reason().is_none()).count(),
-        })
+        };
+        // The last frame may be under way at either instant.
+        let unanswered = (frames + from.duties).abs_diff(to.duties).saturating_sub(2);
+        let unknown_gaps = rig.gaps()?.iter().filter(|gap| gap.reason().is_none()).count();
+        figures.checks = figures.checked(unanswered, unknown_gaps);
+        Ok(figures)
     }
 
     /// Holds each figure against its bound.
-    pub fn check(&mut self) {
+    fn checked(&self, unanswered: u64, unknown_gaps: usize) -> Vec<Check> {
         let at_most = |most: f64| [None, Some(most)];
         let within = |least: f64, most: f64| [Some(least), Some(most)];
         let mut checks = vec![
             Check::new("frame rate", Some(self.frame_rate_hz), "Hz", within(5_000.0, 10_500.0)),
             Check::new("missed frames", Some(f64::from(self.missed_frames)), "", at_most(0.0)),
-            Check::new("frames without a new duty", Some(self.unanswered as f64), "", at_most(0.0)),
+            Check::new("frames without a new duty", Some(unanswered as f64), "", at_most(0.0)),
             Check::new("last conversion to new duty", Some(self.latency_us.largest), "us", within(1.0, 60.0)),
             Check::new("instructions a frame, all told", Some(self.instructions_a_frame), "", within(2_000.0, 8_000.0)),
-            Check::new("emulator gaps not on the allow-list", Some(self.unknown_gaps as f64), "", at_most(0.0)),
+            Check::new("emulator gaps not on the allow-list", Some(unknown_gaps as f64), "", at_most(0.0)),
         ];
         checks.extend(self.forces.checks());
         if let Some(repeated) = &self.repeated_trace_sha256 {
             let differ = Some(f64::from(u8::from(*repeated != self.trace_sha256)));
             checks.push(Check::new("traces that differ when repeated", differ, "", at_most(0.0)));
         }
-        self.checks = checks;
+        checks
     }
 }

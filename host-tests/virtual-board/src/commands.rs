@@ -92,7 +92,7 @@ pub fn demo(image: PathBuf, json: Option<&Path>, out: &Path, quick: bool) -> Res
     if let Some(path) = json {
         let written = serde_json::to_string_pretty(&figures).map_err(std::io::Error::from);
         let written = written.and_then(|text| kept::write(path, text + "\n"));
-        written.map_err(|source| DemoError::Write { path: path.into(), source })?;
+        written.map_err(|error| DemoError::from(format!("cannot write {}: {error}", path.display())))?;
     }
     say::line(format_args!("sha-256  {} ({} bytes, as flashed)\n", figures.image_sha256, figures.image_bytes));
     say::text(figures::table(&figures.checks, &figures.forces));

@@ -171,18 +171,17 @@ pub struct Verdict {
     pub held: bool,
 }
 
-/// Returns the table as Markdown.
+/// Returns the list as Markdown.
 pub fn page() -> String {
-    let mut page =
-        String::from("| metric | what it is, and how it is worked out | of several fingers |\n| --- | --- | --- |\n");
+    let mut page = String::new();
     for Metric { name, about, of_several, .. } in METRICS {
         let several = match of_several {
-            Worst::Largest => "the largest",
-            Worst::Least => "the least",
-            Worst::Sum => "the sum",
-            Worst::FirstFault => "the first in time",
+            Worst::Largest => "",
+            Worst::Least => " (the least)",
+            Worst::Sum => " (the sum)",
+            Worst::FirstFault => " (the first in time)",
         };
-        page += &format!("| `{name}` | {about} | {several} |\n");
+        page += &format!("- `{name}`{several}: {about}\n");
     }
     page
 }
@@ -219,54 +218,54 @@ fn limited<const BIT: usize>(finger: &Finger) -> Option<f64> {
 #[rustfmt::skip]
 pub const METRICS: &[Metric] = &[
     metric("peak_force_n", Largest, "largest true normal force", |f| Some(f.peak_n)),
-    metric("overshoot_percent", Largest, "largest true force beyond a goal, of the goal or of the step to it, whichever is smaller; the worst of all goals", |f| f.answers().overshoot().map(|share| 100.0 * share)),
-    metric("rise_ms", Largest, "time from 10 % to 90 % of the step to a goal; the worst of all goals, none if one is not reached", |f| f.answers().rise_s().map(|s| 1e3 * s)),
-    metric("settling_ms", Largest, "from the goal's change, or from the touch, until the true force stays within 2 % of the goal or of the step, whichever is smaller; the worst of all goals, none where one never settles", |f| f.answers().settling_s().map(|s| 1e3 * s)),
-    metric("steady_error_max_mn", Largest, "largest error of the true force against the goal, from 100 ms after the goal's change or the touch", |f| f.answers().steady_max_n().map(|n| 1e3 * n)),
+    metric("overshoot_percent", Largest, "largest true force beyond the goal, as a share of the goal or of the step to it, whichever is smaller", |f| f.answers().overshoot().map(|share| 100.0 * share)),
+    metric("rise_ms", Largest, "time from 10 % to 90 % of the step; none if a goal is not reached", |f| f.answers().rise_s().map(|s| 1e3 * s)),
+    metric("settling_ms", Largest, "time from the goal's change or the touch until the true force stays within 2 % of the goal or of the step, whichever is smaller; none if a goal never settles", |f| f.answers().settling_s().map(|s| 1e3 * s)),
+    metric("steady_error_max_mn", Largest, "largest error of the true force from 100 ms after the goal's change or the touch", |f| f.answers().steady_max_n().map(|n| 1e3 * n)),
     metric("steady_error_rms_mn", Largest, "root mean square of that error", |f| f.answers().steady_rms_n().map(|n| 1e3 * n)),
-    metric("touch_ms", Largest, "from the start to the first contact", |f| f.touch_s.map(|s| 1e3 * s)),
-    metric("approach_mm_per_s", Largest, "mean speed of the tip over the last 10 ms before the first contact", |f| f.approach_mm_per_s),
+    metric("touch_ms", Largest, "time of the first contact", |f| f.touch_s.map(|s| 1e3 * s)),
+    metric("approach_mm_per_s", Largest, "mean speed in the last 10 ms before the first contact", |f| f.approach_mm_per_s),
     metric("travel_max_mm", Largest, "largest travel of the tip", |f| Some(f.travel_max_mm)),
-    metric("travel_min_mm", Least, "least travel of the tip, negative behind its start", |f| Some(f.conduct.travel_min_mm)),
+    metric("travel_min_mm", Least, "least travel of the tip; negative behind its start", |f| Some(f.conduct.travel_min_mm)),
     metric("indentation_max_mm", Largest, "largest indentation of the tip", |f| Some(f.indentation_max_mm)),
-    metric("faults_count", Sum, "faults that stopped the motor, without those that come while a defect of the events acts or within a second after it", |f| Some(f64::from(f.faults))),
-    metric("fault_number", FirstFault, "number of the first fault, as on the bus; 0 without", |f| Some(f.first_fault.map_or(0.0, |(fault, _)| f64::from(fault as u8)))),
-    metric("fault_ms", FirstFault, "from the start to the first fault", |f| f.first_fault.map(|(_, s)| 1e3 * s)),
-    metric("limit_voltage_percent", Largest, "share of the time in which the voltage or the supply was used up", limited::<0>),
-    metric("limit_current_percent", Largest, "share of the time in which the current limit held back", limited::<1>),
+    metric("faults_count", Sum, "faults that stopped the motor, except during a defect and for a second after it", |f| Some(f64::from(f.faults))),
+    metric("fault_number", FirstFault, "number of the first fault; 0 if none", |f| Some(f.first_fault.map_or(0.0, |(fault, _)| f64::from(fault as u8)))),
+    metric("fault_ms", FirstFault, "time of the first fault", |f| f.first_fault.map(|(_, s)| 1e3 * s)),
+    metric("limit_voltage_percent", Largest, "share of the time at the limit of voltage or supply", limited::<0>),
+    metric("limit_current_percent", Largest, "share of the time at the current limit", limited::<1>),
     metric("limit_speed_percent", Largest, "share of the time at the speed limit", limited::<2>),
-    metric("limit_goal_percent", Largest, "share of the time in which the goal was moved to the largest or the least force", limited::<3>),
-    metric("limit_travel_percent", Largest, "share of the time at the travel's end", limited::<4>),
-    metric("limit_taxels_percent", Largest, "share of the time in which taxels were left out", limited::<5>),
-    metric("limit_slew_percent", Largest, "share of the time in which the voltage's slew limit held back", limited::<8>),
+    metric("limit_goal_percent", Largest, "share of the time in which the goal was changed to the largest or the least force", limited::<3>),
+    metric("limit_travel_percent", Largest, "share of the time at an end of the travel", limited::<4>),
+    metric("limit_taxels_percent", Largest, "share of the time with taxels left out", limited::<5>),
+    metric("limit_slew_percent", Largest, "share of the time at the slew limit", limited::<8>),
     metric("missed_frames_count", Sum, "frames that the controller missed", |f| Some(f64::from(f.missed))),
     metric("duty_rms_percent", Largest, "root mean square of the duty", |f| f.duty.rms().map(|share| 100.0 * share)),
-    metric("force_error_max_mn", Largest, "largest difference of the sensed from the true force", |f| Some(1e3 * f.force_error_n.max)),
-    metric("force_error_rms_mn", Largest, "root mean square of that difference, over the whole run", |f| f.force_error_n.rms().map(|n| 1e3 * n)),
-    metric("centre_error_max_mm", Largest, "largest distance of the sensed from the true centre of the contact, above 0.1 N", |f| f.centre_error_mm),
-    metric("confidence_min_percent", Least, "least confidence that the contact is a tip on a plane, from 100 ms after the goal's change or the touch", |f| f.confidence_min.map(|c| f64::from(c) / 2.55)),
+    metric("force_error_max_mn", Largest, "largest error of the measured force", |f| Some(1e3 * f.force_error_n.max)),
+    metric("force_error_rms_mn", Largest, "root mean square of that error over the whole run", |f| f.force_error_n.rms().map(|n| 1e3 * n)),
+    metric("centre_error_max_mm", Largest, "largest error of the measured centre, above 0.1 N", |f| f.centre_error_mm),
+    metric("confidence_min_percent", Least, "least confidence from 100 ms after the goal's change or the touch", |f| f.confidence_min.map(|c| f64::from(c) / 2.55)),
     metric("slip_mm", Largest, "distance that the contact slipped", |f| Some(f.slip_mm)),
     metric("slips_count", Sum, "slips of more than 1 um; a slip is over when the contact has stuck for 10 ms", |f| Some(f64::from(f.slips.count))),
     metric("slips_unnoticed_count", Sum, "slips that were over before the goal rose", |f| Some(f64::from(f.slips.unnoticed()))),
     metric("slip_noticed_ms", Largest, "longest time from the onset of a slip to a higher goal", |f| f.slips.noticed_after_s.map(|s| 1e3 * s)),
-    metric("object_lift_mm", Least, "how much higher than at the start the object is at the end", |f| Some(f.object_lift_mm)),
-    metric("object_fall_mm", Largest, "farthest that the object came below its highest place before", |f| Some(f.object_fall_mm)),
-    metric("object_dropped", Largest, "1 where it fell more than 5 mm", |f| flag(f.object_fall_mm > DROPPED_MM)),
-    metric("object_broken", Largest, "1 where the object broke", |f| flag(f.broken)),
-    metric("energy_j", Sum, "electrical energy that the bridge took from the supply, less what the motor gave back", |f| Some(f.energy_j)),
+    metric("object_lift_mm", Least, "height of the object at the end above its start", |f| Some(f.object_lift_mm)),
+    metric("object_fall_mm", Largest, "largest fall of the object below its highest place before", |f| Some(f.object_fall_mm)),
+    metric("object_dropped", Largest, "1 if the object fell more than 5 mm", |f| flag(f.object_fall_mm > DROPPED_MM)),
+    metric("object_broken", Largest, "1 if the object broke", |f| flag(f.broken)),
+    metric("energy_j", Sum, "energy that the bridge took from the supply, less the energy that it returned", |f| Some(f.energy_j)),
     metric("current_rms_a", Largest, "root mean square of the winding's current", |f| f.current_a.rms()),
     metric("current_max_a", Largest, "largest current in the winding", |f| Some(f.current_a.max)),
     metric("winding_max_c", Largest, "highest temperature of the winding", |f| f.winding_max_c),
-    metric("runaway_mm", Largest, "largest distance of the tip behind the first touch, beyond the largest indentation and the clearance (before a touch: behind the start, beyond the clearance), or beyond the end of the travel", |f| Some(f.conduct.runaway_mm)),
-    metric("air_speed_percent", Largest, "largest speed of the tip without a contact, from 20 ms after one ended, of the approach speed", |f| Some(100.0 * f.conduct.air_share())),
-    metric("over_force_mn", Largest, "largest true force beyond the goal; a goal that is reduced counts for 200 ms more, and during a fault or torque off; the push of an object on a finger without a motor does not count", |f| largest(&over_force(f)).or(Some(0.0))),
-    metric("over_force_defective_mn", Largest, "the same while a defect of the events acts and for a second after it; `over_force_mn` leaves that time out", |f| largest(&over_force_defective(f)).or(Some(0.0))),
-    metric("stop_force_mn", Largest, "largest true force later than 0.5 s after a stop (goal 0, or torque off) while it lasts, without faults, and until the object comes nearer or is put back; with torque off less what dry friction and the gear hold", |f| Some(1e3 * f.conduct.stop_force_n)),
-    metric("rest_travel_um", Largest, "from the least to the farthest travel in the last 200 ms of a goal of 0 that lasted for 400 ms; the worst of all", |f| f.conduct.ended().rest_mm.map(|mm| 1e3 * mm).or(unjudged(f))),
-    metric("rest_duty_percent", Largest, "deviation of the duty in the last 200 ms of a goal, 0 or not, that lasted for 400 ms; the worst of all", |f| f.conduct.ended().duty.map(|share| 100.0 * share).or(unjudged(f))),
-    metric("hold_swing_mn", Largest, "from the least to the largest true force in the last 200 ms of a goal that lasted for 400 ms; the worst of all", |f| largest(&swings(f)).or(unjudged(f))),
-    metric("hold_error_mn", Largest, "error of the mean of the true force in the last 200 ms of a goal that lasted for 400 ms; the worst of all, without those that a fault ended", |f| largest(&errors(f)).or(f.first_fault.map(|_| 0.0)).or(unjudged(f))),
-    metric("touches_missed_count", Sum, "goals of at least 400 ms without a fault in whose last 200 ms nothing was touched", |f| Some(f.conduct.ended().missed() as f64)),
+    metric("runaway_mm", Largest, "largest distance of the tip beyond the end of the travel, or behind the first touch less the largest indentation and the clearance (before a touch: behind the start less the clearance)", |f| Some(f.conduct.runaway_mm)),
+    metric("air_speed_percent", Largest, "largest speed in the air, as a share of the approach speed, from 20 ms after a contact ended", |f| Some(100.0 * f.conduct.air_share())),
+    metric("over_force_mn", Largest, "largest true force beyond the goal. A reduced goal counts for 200 ms more, and during a fault or torque off. A push of the object on a finger without torque does not count", |f| largest(&over_force(f)).or(Some(0.0))),
+    metric("over_force_defective_mn", Largest, "the same during a defect and for a second after it, which `over_force_mn` leaves out", |f| largest(&over_force_defective(f)).or(Some(0.0))),
+    metric("stop_force_mn", Largest, "largest true force from 0.5 s after a stop (goal 0 or torque off) until the stop ends, a fault occurs, or the object comes nearer or is put back; with torque off, less the force that dry friction and gear hold", |f| Some(1e3 * f.conduct.stop_force_n)),
+    metric("rest_travel_um", Largest, "range of the travel at the end of a goal of 0", |f| f.conduct.ended().rest_mm.map(|mm| 1e3 * mm).or(unjudged(f))),
+    metric("rest_duty_percent", Largest, "deviation of the duty at the end of any goal, also 0", |f| f.conduct.ended().duty.map(|share| 100.0 * share).or(unjudged(f))),
+    metric("hold_swing_mn", Largest, "range of the true force at the end of a goal", |f| largest(&swings(f)).or(unjudged(f))),
+    metric("hold_error_mn", Largest, "error of the mean true force at the end of a goal, without goals that a fault ended", |f| largest(&errors(f)).or(f.first_fault.map(|_| 0.0)).or(unjudged(f))),
+    metric("touches_missed_count", Sum, "goals without a fault at whose end nothing was touched", |f| Some(f.conduct.ended().missed() as f64)),
 ];
 
 /// Metrics that have a value for each goal.

@@ -47,8 +47,8 @@ fn section(page: &mut String, kernel: &Kernel, points: &[Point]) {
         let bold = if *firmware { "**" } else { "" };
         let errors = [[*error_max, *error_rms]].into_iter().chain(*other).flatten().map(figure);
         let cells = costs_of(cost).into_iter().chain(errors).collect::<Vec<_>>().join(" | ");
-        let verdict = verdict(point, by.map(|by| &points[by]));
-        let _ = writeln!(page, "| {bold}{name}{bold} | {cells} | {verdict} |");
+        let place = by.map_or_else(|| verdict(point, None), |_| String::new());
+        let _ = writeln!(page, "| {bold}{name}{bold} | {cells} | {place} |");
     }
     if !few {
         let hidden = beaten.iter().flatten().count();

@@ -1,6 +1,6 @@
 //! The tables of `docs/study.md`, the short one of the README, and the figures as JSON.
 
-use super::front::{Point, beaten_by, span};
+use super::front::{Point, beaten_by};
 use super::kernels::Kernel;
 use super::output::{Cost, Passes};
 use super::{scan, simulation};
@@ -57,14 +57,6 @@ fn section(page: &mut String, kernel: &Kernel, points: &[Point]) {
     let beats_firmware = points.iter().zip(&beaten).any(|(point, by)| point.firmware && by.is_some());
     if beats_firmware {
         let _ = writeln!(page, "\nWhy the firmware uses it: {}", kernel.why);
-    }
-    if points.len() > 2 {
-        let (count, errors, cycles) = span(points);
-        let _ = writeln!(
-            page,
-            "\nThe front has {count} points, {} times apart in error and {cycles:.1} times in cycles.",
-            figure(errors)
-        );
     }
 }
 

@@ -72,7 +72,7 @@ struct Commander {
     heard: Instant,
 }
 
-/// Serves until Ctrl-C, then stops the fingers that a client still commands.
+/// Serves until Ctrl-C, then stops what is still commanded.
 ///
 /// # Errors
 /// The port or the address is taken, or the port is lost.

@@ -267,8 +267,9 @@ pub fn markdown(cases: usize, fit_level: FitLevel, progress: &(impl Fn(&str, usi
     page
 }
 
-/// Names of the reading methods in the tables.
-const NAMES: [&str; WAYS] = ["Moments", "One", "Two", "Full", "Fit"];
+/// Reading methods in the tables: the plain sum, the best result from one image, and the firmware's. `docs/study.md` has
+/// the errors of the two others.
+const SHOWN: [(usize, &str); 3] = [(0, "Moments"), (3, "Full"), (WAYS - 1, "Fit")];
 
 fn errors(page: &mut String, good: &[(&Series, Judged)]) {
     page.push_str(
@@ -276,7 +277,7 @@ fn errors(page: &mut String, good: &[(&Series, Judged)]) {
         | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     for (series, judged) in good {
-        for (way, name) in NAMES.into_iter().enumerate() {
+        for (way, name) in SHOWN {
             let half = |value: fn(&Outcome) -> f64| {
                 let values = || judged.iter().map(|verdict| value(&verdict.outcomes[way]));
                 let over = values().filter(|value| *value > 1.0).count();
@@ -296,7 +297,7 @@ fn flagged<'a>(judged: impl IntoIterator<Item = &'a Verdict>, way: usize) -> usi
 
 fn alarms(page: &mut String, bad: &[(&Series, Judged)]) {
     page.push_str(
-        "\nBad contacts that are flagged, percent:\n\n| image | One | Two | Full | Fit |\n| --- | --- | --- | --- | --- |\n",
+        "\nBad contacts that are flagged, percent:\n\n| image | Full | Fit |\n| --- | --- | --- |\n",
     );
     for (series, judged) in bad {
         let share = |way| percent(flagged(judged, way), judged.len());
@@ -307,7 +308,7 @@ fn alarms(page: &mut String, bad: &[(&Series, Judged)]) {
 fn edges(page: &mut String, bad: &[(&Series, Judged)]) {
     page.push_str(
         "\nThe same for edges by the share of the seen force that they take; the classes that are not shown are all flagged:\n\n\
-        | image | share, cases | One | Two | Full | Fit |\n| --- | --- | --- | --- | --- | --- |\n",
+        | image | share, cases | Full | Fit |\n| --- | --- | --- | --- |\n",
     );
     let mut left_out = Vec::new();
     for (series, judged) in bad {
@@ -316,7 +317,7 @@ fn edges(page: &mut String, bad: &[(&Series, Judged)]) {
             let class = || judged.iter().filter(|verdict| (low..high).contains(&verdict.case.cut));
             let size = class().count();
             any |= size > 0;
-            if (1..WAYS).any(|way| flagged(class(), way) < size) {
+            if SHOWN[1..].iter().any(|(way, _)| flagged(class(), *way) < size) {
                 let share = |way| percent(flagged(class(), way), size);
                 let _ = writeln!(page, "| {} | {low} to {high}, {size} | {} |", series.name, row(share));
             }
@@ -377,7 +378,7 @@ fn motion(page: &mut String, cases: usize, fit_level: FitLevel, progress: &(impl
 
 /// Returns a cell for each method that has a confidence.
 fn row(cell: impl Fn(usize) -> String) -> String {
-    (1..WAYS).map(cell).collect::<Vec<_>>().join(" | ")
+    SHOWN[1..].iter().map(|(way, _)| cell(*way)).collect::<Vec<_>>().join(" | ")
 }
 
 fn percent(part: usize, of: usize) -> String {

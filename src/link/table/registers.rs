@@ -118,7 +118,7 @@ control_table! {
     262 SAVE_PARAMETERS: U8 TorqueOff, "" * 1, 0 to 1 = 0,
         |_, _| 0,
         |staged, value| { staged.actions.save |= value != 0; Ok(()) };
-    /// Stored registers compared with the flash: 0 equal, 1 changed, 2 the last save failed.
+    /// Stored registers compared with the flash: 0 the same, 1 changed since, 2 the last save failed.
     263 SAVED_STATE: U8 ReadOnly, "" * 1, 0 to 2,
         |view, _| view.settings().saved as u32;
     /// Mode: 0 off, 1 tare, 2 approach, 3 force, 4 release, 5 fault, 6 press, 7 strokes.
@@ -130,10 +130,10 @@ control_table! {
     /// brown-out level.
     265 FAULT: U8 ReadOnly, "" * 1, 0 to 18,
         |view, _| view.snapshot.status.fault.map_or(0, |fault| fault as u32);
-    /// Active limits, by bit: 0 voltage, 1 current, 2 speed, 3 goal, 4 travel, 5 taxels, 6 not tared, 7
-    /// frame missed, 8 slew, 9 fit level lowered by lack of time, 10 touched during the last tare, 11
-    /// only a lower bound of the force is known, 12 guard, 13 winding warm, 14 direction not confirmed,
-    /// 15 torque on since before the tare or the configuration: drives nothing until it was off.
+    /// Present restrictions, by bit: 0 voltage, 1 current, 2 speed, 3 goal, 4 travel, 5 taxels, 6 not
+    /// tared, 7 frame missed, 8 slew, 9 fit level held back by time, 10 something touched during the last tare,
+    /// 11 force known only from below, 12 guard, 13 winding warm, 14 direction not confirmed, 15 torque on since
+    /// before the tare or the configuration: it drives nothing until it was off.
     266 LIMITS: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
         |view, _| u32::from(view.snapshot.status.limits.0);
     /// Total normal force. Before a tare this and all
@@ -228,8 +228,8 @@ control_table! {
     /// Fit level in use: lower than requested if the time is too short.
     368 FIT_LEVEL_IN_USE: U8 ReadOnly, "" * 1, 0 to 5,
         |view, _| view.snapshot.status.fit_level as u32;
-    /// Last requested tare: 0 none since reset, 1 running, 2 done, 3 refused or
-    /// ended by a fault: remove the object or clear the fault, then request again.
+    /// State of the last requested tare: 0 none since reset, 1 running, 2 done, 3 refused, or ended by a fault:
+    /// remove the object or clear the fault, then request again.
     369 TARE_STATE: U8 ReadOnly, "" * 1, 0 to 3,
         |view, _| view.tare_state();
     /// Part of present_force_mn that counts as the array's creep:
@@ -258,8 +258,8 @@ control_table! {
     396 RECOVER: U8 ReadWrite, "" * 1, 0 to 1 = 0,
         |_, _| 0,
         set_recover;
-    /// Obstacle to recover: 0 none, 1 supply below supply_min_mv, 2 above
-    /// supply_max_mv, 3 more bad taxels than bad_taxels_max, 4 a save waits.
+    /// Obstacle to recover: 0 none, 1 the supply is below supply_min_mv, 2 it is above
+    /// supply_max_mv, 3 more taxels are bad than bad_taxels_max, 4 a save waits.
     397 RECOVER_HINDRANCE: U8 ReadOnly, "" * 1, 0 to 4,
         |view, _| view.hindrance();
     /// FLASH_OPTCR: the option bytes as loaded by the last reset.
@@ -319,10 +319,10 @@ control_table! {
     /// Completed part of the motion.
     4226 MEASURE_PROGRESS: U8 ReadOnly, "%" * 1, 0 to 100,
         |view, _| u32::from(view.snapshot.status.measure.progress);
-    /// Reason of an early end, with its number in measure_value; 0 none. 1 interrupted, 2 not ready (not
-    /// tared, touching, or wrong torque state), 3 direction not confirmed, 4 encoder did not move (mV), 5
-    /// encoder counts against the motor (counts), 6 tip left its range (um), 7 touched (mN), 8 motor measured
-    /// a force (mN), 10 never at rest (counts), 11 no contact (um), 12 stalled (um), 13 memory full.
+    /// Reason of an early end, with its number in measure_value; 0 none. 1 interrupted, 2 not ready: not tared,
+    /// touching, or torque not as it must be, 3 the direction is not confirmed, 4 the encoder did not move (mV), 5 it
+    /// counts against the motor (counts), 6 the tip left its range (um), 7 touched (mN), 8 the motor measured a force
+    /// (mN), 10 never at rest (counts), 11 no contact (um), 12 stalled (um), 13 memory full.
     4227 MEASURE_ENDED: U8 ReadOnly, "" * 1, 0 to 13,
         |view, _| view.snapshot.status.measure.ended as u32;
     /// Number that explains measure_ended.
@@ -340,8 +340,8 @@ control_table! {
     /// Capture: 0 none since reset, 1 armed, 2 keeping frames, 3 done.
     4261 CAPTURE_STATE: U8 ReadOnly, "" * 1, 0 to 3,
         |view, _| view.capture_state();
-    /// Reason of its end; 0 none. 1 memory full, 2 by the host, 3 new parameters or gains, 4 the
-    /// firmware stopped the motor, 5 the firmware shorted the motor because of a broken array.
+    /// Reason of the capture's end; 0 none. 1 its memory is full, 2 the host ended it, 3 new parameters or gains, 4 the
+    /// firmware stopped the motor, 5 the firmware shorted the motor at a broken array.
     4262 CAPTURE_ENDED: U8 ReadOnly, "" * 1, 0 to 5,
         |view, _| view.snapshot.capture.standing.ended as u32;
     /// Captures begun since reset; wraps.

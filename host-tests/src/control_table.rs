@@ -100,7 +100,7 @@ fn parameters(page: &mut String) {
     }
 }
 
-/// Range, unless it is that of the type.
+/// Range, unless it is that of the type, or of a count that is only read.
 fn range(register: &Register) -> String {
     let Register { min, max, kind, .. } = *register;
     let whole = match kind {
@@ -111,7 +111,8 @@ fn range(register: &Register) -> String {
         Kind::U32 => [0, u32::MAX.into()],
         Kind::I32 => [i32::MIN.into(), i32::MAX.into()],
     };
-    if [min, max] == whole { String::new() } else { format!("{min} to {max}") }
+    let counts = register.access == Access::ReadOnly && min == 0;
+    if counts || [min, max] == whole { String::new() } else { format!("{min} to {max}") }
 }
 
 /// Step of the number, if the register's name does not end with it.

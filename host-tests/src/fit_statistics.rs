@@ -296,9 +296,7 @@ fn flagged<'a>(judged: impl IntoIterator<Item = &'a Verdict>, way: usize) -> usi
 }
 
 fn alarms(page: &mut String, bad: &[(&Series, Judged)]) {
-    page.push_str(
-        "\nBad contacts that are flagged, percent:\n\n| image | Full | Fit |\n| --- | --- | --- |\n",
-    );
+    page.push_str("\nBad contacts that are flagged, percent:\n\n| image | Full | Fit |\n| --- | --- | --- |\n");
     for (series, judged) in bad {
         let share = |way| percent(flagged(judged, way), judged.len());
         let _ = writeln!(page, "| {} | {} |", series.name, row(share));

@@ -77,9 +77,8 @@ fn costs(page: &mut String, kernel: &Kernel, points: &[Point]) {
 /// Cells with the cost of a call.
 fn costs_of(cost: &Cost) -> [String; 4] {
     let Cost { instructions, low, estimate, high, flash } = cost;
-    let [instructions, estimate, flash] = [instructions, estimate, flash].map(|Passes { median, max }| {
-        if median == max { median.to_string() } else { format!("{median} ({max})") }
-    });
+    let [instructions, estimate, flash] = [instructions, estimate, flash]
+        .map(|Passes { median, max }| if median == max { median.to_string() } else { format!("{median} ({max})") });
     [instructions, format!("{} to {}", low.median, high.median), estimate, flash]
 }
 

@@ -24,7 +24,7 @@ const PICTURES: [(&str, i64, &str, u16, &str); COUNT] = [
         4095,
         "",
         1,
-        " Converter codes of the last frame, row by row; last the columns with no row driven.",
+        " Converter codes of the last frame, row by row; the last row is that of the columns with no row driven.",
     ),
     ("TARE_CODES", 4095, "", 1, " Zero of each taxel in converter codes, row by row."),
     (

@@ -273,8 +273,8 @@ fn a_sound_finger_is_never_stopped_for_its_direction() {
     }
 }
 
-/// With swapped channels or leads, a blocked motor or a dead encoder, the motor stops within 5 ms and 0.5 mm of full
-/// drive, in either direction.
+/// Swapped channels or leads: stopped within 5 ms and 0.5 mm of full drive, in either direction. A blocked motor or a
+/// dead encoder too.
 #[test]
 fn the_wrong_way_ends_within_half_a_millimetre() {
     let config = Config::shipped(&Params::DEFAULT).expect("the defaults are allowed");

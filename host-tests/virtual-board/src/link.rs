@@ -1,4 +1,4 @@
-//! The bus from the host's side: single bytes with their times, and whole transactions.
+//! The bus from the host's side: bytes at their time, and whole transactions.
 
 use crate::error::Error;
 use crate::rig::{Order, Rig};

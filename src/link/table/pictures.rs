@@ -32,7 +32,7 @@ const PICTURES: [(&str, i64, &str, u16, &str); COUNT] = [
         GAIN_MAX as i64,
         "1/16384",
         1,
-        " Factor of each taxel's reading, row by row: a half to just below 2. New gains need a new tare.",
+        " What each taxel's reading is multiplied by, row by row: a half to just below 2. New gains need a new tare.",
     ),
 ];
 

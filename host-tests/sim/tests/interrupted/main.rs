@@ -132,8 +132,8 @@ impl Job {
         command
     }
 
-    /// The same command with a limit on the size of its files. Beyond the limit the system kills the process, or
-    /// only fails the write.
+    /// The same under a limit of its files' size. Beyond it the system kills it, or lets it live with a write that
+    /// failed.
     fn limited(&self, bytes: u64, lives: bool) -> Command {
         let mut command = Command::new("sh");
         let trap = if lives { "trap '' XFSZ; " } else { "" };

@@ -87,77 +87,77 @@ params! {
     pitch_um = 1_500 in 500..=4_000;
     /// Settle time of a row before its conversions.
     settle_ns = 2_400 in 500..=100_000;
-    /// Sampling time of a conversion, in converter cycles: one of `Clocks::sample_cycles`, which on the STM32F446
-    /// are 3, 15, 28, 56, 84, 112, 144 and 480. A half cycle of a converter's list is rounded up.
+    /// Sampling time in converter cycles, one of `Clocks::sample_cycles`: 3, 15,
+    /// 28, 56, 84, 112, 144 and 480 on the STM32F446. Half cycles are rounded up.
     sample_cycles = 15 in 3..=480;
-    /// Converter codes for each kPa on a taxel, thousandths.
+    /// Converter codes per kPa on a taxel, thousandths.
     codes_per_kpa_milli = 24_000 in 1_000..=200_000;
-    /// Share of the row's voltage lost to the row driver's resistance for each code in the row's sum, parts per
-    /// billion: R_on / (R_f V_drive 4096 / V_ref).
+    /// Share of the row's voltage lost in the row driver's resistance per code
+    /// of the row's sum, parts per billion: R_on / (R_f V_drive 4096 / V_ref).
     row_sag_ppb_per_code = 1_667 in 0..=7_600;
-    /// A taxel that reads fewer codes than this above its column's undriven level is dead: the sensor's preload is
-    /// gone.
+    /// A taxel is dead if it reads less than this above
+    /// its column's undriven level: its preload is gone.
     dead_codes = 12 in 1..=1_000;
-    /// A column that reads more codes than this with no row driven shows a row that is stuck on.
+    /// A column that reads more than this with no row driven shows a row that is stuck on.
     undriven_max_codes = 700 in 0..=4_000;
     /// More dead or saturated taxels than this are a fault.
     bad_taxels_max = 5 in 0..=100;
-    /// Contact begins above this force; goals below it are held as this. Must be above contact_off_mn and below
-    /// force_max_mn.
+    /// Contact begins above this force; lower goals are held
+    /// as this. Above contact_off_mn, below force_max_mn.
     contact_on_mn = 40 in 5..=2_000;
-    /// Contact ends below this force. Must be below contact_on_mn.
+    /// Contact ends below this force. Below contact_on_mn.
     contact_off_mn = 15 in 1..=2_000;
-    /// Baseline follows drift while there is no contact: 1 yes, 0 no.
+    /// The baseline follows drift without contact: 1 yes, 0 no.
     baseline_follows = 1 in 0..=1;
-    /// Torque constant of the motor, uN m/A.
+    /// Torque constant of the motor.
     torque_constant_unm_per_a = 5_350 in 100..=200_000;
-    /// Terminal resistance of the motor and the bridge together.
+    /// Resistance of motor and bridge together.
     resistance_mohm = 3_530 in 50..=200_000;
-    /// Inertia at the motor's shaft, rotor and gear, ug m^2 (1 g cm^2 is 100).
+    /// Inertia of rotor and gear at the shaft (1 g cm^2 is 100).
     inertia_ug_m2 = 71 in 1..=20_000;
-    /// Coulomb friction at the motor's shaft, uN m.
+    /// Coulomb friction at the shaft.
     friction_unm = 120 in 0..=20_000;
-    /// Motor angle for tip travel, thousandths of rad/mm: gear ratio over the drum's or crank's radius.
+    /// Motor angle per tip travel: gear ratio over the radius of drum or crank.
     reduction_mrad_per_mm = 3_583 in 100..=50_000;
-    /// Quadrature counts for one turn of the motor.
+    /// Quadrature counts per turn of the motor.
     encoder_counts_per_turn = 1_600 in 16..=65_536;
     /// Largest voltage at the motor.
     voltage_max_mv = 6_000 in 500..=48_000;
-    /// Largest current, by the motor's model.
+    /// Largest current, by the motor model.
     current_max_ma = 2_000 in 20..=20_000;
-    /// Largest change of the motor's voltage in a millisecond.
+    /// Largest slew of the motor's voltage.
     voltage_slew_mv_per_ms = 60_000 in 100..=1_000_000;
-    /// Largest speed of the tip. Must not be below approach_um_per_s.
+    /// Largest speed of the tip. At least approach_um_per_s.
     speed_max_um_per_s = 250_000 in 1_000..=2_000_000;
-    /// Speed of the approach and of the release. Must not be above speed_max_um_per_s.
+    /// Speed of approach and release. At most speed_max_um_per_s.
     approach_um_per_s = 30_000 in 500..=200_000;
-    /// Largest travel of the tip from where torque was first enabled.
+    /// Largest travel from where torque was first enabled.
     travel_max_um = 20_000 in 100..=100_000;
-    /// Distance that the tip backs off after contact is lost on release.
+    /// Distance behind the surface to which a release goes.
     clearance_um = 1_000 in 0..=20_000;
-    /// Over-force: above this the motor is stopped. Must be above force_max_mn.
+    /// Over-force: above this the motor stops. Above force_max_mn.
     force_fault_mn = 9_000 in 100..=200_000;
-    /// Largest goal; a higher one is refused. Must be above contact_on_mn and below force_fault_mn.
+    /// Largest goal; higher ones are refused. Above contact_on_mn, below force_fault_mn.
     force_max_mn = 7_000 in 50..=150_000;
-    /// Below this supply the motor is stopped. Must be below supply_max_mv.
+    /// The motor stops below this supply. Below supply_max_mv.
     supply_min_mv = 5_000 in 1_000..=48_000;
-    /// Above this supply the motor is stopped. Must be above supply_min_mv.
+    /// The motor stops above this supply. Above supply_min_mv.
     supply_max_mv = 8_500 in 2_000..=60_000;
-    /// Increase of the force per code at the converter's full range, compared with small codes, permille: the array's
-    /// characteristic. 0 is a line. With more, codes_per_kpa_milli is that of small pressures, and must leave 1,000 at
-    /// the full range.
+    /// Characteristic of the array: how much more force per code at the converter's
+    /// full range than at small codes; 0 is a line. Otherwise codes_per_kpa_milli
+    /// is that of small pressures, and must leave 1,000 at the full range.
     curve_permille = 0 in 0..=8_000;
-    /// Final growth of the reading of a held force, permille of it: the array's creep. 0 turns the compensation off.
+    /// Creep of the array: final growth of the reading of a held force. 0 turns the compensation off.
     creep_permille = 0 in 0..=300;
     /// Time constant of the creep.
     creep_time_ms = 10_000 in 50..=600_000;
-    /// Direction confirmed: positive duty moves the tip towards the object, and the jog showed that the encoder then
-    /// counts up: 1 yes, 0 no. Without it torque is refused. See `docs/commissioning.md`.
+    /// 1: positive duty moves the tip towards the object, and in the jog the encoder
+    /// then counted up. 0: unknown, torque is refused. See `docs/commissioning.md`.
     direction_confirmed = 0 in 0..=1;
-    /// Largest temperature of the winding, degrees Celsius: the current is reduced below it, see limit 13.
+    /// Largest winding temperature: the current falls below it (limit 13).
     winding_max_c = 125 in 85..=250;
-    /// Thermal resistance from winding to housing. 0 leaves it out; with housing_k_per_w of 0 as well the winding is
-    /// assumed to have the temperature of its surroundings.
+    /// Thermal resistance from winding to housing; 0 leaves it out. If
+    /// housing_k_per_w is also 0, the winding counts as warm as its surroundings.
     winding_k_per_w = 20 in 0..=500;
     /// Thermal time constant of the winding.
     winding_time_ms = 5_000 in 2_000..=600_000;
@@ -165,17 +165,17 @@ params! {
     housing_k_per_w = 26 in 0..=500;
     /// Thermal time constant of the housing.
     housing_time_ms = 400_000 in 2_000..=10_000_000;
-    /// Largest temperature around the motor, degrees Celsius.
+    /// Largest temperature around the motor.
     ambient_c = 40 in -40..=60;
-    /// Change of the array's gain for a K, by the microcontroller's temperature. 0 turns the compensation off.
+    /// Change of the array's gain with the microcontroller's temperature. 0 turns the compensation off.
     array_gain_ppm_per_k = 0 in -10_000..=10_000;
-    /// The microcontroller's temperature at which the array's gain is right, degrees Celsius.
+    /// Microcontroller's temperature at which the array's gain is right.
     array_gain_at_c = 25 in -40..=125;
-    /// Change of every taxel's zero for a K, by the microcontroller's temperature since the zero was last learnt. 0
-    /// turns the compensation off.
+    /// Change of each taxel's zero with the microcontroller's temperature
+    /// since the zero was last learnt. 0 turns the compensation off.
     array_zero_pa_per_k = 0 in -1_000..=1_000;
-    /// Distance below the converter's largest code, 4,095, within which a column amplifier may clip. A taxel that reads
-    /// this close to it counts as saturated. 255 codes are 205 mV.
+    /// A taxel counts as saturated this far below the largest code, 4,095,
+    /// because a column amplifier may clip there. 255 codes are 205 mV.
     headroom_codes = 255 in 5..=2_000;
 }
 

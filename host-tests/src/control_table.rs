@@ -19,37 +19,48 @@ pub fn markdown() -> String {
     page += &format!(
         "# Control table\n\n\
         Generated from `src/link/table/registers.rs` and `src/params.rs` by `{COMMAND}`: do not edit.\n\n\
-        DYNAMIXEL Protocol 2.0. Numbers are little-endian, signed ones two's complement. One Read of {state_bytes} \
-        bytes from {state} fetches the whole state of the loop, all from one frame. A read may take any 1 to {READ_MAX} \
-        bytes of the table, and gets 0 where there is no register; a write covers whole registers, and either all of it \
-        happens or nothing.\n\n\
-        Some registers have a second name elsewhere, for drivers that cannot reach the first: 148 to 166 for those whose \
-        addresses end at 255, {picture} to {end} for those that read 255 bytes at most (state, time and all pressures in \
-        {together} bytes).\n\n\
-        - **access**: R read only, RW, RW-off writable with torque off, S writable with torque off and kept in flash \
-        once `save_parameters` was written, S-any the same but writable at any time.\n\
-        - **one is**: what a step of the number means, which is also its resolution.\n\n"
+        DYNAMIXEL Protocol 2.0; numbers are little-endian, signed ones two's complement. One read of {state_bytes} \
+        bytes from {state} gets the whole state of the loop, all from one frame. A read takes 1 to {READ_MAX} bytes; \
+        gaps read 0. A write covers whole registers, and is done or refused as a whole.\n\n\
+        **Access**: R read only; RW; RW-off writable with torque off; S writable with torque off, and kept in flash \
+        after `save_parameters`; S-any the same, but writable at any time. A number is in the unit at the end of its \
+        name, unless its row names a step.\n\n"
     );
     errors(&mut page);
-    section(&mut page, "Registers", |register| param(register).is_none());
-    section(&mut page, "Parameters", |register| param(register).is_some());
+    section(&mut page, "Registers", |register| param(register).is_none() && second_name_of(register).is_none());
+    page += &format!(
+        "\n## Second names\n\nFor drivers that cannot reach the first address: 124 to 132 as in an X-series servo, 148 to 166 \
+        for addresses up to 255, {picture} to {end} for reads of at most 255 bytes (state, time and all pressures in \
+        {together} bytes).\n\n| address | name | same as |\n| --- | --- | --- |\n"
+    );
+    for register in REGISTERS {
+        if let Some(first) = second_name_of(register) {
+            page += &format!("| {} | {} | {first} |\n", register.address, register.name.to_lowercase());
+        }
+    }
+    parameters(&mut page);
     page
+}
+
+/// Name of the register of which this is a second name.
+fn second_name_of(register: &Register) -> Option<&'static str> {
+    register.doc.trim().strip_prefix("The same as ").map(|name| name.trim_end_matches('.'))
 }
 
 fn errors(page: &mut String) {
     page.push_str("## Errors in a status packet\n\n| number | meaning |\n| --- | --- |\n");
     let meanings = [
-        (StatusError::Result, "understood, but cannot be carried out just now"),
+        (StatusError::Result, "understood, but not possible now"),
         (StatusError::Instruction, "no such instruction, or not under this ID"),
         (StatusError::Crc, "the packet arrived damaged"),
         (StatusError::Range, "a value outside its register's range, or a goal after the bus watchdog has tripped"),
-        (StatusError::Length, "parameters missing or too many, a part of a register written, a read too long"),
+        (StatusError::Length, "wrong number of parameters, a part of a register written, a read too long"),
         (
             StatusError::Limit,
-            "a value beyond what other registers allow: a goal above force_max_mn, parameters that contradict each other: each says \
-            which it must be above or below; to change both, write both in one packet, or first the one that makes room",
+            "a value that other registers do not allow: a goal above force_max_mn, or contradicting parameters; write \
+            both in one packet, or first the one that makes room",
         ),
-        (StatusError::Access, "no such register, or one that cannot be written, or not while torque is on"),
+        (StatusError::Access, "no such register, or not writable, or not while torque is on"),
     ];
     for (error, meaning) in meanings {
         *page += &format!("| {} | {meaning} |\n", error as u8);
@@ -59,23 +70,56 @@ fn errors(page: &mut String) {
 
 fn section(page: &mut String, title: &str, wanted: impl Fn(&Register) -> bool) {
     *page += &format!(
-        "\n## {title}\n\n| address | name | type | access | one is | range | default | meaning |\n\
-        | --- | --- | --- | --- | --- | --- | --- | --- |\n"
+        "\n## {title}\n\n| address | name | type | access | range | default | meaning |\n\
+        | --- | --- | --- | --- | --- | --- | --- |\n"
     );
     for register in REGISTERS.iter().filter(|register| wanted(register)) {
         let default = register.default.map_or(String::new(), |value| value.to_string());
         *page += &format!(
-            "| {} | {} | {} | {} | {} | {} to {} | {default} | {} |\n",
+            "| {} | {} | {} | {} | {} | {default} | {}{} |\n",
             register.address,
             register.name.to_lowercase(),
             kind(register),
             access(register.access),
-            step(register),
-            register.min,
-            register.max,
+            range(register),
             register.doc.trim(),
+            unusual_step(register),
         );
     }
+}
+
+fn parameters(page: &mut String) {
+    page.push_str(
+        "\n## Parameters\n\nEach is an i32 with access S.\n\n\
+        | address | name | range | default | meaning |\n| --- | --- | --- | --- | --- |\n",
+    );
+    for register in REGISTERS.iter().filter(|register| param(register).is_some()) {
+        let Register { address, name, min, max, default, doc, .. } = register;
+        let (default, doc) = (default.unwrap_or_default(), doc.trim());
+        *page += &format!("| {address} | {name} | {min} to {max} | {default} | {doc} |\n");
+    }
+}
+
+/// Range, unless it is that of the type, or of a count that is only read.
+fn range(register: &Register) -> String {
+    let Register { min, max, kind, .. } = *register;
+    let whole = match kind {
+        Kind::U8 => [0, u8::MAX.into()],
+        Kind::I8 => [i8::MIN.into(), i8::MAX.into()],
+        Kind::U16 => [0, u16::MAX.into()],
+        Kind::I16 => [i16::MIN.into(), i16::MAX.into()],
+        Kind::U32 => [0, u32::MAX.into()],
+        Kind::I32 => [i32::MIN.into(), i32::MAX.into()],
+    };
+    let counts = register.access == Access::ReadOnly && min == 0;
+    if counts || [min, max] == whole { String::new() } else { format!("{min} to {max}") }
+}
+
+/// Step of the number, if the register's name does not end with it.
+fn unusual_step(register: &Register) -> String {
+    let (step, name) = (step(register), register.name.to_lowercase());
+    let named = units::of(&name).map_or("1".into(), |unit| units::step(&unit));
+    if step == named || step == "1" { String::new() } else { format!(" Step: {step}.") }
 }
 
 fn param(register: &Register) -> Option<usize> {

@@ -260,31 +260,33 @@ pub fn markdown(cases: usize, fit_level: FitLevel, progress: &(impl Fn(&str, usi
     let bad: Vec<_> = BAD.iter().map(|series| (series, judged(series))).collect();
     let mut page = format!("{cases} cases a series, `Fit` with fit level {}.\n\n", fit_level as u8);
     errors(&mut page, &good);
-    alarms(&mut page, &good, &bad);
+    alarms(&mut page, &bad);
     edges(&mut page, &bad);
     settling(&mut page, &good);
     motion(&mut page, cases, fit_level, progress);
     page
 }
 
-/// Names of the reading methods in the tables.
-const NAMES: [&str; WAYS] = ["Moments", "One", "Two", "Full", "Fit"];
+/// Reading methods in the tables: the plain sum, the best result from one image, and the firmware's. `docs/study.md` has
+/// the errors of the two others.
+const SHOWN: [(usize, &str); 3] = [(0, "Moments"), (3, "Full"), (WAYS - 1, "Fit")];
 
 fn errors(page: &mut String, good: &[(&Series, Judged)]) {
     page.push_str(
-        "| series | way | force 99 % | force max | over | centre 99 % | centre max | over |\n\
-        | --- | --- | --- | --- | --- | --- | --- | --- |\n",
+        "| series | method | force 99 % | force max | over | centre 99 % | centre max | over | flagged |\n\
+        | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     for (series, judged) in good {
-        for (way, name) in NAMES.into_iter().enumerate() {
+        for (way, name) in SHOWN {
             let half = |value: fn(&Outcome) -> f64| {
                 let values = || judged.iter().map(|verdict| value(&verdict.outcomes[way]));
                 let over = values().filter(|value| *value > 1.0).count();
                 format!("{:.3} | {:.3} | {over}", quantile(values(), 0.99), quantile(values(), 1.0))
             };
             let (force, centre) = (half(|outcome| outcome.force), half(|outcome| outcome.centre));
+            let alarms = if way == 0 { String::new() } else { format!("{} ", flagged(judged, way)) };
             // Writing to a string cannot fail.
-            let _ = writeln!(page, "| {} | {name} | {force} | {centre} |", series.name);
+            let _ = writeln!(page, "| {} | {name} | {force} | {centre} | {alarms}|", series.name);
         }
     }
 }
@@ -293,14 +295,8 @@ fn flagged<'a>(judged: impl IntoIterator<Item = &'a Verdict>, way: usize) -> usi
     judged.into_iter().filter(|verdict| verdict.outcomes[way].flagged).count()
 }
 
-fn alarms(page: &mut String, good: &[(&Series, Judged)], bad: &[(&Series, Judged)]) {
-    page.push_str(
-        "\nFalse alarms, of the cases above:\n\n| series | One | Two | Full | Fit |\n| --- | --- | --- | --- | --- |\n",
-    );
-    for (series, judged) in good {
-        let _ = writeln!(page, "| {} | {} |", series.name, row(|way| flagged(judged, way).to_string()));
-    }
-    page.push_str("\nFlagged, percent:\n\n| picture | One | Two | Full | Fit |\n| --- | --- | --- | --- | --- |\n");
+fn alarms(page: &mut String, bad: &[(&Series, Judged)]) {
+    page.push_str("\nBad contacts that are flagged, percent:\n\n| image | Full | Fit |\n| --- | --- | --- |\n");
     for (series, judged) in bad {
         let share = |way| percent(flagged(judged, way), judged.len());
         let _ = writeln!(page, "| {} | {} |", series.name, row(share));
@@ -309,26 +305,27 @@ fn alarms(page: &mut String, good: &[(&Series, Judged)], bad: &[(&Series, Judged
 
 fn edges(page: &mut String, bad: &[(&Series, Judged)]) {
     page.push_str(
-        "\nEdges by the share of the seen force that they take, flagged percent:\n\n\
-        | picture | share | One | Two | Full | Fit |\n| --- | --- | --- | --- | --- | --- |\n",
+        "\nThe same for edges by the share of the seen force that they take; the classes that are not shown are all flagged:\n\n\
+        | image | share, cases | Full | Fit |\n| --- | --- | --- | --- |\n",
     );
+    let mut left_out = Vec::new();
     for (series, judged) in bad {
         let mut any = false;
         for (low, high) in CUTS {
             let class = || judged.iter().filter(|verdict| (low..high).contains(&verdict.case.cut));
             let size = class().count();
-            if size == 0 {
-                continue;
+            any |= size > 0;
+            if SHOWN[1..].iter().any(|(way, _)| flagged(class(), *way) < size) {
+                let share = |way| percent(flagged(class(), way), size);
+                let _ = writeln!(page, "| {} | {low} to {high}, {size} | {} |", series.name, row(share));
             }
-            any = true;
-            let share = |way| percent(flagged(class(), way), size);
-            let _ = writeln!(page, "| {} | {low} to {high}, {size} cases | {} |", series.name, row(share));
         }
         if any {
-            let left_out: usize = judged.iter().map(|verdict| verdict.case.invisible).sum();
-            let _ = writeln!(page, "| {} | below {}, {left_out} cases not judged | | | |", series.name, CUTS[0].0);
+            let cases: usize = judged.iter().map(|verdict| verdict.case.invisible).sum();
+            left_out.push(format!("{cases} of {}", series.name));
         }
     }
+    let _ = writeln!(page, "\nEdges below {} are not judged: {}.", CUTS[0].0, left_out.join("; "));
 }
 
 fn settling(page: &mut String, good: &[(&Series, Judged)]) {
@@ -336,7 +333,7 @@ fn settling(page: &mut String, good: &[(&Series, Judged)]) {
     let rule = "| --- ".repeat(frames.len() + 1);
     let _ = write!(
         page,
-        "\nForces of `Fit` beyond the bound after so many frames of a contact that was not there before:\n\n\
+        "\nForces of `Fit` beyond the bound, by the number of frames since the contact appeared:\n\n\
         | series | {} |\n{rule}|\n",
         frames.join(" | ")
     );
@@ -352,7 +349,7 @@ fn motion(page: &mut String, cases: usize, fit_level: FitLevel, progress: &(impl
     let (cases, configs) = ((cases / 100).max(1), Configs::default());
     let _ = write!(
         page,
-        "\nPressed in from 0.1 mm, `Fit` at every frame from the {FRAMES}th on that 12 taxels see, {cases} contacts without noise:\n\n\
+        "\nPressed in from 0.1 mm, `Fit` at every frame from the {FRAMES}th on with at least 12 taxels, {cases} contacts without noise:\n\n\
         | speed | force 99 % | force max | over | centre max | flagged |\n| --- | --- | --- | --- | --- | --- |\n"
     );
     for um_per_frame in [0.3, 1.0, 3.0] {
@@ -379,7 +376,7 @@ fn motion(page: &mut String, cases: usize, fit_level: FitLevel, progress: &(impl
 
 /// Returns a cell for each method that has a confidence.
 fn row(cell: impl Fn(usize) -> String) -> String {
-    (1..WAYS).map(cell).collect::<Vec<_>>().join(" | ")
+    SHOWN[1..].iter().map(|(way, _)| cell(*way)).collect::<Vec<_>>().join(" | ")
 }
 
 fn percent(part: usize, of: usize) -> String {

@@ -1,4 +1,4 @@
-//! All that the pages tell a reader to run or to open exists: commands with their flags, files, links and anchors.
+//! Checks that everything that the pages name exists: commands with their flags, files, links and anchors.
 
 use crate::common::*;
 use host_tests::figures::{Modulus, PITCH_MM, all, fit, readings, seen, tip};

@@ -23,7 +23,7 @@ pub mod same_bits;
 
 pub mod single;
 
-/// The shipped parameters of a finger whose motor's direction was confirmed: torque is refused before.
+/// The shipped parameters with a confirmed direction of the motor, because torque is refused without it.
 pub const CONFIRMED: Params = Params { direction_confirmed: 1, ..Params::DEFAULT };
 
 /// Parameters with all corrections of a real sensor on: a nonlinear characteristic, creep, and a gain that drifts with

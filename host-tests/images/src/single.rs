@@ -111,7 +111,7 @@ fn refine<const ROWS: usize, const COLUMNS: usize>(
     config: &Shaped<ROWS, COLUMNS>,
 ) -> Guess {
     let (mut guess, far) = step(start, false, view, config);
-    // A start from few taxels can be far off; few taxels are also quick.
+    // With few taxels the start can be far off, and a second step takes little time.
     if far > FAR {
         (guess, _) = step(guess, false, view, config);
     }

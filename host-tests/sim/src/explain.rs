@@ -4,7 +4,7 @@ use crate::effects::{Build, Part};
 use crate::events::{EVENT, KINDS, own_keys};
 use crate::metrics;
 use crate::registry::{self, CONTACT, DRIVE, Description, LINK, SENSOR};
-use crate::scene::tables::{EXPECT, Key, ROOT, SCRIPT, TABLES, Table, Values};
+use crate::scene::tables::{EXPECT, Key, ROOT, SCRIPT, TABLES, Values};
 use crate::scene::{Scene, library, read};
 use std::fmt::Write as _;
 
@@ -83,22 +83,32 @@ pub fn page() -> String {
     );
     library_of(&mut page);
     stages(&mut page);
-    page.push_str("\n## Tables\n");
+    page.push_str(
+        "\n## Tables\n\nAfter each key: its range, and its default if it has one. A unit is the end of the key's name.\n",
+    );
     for table in [&ROOT].into_iter().chain(TABLES).chain([&SCRIPT, &EVENT, &EXPECT]) {
         let title =
             if table.name.is_empty() { "Before the first table".into() } else { format!("`{}`", table.title()) };
-        let _ = write!(page, "\n### {title}\n\n{}\n\n", table.about);
-        table_of(&mut page, table);
-    }
-    page.push_str("\n## Events\n\nWhat each kind of `[[event]]` does, and its own keys.\n");
-    for kind in &KINDS {
-        let _ = write!(page, "\n### `{}`\n\n{}\n", kind.name, kind.about);
-        if !own_keys(kind).is_empty() {
+        let _ = write!(page, "\n### {title}\n\n{}\n", table.about);
+        if table.name == "controller" {
+            page.push_str("The keys are the [parameters](control-table.md#parameters), with their ranges.\n");
+        } else {
             page.push('\n');
-            table_of(&mut page, &Table { keys: own_keys(kind), ..*kind });
+            keys_on(&mut page, table.keys, "");
         }
     }
-    page.push_str("\n## Effects\n\nThey act in this order within a stage, whatever the order in the scene.\n");
+    page.push_str(
+        "\n## Events\n\nKinds of `[[event]]`, with their keys. `for_s` is the duration, 0 to 1000000, required.\n\n",
+    );
+    for kind in &KINDS {
+        let (own, lasts) = match own_keys(kind) {
+            [own @ .., last] if last.name == "for_s" => (own, ", `for_s`"),
+            own => (own, ""),
+        };
+        let _ = writeln!(page, "- `{}`{lasts}: {}", kind.name, kind.about);
+        keys_on(&mut page, own, "  ");
+    }
+    page.push_str("\n## Effects\n\nWithin a stage they act in this order, whatever their order in the scene.\n");
     for family in [CONTACT, DRIVE, SENSOR, LINK] {
         let _ = write!(page, "\n### {}\n", family.title);
         for effect in family.effects {
@@ -107,7 +117,9 @@ pub fn page() -> String {
     }
     let _ = write!(
         page,
-        "\n## Metrics\n\nWhat `[[expect]]` may bound. With two fingers, `finger0.` and `finger1.` before a name ask for one of them.\n\n{}",
+        "\n## Metrics\n\n`[[expect]]` can bound these. The unit is the end of the name. Of several goals the worst one counts. Of two fingers the one \
+         with the largest value counts, unless brackets give another rule; `finger0.` or `finger1.` before a name selects one. *The end \
+         of a goal* is its last 200 ms, if it lasted 400 ms. *Defects* are the [events](#events) of encoder, supply, array and host.\n\n{}",
         metrics::page()
     );
     page
@@ -116,12 +128,11 @@ pub fn page() -> String {
 /// Adds the scenes of the library; none without the sources.
 fn library_of(page: &mut String) {
     page.push_str(
-        "\n## The library\n\nEach scene of `host-tests/sim/scenes` explains itself; a test runs them all and holds their bounds.\n\n",
+        "\n## The library\n\nComments in each file of `host-tests/sim/scenes` explain it. A test runs all scenes against their bounds.\n\n",
     );
-    page.push_str("| scene | what it shows |\n| --- | --- |\n");
     for line in list().unwrap_or_default().lines() {
         if let Some((name, about)) = line.split_once(' ') {
-            let _ = writeln!(page, "| `{name}` | {} |", about.trim());
+            let _ = writeln!(page, "- `{name}`: {}", about.trim());
         }
     }
 }
@@ -129,9 +140,9 @@ fn library_of(page: &mut String) {
 /// Adds the stages from pressure to codes, with the effects at each.
 fn stages(page: &mut String) {
     page.push_str(
-        "\n## From pressure to codes\n\nWithout effects the readout is ideal: equal taxels, a perfect row switch, a perfect virtual ground, \
-         settled at once, 12 bits rounded down. Each row is sampled at its own instant. The stages and the effects in each, in order:\n\n\
-         | stage | what it holds | effects |\n| --- | --- | --- |\n",
+        "\n## From pressure to codes\n\nWithout effects the readout is ideal: equal taxels, a perfect row switch and virtual ground, \
+         no settling time, 12 bits rounded down. Each row is sampled at its own instant. Stages and effects, in order:\n\n\
+         | stage | content | effects |\n| --- | --- | --- |\n",
     );
     for (stage, about) in [
         ("pressure", "kPa of each taxel of the row"),
@@ -162,16 +173,17 @@ fn stage_of(effect: &Description) -> Option<&'static str> {
 fn effect_of(page: &mut String, effect: &Description) {
     let Description { name, about, equations, state, reference, keys, .. } = effect;
     let _ = write!(page, "\n#### `[effects.{name}]`\n\n{about}\n\n");
-    table_of(page, &Table { name, about, keys });
+    keys_on(page, keys, "");
     page.push_str("\n```text\n");
     equations.iter().for_each(|line| *page += &format!("{line}\n"));
-    let _ = writeln!(page, "```\n\nState: {state}. Source: {reference}.");
+    let state = if *state == "none" { String::new() } else { format!("State: {state}. ") };
+    let _ = writeln!(page, "```\n\n{state}Source: {reference}.");
 }
 
-fn table_of(page: &mut String, table: &Table) {
-    page.push_str("| key | unit | allowed | what it is |\n| --- | --- | --- | --- |\n");
-    for key in table.keys {
-        let unit = key.unit().unwrap_or_default();
-        let _ = writeln!(page, "| `{}` | {unit} | {} | {} |", key.name, key.allowed(), key.about.trim());
+/// Adds a list of keys to the page.
+fn keys_on(page: &mut String, keys: &[Key], indent: &str) {
+    for key in keys {
+        let allowed = key.allowed().replace("whole number", "whole").replace("number, ", "");
+        let _ = writeln!(page, "{indent}- `{}` ({allowed}): {}", key.name, key.about.trim());
     }
 }

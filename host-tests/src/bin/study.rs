@@ -60,7 +60,7 @@ fn report(runs: [&str; 2], whole: &str, flags: &[&str]) -> Result<(), String> {
     }
     let mut files = Vec::new();
     let whole = WholeLoop::read(&fs::read_to_string(whole).map_err(|error| format!("{whole}: {error}"))?)?;
-    let tables = page::markdown(&studied, whole.markdown(&studied)?);
+    let tables = page::markdown(&studied, whole.markdown()?);
     for (page, tables) in [(page::PAGE, tables), (page::README, whole.levels_table(&studied)?)] {
         files.push((page.name.to_owned(), page.renewed(&tables)?));
     }

@@ -62,7 +62,7 @@ pub const KERNELS: &[Kernel] = &[
     Kernel {
         name: "root",
         title: "Square root",
-        text: "sqrt(x) for 512 numbers from 0.01 to 32767, as many in each octave.",
+        text: "sqrt(x) for 512 numbers from 0.01 to 32767, equally many in each octave.",
         error: "relative error",
         other: None,
         measure: Measure::Scalar {
@@ -70,8 +70,8 @@ pub const KERNELS: &[Kernel] = &[
             exact: |_, [x, _]| input(*x).sqrt(),
             relative: true,
         },
-        why: "The loop takes 32 exact bits of the root of 64: an indentation of 8 mm to its unit of 2^-24 mm, which single \
-            precision does not hold. Its error here is that of a Q48 number whose root is cut to Q24.",
+        why: "it has 32 exact bits of the root of 64, so an indentation of 8 mm is exact to 2^-24 mm, which single precision is not. Its \
+            error here is that of a Q48 root cut to Q24.",
     },
     Kernel {
         name: "force",
@@ -84,8 +84,8 @@ pub const KERNELS: &[Kernel] = &[
             exact: |reference, [d, _]| reference.force(&input(*d)),
             relative: false,
         },
-        why: "The loop holds no floating-point number. The cheaper integer way is made for this range; the model's is correctly \
-            rounded for every radius from 4 to 16 mm and every modulus from 20 to 2000 kPa, which is proven.",
+        why: "it has no floating-point numbers, and is proven to be correctly rounded for every radius from 4 to 16 mm and \
+            every modulus from 20 to 2000 kPa. The cheaper integers serve only the range of this table.",
     },
     Kernel {
         name: "indentation",
@@ -103,8 +103,8 @@ pub const KERNELS: &[Kernel] = &[
     Kernel {
         name: "pressure",
         title: "Pressure at a distance from the centre",
-        text: "p = Y dL/L, 0 from the rim on, for 512 indentations from 0.01 to 9.5 mm and distances up to 1.05 contact radii. \
-            *Textbook* is Y (L - (a - d)) / L; *no cancellation* is Y (r_c^2 - r^2) / (L (L + a - d)).",
+        text: "p = Y dL/L inside the contact, else 0, for 512 indentations from 0.01 to 9.5 mm and distances up to 1.05 contact radii. \
+            *Textbook*: Y (L - (a - d)) / L. *No cancellation*: Y (r_c^2 - r^2) / (L (L + a - d)). No frame computes `Tip::pressure`.",
         error: "pressure error, kPa",
         other: None,
         measure: Measure::Scalar {
@@ -118,8 +118,8 @@ pub const KERNELS: &[Kernel] = &[
     Kernel {
         name: "rings",
         title: "Equation 14 by rings",
-        text: "F = integral of p dS as a sum over 4 to 64 rings, by the midpoint rule in r or in u = r^2, against the closed form \
-            pi Y d^2, for 32 indentations from 0.5 to 5 mm. The front is that of the sums alone: nothing sums what has a closed form. `fixed` is I16F16, *Tip* the model's `force_by_rings`.",
+        text: "F = integral of p dS over 4 to 64 rings, by the midpoint rule in r or in u = r^2, against pi Y d^2, for 32 indentations from \
+            0.5 to 5 mm. The closed form is apart from the front. `fixed` is I16F16, *Tip* is `force_by_rings`.",
         error: "relative error of the force",
         other: None,
         measure: Measure::Scalar {
@@ -132,23 +132,21 @@ pub const KERNELS: &[Kernel] = &[
     Kernel {
         name: "frame",
         title: "Frame to force, centre and flags",
-        text: "100 taxels: offset, gain, the driven row's sag, tare, then sum, moments, and whether a taxel is dead or saturated; \
-            256 frames of a simulated array with gains of 0.8 to 1.2, indentations of 0.1 to 5 mm. The error is that of the arithmetic: force and \
-            centre by the sums, against those by exact sums of the same codes and gains, less those of the frame without contact. All find \
-            a peak as well: `Array::read` and those that work taxel by taxel the largest taxel, the packed ones and the sums alone the largest code. \
-            *Sums alone* is the pass that the firmware had before, which left single taxels to those frames that looked at them, *two rows* \
-            what most frames took, *all rows* every taxel by that way. What a frame pays for all taxels, always fresh, is the difference to `Array::read`.",
+        text: "100 taxels: offset, gain, row sag, tare, sum, moments, dead and saturated taxels; 256 frames of a simulated array with \
+            gains of 0.8 to 1.2 and indentations of 0.1 to 5 mm. The error is that of the arithmetic, against exact sums of the same codes and gains. All \
+            find a peak: the largest taxel, or (*packed*, *sums alone*) the largest code. *Sums alone* is the former pass, which computed single \
+            taxels only on demand: *two rows* in most frames, *all rows* at most.",
         error: "force error, N",
         other: Some("centre error, mm"),
         measure: Measure::Frames,
-        why: "`Array::read` works out every taxel as well. A picture of which some rows are older than others cost less, but a contact \
-            whose rows nobody had looked at was never fitted: its force stayed the sum's.",
+        why: "it also computes every taxel in every frame. With older rows in the image, a contact on rows that were not read was \
+            never fitted.",
     },
     Kernel {
         name: "fit-clean",
-        title: "Contact from a picture, no noise",
-        text: "64 contacts, with their centres on the array or beyond its edge, as [contact.md](contact.md) draws them, without noise, read to a sixteenth of a code. *One*, *Two* and *Full* see one picture; \
-            *Fit* sees 90 at each of the loop's fit_levels and is judged on the last; 0 and 1 are the sums. The error is that against the simulated truth. All are the firmware's.",
+        title: "Contact from an image, no noise",
+        text: "64 contacts as in [contact.md](contact.md), with centres on and off the array, without noise, read to 1/16 code. *One*, *Two* and \
+            *Full* read a single image, *Fit* the 90th of 90 at each fit level; 0 and 1 are the sums. Error against the simulated truth. All are the firmware's.",
         error: "force error, N",
         other: Some("centre error, mm"),
         measure: Measure::Fit { noisy: false },
@@ -156,22 +154,19 @@ pub const KERNELS: &[Kernel] = &[
     },
     Kernel {
         name: "fit-noise",
-        title: "Contact from a picture, 1 % of noise",
-        text: "64 contacts, with their centres on the array or beyond its edge, as [contact.md](contact.md) draws them, each taxel with noise of 1 % of its reading. *One*, *Two* and *Full* see one picture; \
-            *Fit* sees 90 at each of the loop's fit_levels and is judged on the last; 0 and 1 are the sums. The error is that against the simulated truth. All are the firmware's.",
+        title: "Contact from an image, 1 % of noise",
+        text: "As above, each taxel with noise of 1 % of its reading.",
         error: "force error, N",
         other: Some("centre error, mm"),
         measure: Measure::Fit { noisy: true },
-        why: "*One*, *Two* and *Full* read a single picture, where nothing went before. Where pictures follow each other, *Fit* takes \
-            several into each refinement: less noise for less time a frame.",
+        why: "*One*, *Two* and *Full* read a single image. *Fit* uses several images for each step: less noise in less time a \
+            frame.",
     },
     Kernel {
         name: "control",
         title: "Controller step",
-        text: "A proportional and integral controller by increments with a slew limit and an output limit that wind nothing up, y = y1 + 1.591 e - 1.53 e1, \
-            2048 steps. The error is that against the same law in arbitrary precision. What the firmware does instead has no \
-            row here, as it answers another question: it takes a speed, its slope and a disturbance, and holds voltage, current and \
-            slew. It is the *speed law with limits* among the parts of the step below; the *duty from the voltage* is the division by the supply.",
+        text: "PI controller by increments with limits of slew and output, without windup: y = y1 + 1.591 e - 1.53 e1, 2048 steps, \
+            against arbitrary precision. The firmware has another law (*speed law with limits* in [the step](#the-step-and-its-parts)).",
         error: "output error, share of the range",
         other: None,
         measure: Measure::Control,
@@ -180,8 +175,9 @@ pub const KERNELS: &[Kernel] = &[
     Kernel {
         name: "step",
         title: "The step and its parts",
-        text: "`Pipeline::step` over the recorded stimulus of 10,000 frames, faults included, at the default fit level, 2, and at the others; its parts over the first 3,000. What corrects for a real sensor is off in the step and costs it a \
-            comparison; switched on, *by a curve* takes the place of *Array::read*, *with creep* that of *goal and profile*, and *warmth* is added. The *winding* is in the step.",
+        text: "`Pipeline::step` over a recorded stimulus of 10,000 frames with faults, by default at fit level 2; its parts over the first \
+            3,000. Corrections of a real sensor are off in the step. Switched on, *by a curve* replaces *Array::read*, *with creep* replaces *goal and \
+            profile*, and *warmth* (temperature compensation) is added. The *winding* is in the step.",
         error: "",
         other: None,
         measure: Measure::Cost,

@@ -1,8 +1,8 @@
 //! The tables of `docs/study.md`, the short one of the README, and the figures as JSON.
 
-use super::front::{Point, beaten_by, span};
+use super::front::{Point, beaten_by};
 use super::kernels::Kernel;
-use super::output::Cost;
+use super::output::{Cost, Passes};
 use super::{scan, simulation};
 use crate::page::Page;
 use std::fmt::Write as _;
@@ -11,6 +11,9 @@ use std::fmt::Write as _;
 pub const PAGE: Page = Page { name: "docs/study.md", tables: "study", command: "cargo xtask study" };
 /// See [`PAGE`].
 pub const README: Page = Page { name: "README.md", ..PAGE };
+
+/// Largest number of variants of which the page shows also the beaten ones.
+const SHOWN_MAX: usize = 20;
 
 /// A kernel with its variants, cheapest first.
 pub type Studied<'a> = (&'a Kernel, Vec<Point>);
@@ -34,30 +37,26 @@ fn section(page: &mut String, kernel: &Kernel, points: &[Point]) {
     let (more, rule) = other.map_or((String::new(), ""), |other| (format!(" {other}, max | rms |"), " --- | --- |"));
     let _ = writeln!(
         page,
-        "| variant | {} | {error}, max | rms |{more} |\n\
-        | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |{rule} --- |",
-        Cost::HEADS
+        "| variant | instructions | cycles: low to high | estimate | with flash | {error}, max | rms |{more} |\n\
+        | --- | --- | --- | --- | --- | --- | --- |{rule} --- |"
     );
     let beaten = beaten_by(points);
-    for (point, by) in points.iter().zip(&beaten) {
+    let few = points.len() <= SHOWN_MAX;
+    for (point, by) in points.iter().zip(&beaten).filter(|(_, by)| few || by.is_none()) {
         let Point { name, firmware, cost, error_max, error_rms, other } = point;
         let bold = if *firmware { "**" } else { "" };
-        let errors = [[*error_max, *error_rms]].into_iter().chain(*other);
-        let errors = errors.flatten().map(figure).collect::<Vec<_>>().join(" | ");
-        let verdict = verdict(point, by.map(|by| &points[by]));
-        let _ = writeln!(page, "| {bold}{name}{bold} | {} | {errors} | {verdict} |", cost.cells());
+        let errors = [[*error_max, *error_rms]].into_iter().chain(*other).flatten().map(figure);
+        let cells = costs_of(cost).into_iter().chain(errors).collect::<Vec<_>>().join(" | ");
+        let place = by.map_or_else(|| verdict(point, None), |_| String::new());
+        let _ = writeln!(page, "| {bold}{name}{bold} | {cells} | {place} |");
+    }
+    if !few {
+        let hidden = beaten.iter().flatten().count();
+        let _ = writeln!(page, "\nThe picture and `--json` also have the {hidden} beaten variants.");
     }
     let beats_firmware = points.iter().zip(&beaten).any(|(point, by)| point.firmware && by.is_some());
     if beats_firmware {
-        let _ = writeln!(page, "\nWhy the firmware's is not on the front: {}", kernel.why);
-    }
-    if points.len() > 2 {
-        let (count, errors, cycles) = span(points);
-        let _ = writeln!(
-            page,
-            "\nThe front has {count} points, {} times apart in error and {cycles:.1} times in cycles.",
-            figure(errors)
-        );
+        let _ = writeln!(page, "\nWhy the firmware uses it: {}", kernel.why);
     }
 }
 
@@ -73,6 +72,14 @@ fn costs(page: &mut String, kernel: &Kernel, points: &[Point]) {
     for Point { name, cost, .. } in points.iter().rev() {
         let _ = writeln!(page, "| {name} | {} |", cost.cells());
     }
+}
+
+/// Cells with the cost of a call.
+fn costs_of(cost: &Cost) -> [String; 4] {
+    let Cost { instructions, low, estimate, high, flash } = cost;
+    let [instructions, estimate, flash] = [instructions, estimate, flash]
+        .map(|Passes { median, max }| if median == max { median.to_string() } else { format!("{median} ({max})") });
+    [instructions, format!("{} to {}", low.median, high.median), estimate, flash]
 }
 
 /// Position of a variant among the others.

@@ -59,21 +59,18 @@ impl WholeLoop {
     /// Returns the section that opens the page.
     ///
     /// # Errors
-    /// The step was not studied at a fit level.
-    pub fn markdown(&self, studied: &[Studied]) -> Result<String, String> {
+    /// A settle time is not allowed.
+    pub fn markdown(&self) -> Result<String, String> {
         let mut page = format!(
-            "\n## The whole loop\n\nError of the **true force** that {} [usual fingers](budget.md) hold, root mean square over the fingers, \
-             against the cycles of `Pipeline::step`. *Calibrated* fingers were pressed onto a plate and held on a scale first \
-             ([commissioning](commissioning.md)). Simulated; cycles estimated.\n\n\
+            "\n## The whole loop\n\nError of the **true force** that {} [usual fingers](budget.md) hold, rms over the fingers, against the cycles of \
+             `Pipeline::step`; the [README](../README.md#accuracy-and-its-cost) has the table. *Calibrated* fingers were \
+             [calibrated](commissioning.md) with a plate and a scale. Simulated; cycles estimated.\n\n\
              ![The whole loop: error at 5 N over cycles](pictures/study-whole-loop.svg)\n\n",
             self.fingers
         );
-        page += &self.levels_table(studied)?;
-        page += "\nFit level 2 is the default. Levels 3 to 5 refine the contact in 6, 3 and 1 frames instead of 11, and nothing measured here gains by it: \
-                 the errors of the taxels limit the force.\n\n\
-                 Frame rate: the demonstration's longest settling and its duty at rest, and the same fingers at fit level 2 as they come. The array is \
-                 slowed by its settle time; the cycles a second fall in proportion. Why a slower loop holds the true force closer was not \
-                 examined.\n\n\
+        page += "Fit levels 3 to 5 refine the contact in 6, 3 and 1 frames instead of 11. The errors do not fall: the taxels limit the force.\n\n\
+                 Slower frames (by the settle time): the demonstration's longest settling and its duty at rest, and the errors of uncalibrated \
+                 fingers at fit level 2. Why a slower loop has the smaller errors was not examined.\n\n\
                  | settle, ns | frames a second | settling, ms | duty at rest, % | at 0.5 N, mN | 1 N | 2 N | 5 N | holds without a fault |\n\
                  | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
         for (ns, ms, percent, errors, holds) in &self.rates {
@@ -82,10 +79,10 @@ impl WholeLoop {
             let hz = f64::from(CLOCKS.timer_hz) / (f64::from(slot.0) * SLOTS as f64);
             let _ = writeln!(page, "| {ns} | {hz:.0} | {ms:.1} | {percent:.2} | {} | {holds} |", cells(errors));
         }
-        Ok(page + &formats(studied))
+        Ok(page + &formats())
     }
 
-    /// Returns the table of the fit levels, which the README shows too.
+    /// Returns the table of the fit levels, which the README shows.
     ///
     /// # Errors
     /// The step was not studied at a fit level.
@@ -145,25 +142,16 @@ fn cells(errors: &Errors) -> String {
 }
 
 /// The pressure in words of some lengths, against the smallest pressure that the sensor shows.
-fn formats(studied: &[Studied]) -> String {
+fn formats() -> String {
     let code_kpa = 1e3 / f64::from(Params::DEFAULT.codes_per_kpa_milli);
     let mut page = format!(
-        "\nNumber formats, for the pressure at a distance from the centre (eq. 13): *n bits* rounds every intermediate result to n bits of its range. \
-         The sensor's line is one code, {code_kpa:.3} kPa: an error far below it buys nothing. No frame computes `Tip::pressure`: \
-         the loop uses the force alone, so its cycles cost nothing there.\n\n\
-         | format | cycles, median | error, kPa, max | error, codes |\n| --- | --- | --- | --- |\n"
+        "\nWord length, for the [pressure](#pressure-at-a-distance-from-the-centre) with every intermediate result rounded to n bits of its range. \
+         The sensor resolves one code, {code_kpa:.3} kPa.\n\n\
+         | bits | error, kPa, max | error, codes |\n| --- | --- | --- |\n"
     );
-    let mut line = |name: &str, cycles: String, kpa: f64| {
-        let _ = writeln!(page, "| {name} | {cycles} | {} | {} |", figure(kpa), figure(kpa / code_kpa));
-    };
     for bits in BITS {
-        line(&format!("{bits} bits"), String::new(), rounded_error_kpa(bits));
-    }
-    for (_, points) in studied.iter().filter(|(kernel, _)| kernel.name == "pressure") {
-        for point in points.iter().filter(|point| point.competes()) {
-            let bold = if point.firmware { "**" } else { "" };
-            line(&format!("{bold}{}{bold}", point.name), point.cycles().to_string(), point.error_max);
-        }
+        let kpa = rounded_error_kpa(bits);
+        let _ = writeln!(page, "| {bits} | {} | {} |", figure(kpa), figure(kpa / code_kpa));
     }
     page
 }

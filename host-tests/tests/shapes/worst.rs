@@ -110,7 +110,7 @@ fn survives<const ROWS: usize, const COLUMNS: usize>() {
                 let exact = sums(frame, gain, &config);
                 let found = [picture.sum, picture.moment_x, picture.moment_y].map(f64::from);
                 let off = exact.iter().zip(found).map(|(exact, found)| (exact - found).abs()).fold(0.0, f64::max);
-                // The boost's series is off by 2^-20 at its end.
+                // The error of the boost's series is 2^-20 at the end of its range.
                 assert!(off < 2e-5 * exact[0] * ROWS.max(COLUMNS) as f64 + 20.0, "{found:?}, not {exact:?}");
                 for refined in Refined::ALL {
                     single::read(&picture, refined, &config);

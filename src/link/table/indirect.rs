@@ -29,9 +29,9 @@ pub(super) mod address {
 use address::{INDIRECT_ADDRESS_1, INDIRECT_ADDRESS_29, INDIRECT_DATA_1, INDIRECT_DATA_29};
 
 const ADDRESS_DOC: &str = " Address of the byte of the same number in the indirect data: 64 or above, in any register \
-    but the indirect ones; a range error otherwise. 0 is nowhere. Kept until a reset.";
-const DATA_DOC: &str = " The bytes that the indirect addresses lead to; 0 for those that lead nowhere. A write obeys \
-    the rules of the registers that it reaches, and covers whole ones.";
+    but the indirect ones, else a range error. 0 is none. Kept until a reset.";
+const DATA_DOC: &str = " Bytes at the indirect addresses; 0 for an address of 0. A write follows the rules of \
+    its registers and covers whole ones.";
 
 /// Returns true if a block begins here.
 pub const fn begins(address: u16) -> bool {

@@ -71,7 +71,7 @@ fn params(source: &mut Source) -> Params {
     params.sample_cycles = SAMPLE_CYCLES.get((source.word() & 7) as usize).map_or(0, |cycles| *cycles);
     let order = |low: &mut i32, high: &mut i32| (*low, *high) = ((*low).min(*high), (*low).max(*high));
     order(&mut params.contact_off_mn, &mut params.contact_on_mn);
-    // Most converters then see four least contacts.
+    // So the range of most converters is at least four times the smallest contact force.
     params.contact_on_mn = (params.contact_on_mn / 16).max(5);
     params.contact_off_mn = params.contact_off_mn.min(params.contact_on_mn - 1);
     order(&mut params.contact_on_mn, &mut params.force_max_mn);

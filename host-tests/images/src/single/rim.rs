@@ -9,7 +9,7 @@ use fingertip::contact::parts::{Guess, ONE, PLACE_BITS, PeakScale, SQUARE_BITS, 
 
 /// 1/sqrt(3), Q15: Gauss points on -1 to 1.
 const GAUSS: i32 = 18_919;
-/// Bits from the square of a place to a squared distance.
+/// Shift from the square of a place to the format of squared distances, bits.
 const TO_SQUARE: u32 = 2 * PLACE_BITS - SQUARE_BITS;
 
 /// A guess worked out for the taxels under its rim.

@@ -135,11 +135,11 @@ pub const EFFECTS: &[Description] = &[
         name: "tilted_plane",
         about: "A plane that is tilted against the array.",
         equations: &[
-            "h = x tan(along_columns_deg) + y tan(along_rows_deg), less the offset that puts the first point of contact at d = 0",
+            "h = x tan(along_columns_deg) + y tan(along_rows_deg), less the offset that gives the first contact at d = 0",
             "force by the integral of p = Y dL / L over the tip",
         ],
         state: "none",
-        reference: "the compression of Park, Kim, Hirai 2003, eq. 13, with the surface's height added: dL = sqrt(a^2 - r^2) - (a - d) + h",
+        reference: "Park, Kim, Hirai 2003, eq. 13, with the surface's height h: dL = sqrt(a^2 - r^2) - (a - d) + h",
         keys: &[
             Key::number("along_columns_deg", "Tilt along the columns; positive presses higher ones.", -45.0, 45.0, 5.0),
             Key::number("along_rows_deg", "Tilt along the rows.", -45.0, 45.0, 0.0),
@@ -161,7 +161,7 @@ pub const EFFECTS: &[Description] = &[
         about: "A ball instead of the plane.",
         equations: &["h = -(R - sqrt(R^2 - r^2)); nothing beyond R"],
         state: "none",
-        reference: "the compression of Park, Kim, Hirai 2003, eq. 13, with the surface's height added: dL = sqrt(a^2 - r^2) - (a - d) + h; Hertz compares with a radius 1 / (1/a + 1/R)",
+        reference: "as `tilted_plane`; Hertz compares with a radius 1 / (1/a + 1/R)",
         keys: &[Key::number("curvature_per_mm", "1 / R; 0 is a plane.", 0.0, 1.0, 0.05)],
         zero: &[("curvature_per_mm", 0.0)],
         build: |build: &Build| {
@@ -174,7 +174,7 @@ pub const EFFECTS: &[Description] = &[
         about: "A cylinder instead of the plane, at any angle.",
         equations: &["h = -(R - sqrt(R^2 - s^2)), s the distance from the axis; nothing beyond R"],
         state: "none",
-        reference: "the compression of Park, Kim, Hirai 2003, eq. 13, with the surface's height added: dL = sqrt(a^2 - r^2) - (a - d) + h",
+        reference: "as `tilted_plane`",
         keys: &[
             Key::number("curvature_per_mm", "1 / R; 0 is a plane.", 0.0, 1.0, 0.1),
             Key::number("axis_deg", "Angle from the columns to the axis.", -180.0, 180.0, 90.0),
@@ -194,7 +194,7 @@ pub const EFFECTS: &[Description] = &[
         about: "A plane that ends at an edge.",
         equations: &["h = 0 where x cos(t) + y sin(t) <= offset_mm, else nothing touches"],
         state: "none",
-        reference: "the compression of Park, Kim, Hirai 2003, eq. 13, with the surface's height added: dL = sqrt(a^2 - r^2) - (a - d) + h",
+        reference: "as `tilted_plane`",
         keys: &[
             Key::number("offset_mm", "Distance from the centre of the contact to the edge.", -20.0, 20.0, 0.0),
             Key::number("towards_deg", "Direction: 0 along the columns, 90 along the rows.", -180.0, 180.0, 0.0),
@@ -210,14 +210,14 @@ pub const EFFECTS: &[Description] = &[
     },
     Description {
         name: "relaxation",
-        about: "Relaxation of the soft tip: it loses a share of its force while it is held.",
+        about: "Relaxation: the soft tip loses a share of a held force.",
         equations: &[
             "F = F_e - share q, at least 0;  tau_s dq/dt = F_e - q  (quasi-linear, one term)",
             "over a step: q goes to F_e exponentially, half a step before and half a step after the motion",
-            "where F_e < share q the tip has not recovered its shape and does not touch; then tau_s dq/dt = (share - 1) q",
+            "F_e < share q: the tip has not recovered and does not touch; then tau_s dq/dt = (share - 1) q",
         ],
         state: "relaxed force, N",
-        reference: "Fung, Biomechanics, 1993, 7.6; Park, Kim, Hirai 2003 leave it out; in fixed point it is paper::Relaxation",
+        reference: "Fung, Biomechanics, 1993, 7.6; not in Park, Kim, Hirai 2003; in fixed point: paper::Relaxation",
         keys: &[
             Key::number("share", "Share of the force that is lost in the end.", 0.0, 0.95, 0.15),
             Key::number("tau_s", "Time constant.", 0.0001, 10000.0, 0.5),
@@ -261,10 +261,10 @@ pub const EFFECTS: &[Description] = &[
         name: "tangential",
         about: "Friction along the surface: the patch is elastic, sticks, and slips.",
         equations: &[
-            "T = n_per_mm s + damping_n_s_per_mm ds/dt, s the displacement of the object against the tip since they stick",
-            "it slips where T > still N; while it slips T = slipping N, and it sticks again once the motion reverses",
+            "T = n_per_mm s + damping_n_s_per_mm ds/dt, s the displacement of object against tip since they stick",
+            "it slips if T > still N; then T = slipping N until the motion reverses and it sticks again",
             "the patch's centre on the array moves by s",
-            "both coefficients times 1 + spread_percent / 100 g, g normal within 3 deviations, drawn once",
+            "both coefficients times 1 + g spread_percent / 100, g normal within 3 deviations, drawn once",
         ],
         state: "stretch of the patch, distance slipped (mm), and direction of the slip",
         reference: "Coulomb friction behind a spring (Dahl; Mindlin's full stick): friction coefficient 0.5 to 1 for silicone on skin-like surfaces",

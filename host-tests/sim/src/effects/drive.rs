@@ -200,7 +200,7 @@ pub const EFFECTS: &[Description] = &[
             "J = J_rotor + gear_g_cm2 + finger_g (r / n)^2, r / n the travel of the tip per angle of the shaft",
         ],
         state: "none",
-        reference: "docs/runs.md: 30 g at the tip are 3 % of the rotor's inertia; none is published for the gear",
+        reference: "docs/runs.md: 30 g at the tip are 3 % of the rotor's inertia; the gear's is not published",
         keys: &[
             Key::number("gear_g_cm2", "Inertia of the gear at the shaft of the motor.", 0.0, 100.0, 0.05),
             Key::number("finger_g", "Mass that moves with the tip.", 0.0, 1000.0, 30.0),
@@ -234,7 +234,7 @@ pub const EFFECTS: &[Description] = &[
         equations: &[
             "C dT/dt = i^2 R(T) - (T - ambient_c) / R_th,  C R_th = tau_s",
             "R(T) = R (1 + 0.0039 (T - 25)),  k(T) = k (1 + magnet_per_k (T - 25))",
-            "over a step with its mean square current T approaches its end exponentially, exact at constant current",
+            "in a step T approaches its end exponentially, exact at constant current",
         ],
         state: "temperature of the winding, degC",
         reference: "copper 0.39 %/K (IEC 60034-1); FAULHABER data sheet 1331 ... SR, thermal resistance winding to ambient 20 + 26 K/W",
@@ -293,11 +293,11 @@ pub const EFFECTS: &[Description] = &[
     },
     Description {
         name: "stribeck",
-        about: "Friction that is higher at low speed, so that a start of the motion is a jump.",
+        about: "Friction that is higher at low speed, so the motion starts with a jump.",
         equations: &[
             "T = -sign(w) torque_mnm / (1 + (w / speed)^2), added to other friction",
             "at rest it holds up to torque_mnm more",
-            "the speed is that of the middle of the step, predicted from the step before",
+            "w is the speed in the middle of the step, predicted from the step before",
         ],
         state: "none",
         reference: "the Lorentzian form after Hess and Soom, J. Tribology 112 (1990); here without an exponential",
@@ -334,7 +334,7 @@ pub const EFFECTS: &[Description] = &[
         about: "Loss of a share of the torque in the gear.",
         equations: &[
             "T_f = (1 / efficiency - 1) T, T the tip's load at the shaft; it takes the sign of the motion and holds at rest",
-            "pressing, the share efficiency of the torque arrives; pushed back, the motor receives T (2 - 1 / efficiency)",
+            "pressing, the load gets the share efficiency; pushed back, the motor receives T (2 - 1 / efficiency)",
         ],
         state: "none",
         reference: "docs/runs.md: FAULHABER 14/1 at 43:1, 70 %, github.com/ekrimsk/MGDB",
@@ -347,10 +347,10 @@ pub const EFFECTS: &[Description] = &[
     },
     Description {
         name: "cogging",
-        about: "Attraction between magnet and teeth of the rotor: a torque that changes with the angle and stores energy.",
+        about: "Attraction between magnet and rotor teeth: a torque that depends on the angle and stores energy.",
         equations: &[
             "E = torque_mnm / N (1 - cos(N a)),  T = -dE/da = -torque_mnm sin(N a)",
-            "over a step: the mean torque is the difference in E over the angle a_1 - a_0, torque_mnm sin(N a_mean) sin(h) / h, h = N (a_1 - a_0) / 2",
+            "mean over a step: torque_mnm sin(N a_mean) sin(h) / h, h = N (a_1 - a_0) / 2, the difference in E over the angle",
         ],
         state: "none",
         reference: "ironless motors such as the reference have none; a few percent of the stall torque in slotted ones",
@@ -371,11 +371,11 @@ pub const EFFECTS: &[Description] = &[
         about: "Play of the gear: the tip does not move between its flanks.",
         equations: &[
             "flank <= tip <= flank + play_um, flank the motor's angle times r / n",
-            "pressed, the tip rests on the pressing flank; where the flank retreats from a contact the tip stays at the surface of the object, then follows play_um behind",
+            "pressed, the tip rests on the pressing flank; if the flank retreats, the tip stays at the object's surface, then follows play_um behind",
             "the tip has no mass between the flanks, and starts on the pressing flank",
         ],
         state: "place of the tip, mm",
-        reference: "the play operator; FAULHABER 14/1: at most 3 degrees without load at the output, which are 0.6 mm on a drum of 12 mm radius",
+        reference: "the play operator; FAULHABER 14/1: at most 3 degrees at the output without load, 0.6 mm on a drum of 12 mm radius",
         keys: &[Key::number("play_um", "Play at the tip.", 0.0, 10000.0, 100.0)],
         zero: &[("play_um", 0.0)],
         build: |build: &Build| {

@@ -63,7 +63,7 @@ pub const EFFECTS: &[Description] = &[
             "within one: code' = code + amplitude_codes u, u uniform in -1 to 1, drawn for each conversion",
         ],
         state: "begin and end of bursts, random numbers (8 bytes)",
-        reference: "the bursts of IEC 61000-4-4 as a conversion sees them: repeated, short, of any sign",
+        reference: "bursts of IEC 61000-4-4 as a conversion sees them: repeated, short, of any sign",
         keys: &[
             Key::number("rate_per_s", "Bursts in a second, on average.", 0.0, 10_000.0, 10.0),
             Key::number("length_us", "Duration of each.", 1.0, 1e6, 300.0),
@@ -94,7 +94,7 @@ pub const EFFECTS: &[Description] = &[
         about: "Delays of the packets of the host. Packets do not overtake one another.",
         equations: &["uniform: late by delay_ms u, u in 0 to 1", "normal: late by delay_ms |g|, g normal"],
         state: "random numbers (8 bytes)",
-        reference: "wake-up latency of a host without a real-time kernel, 0.1 to 10 ms; USB serial adapters add up to 16 ms",
+        reference: "wake-up of a host without a real-time kernel, 0.1 to 10 ms; USB serial adapters add up to 16 ms",
         keys: &[
             Key::number("delay_ms", "Largest delay (uniform) or its deviation (normal).", 0.0, 1000.0, 2.0),
             Key {
@@ -116,7 +116,7 @@ pub const EFFECTS: &[Description] = &[
     },
     Description {
         name: "lost_packets",
-        about: "Lost packets of the host. Their contents arrive with the next repetition (period_ms of [host]).",
+        about: "Lost packets of the host. The next repetition (period_ms of [host]) replaces them.",
         equations: &["each packet is lost with the probability lost_percent / 100, independent of the others"],
         state: "random numbers (8 bytes)",
         reference: "a Bernoulli channel",
@@ -130,7 +130,7 @@ pub const EFFECTS: &[Description] = &[
     },
     Description {
         name: "corrupted_packets",
-        about: "Bit errors on the bus. The CRC of the firmware rejects the packet, and the next repetition (period_ms of [host]) replaces it.",
+        about: "Bit errors on the bus. The firmware's CRC rejects the packet; the next repetition (period_ms of [host]) replaces it.",
         equations: &[
             "each of the 128 bits of a packet flips with the probability bit_error_ppm 10^-6: a share 1 - (1 - p)^128 is hit",
             "the packet counts if the CRC-16 of the firmware accepts it",

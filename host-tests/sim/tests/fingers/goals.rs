@@ -10,8 +10,8 @@ use fingertip::params::Params;
 use fingertip::state::{Fault, Mode};
 use sim::cores;
 
-/// Time within which a goal of 0 releases an object of this compliance. In a very soft object the tip has several times
-/// the distance to go.
+/// Time within which a goal of 0 releases an object of this compliance. In a very soft object the tip must
+/// travel several times as far.
 fn release_s(yield_mm_per_n: f64) -> f64 {
     if yield_mm_per_n > 1.0 { 0.8 } else { 0.5 }
 }

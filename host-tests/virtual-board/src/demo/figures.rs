@@ -10,9 +10,9 @@ use serde::Serialize;
 use sim::demo::{Check, Forces, Run};
 use sim::watch::Summary;
 
-/// An answer takes at most this long.
+/// Longest wait for an answer, ns.
 const WAIT_NS: u64 = 20_000_000;
-/// The line is quiet this long after the last request.
+/// Pause of the line after the last request, ms.
 const QUIET_MS: u64 = 2;
 
 /// Counts of the board at an instant.

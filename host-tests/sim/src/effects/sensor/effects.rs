@@ -87,7 +87,7 @@ pub const EFFECTS: &[Description] = &[
     },
     Description {
         name: "temperature_drift",
-        about: "Warming of the array from the start of the scene, with drift of gain and zero.",
+        about: "Warming of the array from time 0 on, with drift of gain and zero.",
         equations: &[
             "T = warming_k (1 - exp(-t / time_constant_s)), t from the start, 0 before it",
             "the microcontroller shows 25 + chip_share * warming_k (1 - exp(-t / chip_time_constant_s))",
@@ -165,14 +165,14 @@ pub const EFFECTS: &[Description] = &[
     },
     Description {
         name: "ghosting",
-        about: "Ghosting: undriven rows and unread columns are held at the virtual ground only through a resistance.",
+        about: "Ghosting: a resistance between the virtual ground and all undriven rows and unread columns.",
         equations: &[
             "the whole network of 100 taxels, the driven row i at 1 V, every line tied to ground by h = 1 / hold_ohm",
             "rows eliminated: A = diag(h + sum over k of G_kc) - sum over k != i of G_k G_k^T / (h + sum over c of G_kc), b = G_i",
             "the short-circuit current of the read column is the conductance seen: (A^-1 b)_j / (A^-1)_jj",
             "hold_ohm = 0: G_ij; floating lines and equal taxels: G M N / (M + N - 1), a resistance of 0.19 R for 10 x 10",
         ],
-        state: "none; other rows count as of their last sample, at most a frame ago",
+        state: "none; other rows have the values of their last sample, at most a frame ago",
         reference: "D'Alessio, Measurement errors in the scanning of piezoresistive sensors arrays, Sensors and Actuators A 72 (1999)",
         keys: &[Key::number("hold_ohm", "Resistance to the virtual ground; 0 is perfect.", 0.0, 1e12, 1000.0)],
         zero: &[("hold_ohm", 0.0)],
@@ -203,7 +203,7 @@ pub const EFFECTS: &[Description] = &[
     },
     Description {
         name: "settling",
-        about: "Settling: at its sample a column still has a part of the slot before.",
+        about: "Settling: a sample still contains a part of the slot before.",
         equations: &[
             "dv/dt = (V - v) / tau_us, V the final voltage of the slot",
             "sampled at after_us after the edge of the slot: v = V + (v_edge - V) exp(-after_us / tau_us), exact",
@@ -259,7 +259,7 @@ pub const EFFECTS: &[Description] = &[
     },
     Description {
         name: "offset",
-        about: "Different zero levels of the taxels, and of the columns without a driven row. The tare removes them.",
+        about: "Different zero levels of taxels and of columns without a driven row. The tare removes them.",
         equations: &["code' = code + rms_codes g, g of each taxel normal, drawn once, within 3 deviations"],
         state: "none; 110 levels drawn at the start",
         reference: "docs/board.md: the preload's spread and the amplifiers' offsets",

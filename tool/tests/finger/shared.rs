@@ -7,7 +7,7 @@ use fingertip::shipped::address;
 use fingertip_cli::Client;
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, Output, Stdio};
 
 /// Time that a client of the broker waits by its `--timeout-ms`.
 const TIMEOUT: &str = "3000";
@@ -40,9 +40,8 @@ impl Shared {
 
     /// A client in a process of its own.
     fn start(&self, arguments: &[&str]) -> Child {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_fingertip"));
-        command.env("FINGERTIP_PORT", format!("tcp:{}", self.address)).args(arguments);
-        command.args(["--timeout-ms", "600000"]).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut command = self.finger.fingertip(arguments);
+        command.env("FINGERTIP_PORT", format!("tcp:{}", self.address)).stdout(Stdio::piped()).stderr(Stdio::piped());
         command.spawn().expect("it starts")
     }
 

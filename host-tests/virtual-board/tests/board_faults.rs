@@ -1,8 +1,8 @@
 //! Defects of the microcontroller: what the rig injects is what it says, and what the image makes of it.
 
 use crate::common::{
-    PING, WAIT_NS, away, frames, on_bus, poke, read_u8, reboot, register, resets_since, restart, run_checks, running,
-    tare_and_hold, write_and_run_ms, write_u8, write_u32,
+    Check, PING, WAIT_NS, away, frames, on_bus, poke, read_u8, reboot, register, resets_since, restart, run_checks,
+    running, tare_and_hold, write_and_run_ms, write_u8, write_u32,
 };
 use crate::injected_faults::{TWO_FRAMES_US, until_off_us};
 use fingertip::shipped::address;
@@ -13,7 +13,7 @@ use virtual_board::{Fault, Options, Rig};
 #[test]
 fn a_defect_of_the_microcontroller_ends_without_torque() {
     let mut rig = running(&away(0.5), &Options::confirmed());
-    let checks: [(&str, fn(&mut Rig)); 10] = [
+    let checks: [Check; 10] = [
         ("the brown-out level", a_part_as_the_factory_left_it_refuses_torque_until_its_brown_out_level_is_programmed),
         ("stored parameters", what_is_stored_survives_a_reboot),
         ("the encoder's edges", the_timer_counts_every_edge_of_the_encoder_also_when_it_turns_impossibly_fast),

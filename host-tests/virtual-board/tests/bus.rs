@@ -1,8 +1,8 @@
 //! What ROBOTIS' own drivers expect of the bus, from the flash image: time, recovery, goals that end with torque.
 
 use crate::common::{
-    PING, WAIT_NS, force_n, hold_again, holding, let_go, on_bus, read_u8, read_u32, run_checks, write_and_run_ms,
-    write_u8,
+    Check, PING, WAIT_NS, force_n, hold_again, holding, let_go, on_bus, read_u8, read_u32, run_checks,
+    write_and_run_ms, write_u8,
 };
 use fingertip::link::Reply;
 use fingertip::link::packet::{CRC_START, Sender, update_crc};
@@ -15,7 +15,7 @@ use virtual_board::{Options, Rig};
 #[test]
 fn a_host_finds_what_it_expects_on_the_bus_of_a_board_that_holds_1_n() {
     let mut rig = holding(&Options::confirmed());
-    let checks: [(&str, fn(&mut Rig)); 7] = [
+    let checks: [Check; 7] = [
         ("the frames' times", frames_have_true_times),
         ("a fast bulk read", fast_bulk_read_is_answered_in_one_packet),
         ("the line's direction", the_line_is_given_back_right_after_the_last_stop_bit),

@@ -111,8 +111,11 @@ pub fn away(distance_mm: f64) -> Setup {
     setup
 }
 
-/// Runs named checks one after another on one board: to start a board costs more than most of them.
-pub fn run_checks(rig: &mut Rig, checks: &[(&str, fn(&mut Rig))]) {
+/// Name of a check, and the check.
+pub type Check = (&'static str, fn(&mut Rig));
+
+/// Runs checks one after another on one board: to start a board costs more than most of them.
+pub fn run_checks(rig: &mut Rig, checks: &[Check]) {
     for (name, check) in checks {
         println!("check: {name}");
         check(rig);

@@ -2,8 +2,8 @@
 //! it holds a requested level back, and misses no deadline.
 
 use crate::common::{
-    away, force_n, read_u8, read_u16, read_u32, register, run_checks, running, write_and_run_ms, write_goal, write_u8,
-    write_u32,
+    Check, away, force_n, read_u8, read_u16, read_u32, register, run_checks, running, write_and_run_ms, write_goal,
+    write_u8, write_u32,
 };
 use fingertip::contact::FitLevel;
 use fingertip::shipped::address;
@@ -42,7 +42,7 @@ fn said(rig: &mut Rig) -> (u8, bool, u16) {
 #[test]
 fn the_fit_level_keeps_within_its_time() {
     let mut rig = holding_over_the_edge();
-    let checks: [(&str, fn(&mut Rig)); 3] = [
+    let checks: [Check; 3] = [
         ("time", the_highest_fit_level_is_held_back_before_a_deadline_is_missed),
         ("changes", a_change_of_the_fit_level_does_not_stop_the_scan),
         ("slower frames", slower_frames_leave_room_for_the_highest_fit_level),

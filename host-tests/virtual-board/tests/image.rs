@@ -2,8 +2,8 @@
 
 use crate::bus::read;
 use crate::common::{
-    PING, WAIT_NS, away, force_n, image, read_u8, read_u16, read_u32, register, run_checks, running, write_and_run_ms,
-    write_goal, write_param, write_u8, write_u32,
+    Check, PING, WAIT_NS, away, force_n, image, read_u8, read_u16, read_u32, register, run_checks, running,
+    write_and_run_ms, write_goal, write_param, write_u8, write_u32,
 };
 use fingertip::params::Params;
 use fingertip::shipped::{Config, TAXELS, address};
@@ -16,7 +16,7 @@ use virtual_board::{Fault, Options, Rig};
 #[test]
 fn the_image_boots_scans_and_tells_how_the_board_is() {
     let mut rig = running(&away(0.5), &Options::default());
-    let checks: [(&str, fn(&mut Rig)); 11] = [
+    let checks: [Check; 11] = [
         ("the clock", its_clock_begins_at_zero_and_never_falls_back),
         ("the scan's rate", frames_arrive_at_the_scans_rate),
         ("a ping", it_answers_a_ping_at_its_baud_rate),

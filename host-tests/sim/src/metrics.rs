@@ -158,16 +158,15 @@ pub struct Verdict {
 
 /// Returns the table as Markdown.
 pub fn page() -> String {
-    let mut page =
-        String::from("| metric | what it is, and how it is worked out | of several fingers |\n| --- | --- | --- |\n");
+    let mut page = String::new();
     for Metric { name, about, of_several, .. } in METRICS {
         let several = match of_several {
-            Worst::Largest => "the largest",
-            Worst::Least => "the least",
-            Worst::Sum => "the sum",
-            Worst::FirstFault => "the first in time",
+            Worst::Largest => "",
+            Worst::Least => " (the least)",
+            Worst::Sum => " (the sum)",
+            Worst::FirstFault => " (the first in time)",
         };
-        page += &format!("| `{name}` | {about} | {several} |\n");
+        page += &format!("- `{name}`{several}: {about}\n");
     }
     page
 }

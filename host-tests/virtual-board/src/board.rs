@@ -43,16 +43,16 @@ pub struct FingerBoard {
 impl Store for FingerBoard {}
 
 impl FingerBoard {
-    /// Powered, with nothing run, with the brown-out level 3 that `cargo xtask flash` programs.
+    /// Powered, with nothing run, with bits 3:2 of the option bytes.
     ///
     /// # Errors
     /// The part's description does not fit this crate: another release of `rigless`.
-    pub fn new(front_end: Shared) -> Result<Self, Error> {
+    pub fn new(front_end: Shared, brown_out_bits: u8) -> Result<Self, Error> {
         let mut part = Part::new(front_end)?;
         part.chip.rcc.attach_crystals(HSE_HZ, 0);
         part.chip.set_supply(VDD_MV);
         let (flash, registers) = part.chip.program();
-        let loaded = optcr::BOR_LEV.set(registers.get(Register::Optcr), 0);
+        let loaded = optcr::BOR_LEV.set(registers.get(Register::Optcr), brown_out_bits.into());
         flash.keep_options(loaded, registers.get(Register::Optcr1), registers);
         Ok(Self { part })
     }

@@ -29,6 +29,9 @@ use std::thread::JoinHandle;
 pub struct Options {
     /// Addresses and bytes that memory holds beside the image, for example a parameter sector.
     pub presets: Vec<(u64, Vec<u8>)>,
+    /// Bits 3:2 of the option bytes: 0 is the brown-out level 3, as `cargo xtask flash` leaves them, and 3 is off, as
+    /// the factory does.
+    pub brown_out_bits: u8,
     /// Factory codes of the reference and of the temperature sensor.
     pub factory: Factory,
 }
@@ -44,7 +47,7 @@ impl Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { presets: Vec::new(), factory: inside::factory() }
+        Self { presets: Vec::new(), brown_out_bits: 0, factory: inside::factory() }
     }
 }
 
@@ -92,7 +95,7 @@ impl Rig {
         let image = Firmware::read(image)?;
         let images = images(&image, options)?;
         let front_end = Shared::new(world.into());
-        let board = FingerBoard::new(front_end.clone())?;
+        let board = FingerBoard::new(front_end.clone(), options.brown_out_bits)?;
         let session = Session::new(Box::new(board), 0, VirtualNanos(STEP_NS)).map_err(failure)?;
         let bench = Bench::new(front_end, &image);
         let (orders, ordered) = mpsc::channel();

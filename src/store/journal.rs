@@ -200,8 +200,9 @@ struct Whole {
 
 impl SectorContent {
     fn of(sector: &[u8]) -> Self {
-        let used = sector.as_chunks::<GRID>().0.iter().rposition(|chunk| *chunk != [BLANK; GRID]);
-        let end = used.map_or(0, |place| (place + 1) * GRID);
+        // Word by word: the start reads two sectors, and a comparison of whole chunks goes byte by byte.
+        let used = sector.as_chunks::<4>().0.iter().rposition(|word| *word != [BLANK; 4]);
+        let end = used.map_or(0, |place| (4 * place / GRID + 1) * GRID);
         let newest = (0..end / GRID).rev().map(|place| place * GRID).find_map(|start| {
             let Found { sequence, bytes, .. } = read_record(sector.get(start..)?)?;
             Some(Whole { start, end: start + bytes, sequence })

@@ -1,6 +1,6 @@
 //! Parameters, turned once into the numbers that the loop works with.
 //!
-//! This module is the only one with floating point: single precision, and only + - * /, so the host and the target
+//! Only this module computes in floating point: single precision, and only + - * /, so the host and the target
 //! agree to the bit. `docs/control.md` gives the formulas and their reasons.
 
 pub(crate) mod array;

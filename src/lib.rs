@@ -3,8 +3,8 @@
 //! # Reading on
 //!
 //! Each module uses only those declared before it. [`pipeline`] begins with the path of a frame, stage by stage, from
-//! the converter's codes to the bridge. After configuration, floating point is used only for the first estimate of a
-//! square root, which [`arith::floor_sqrt`] then corrects in integers.
+//! the converter's codes to the bridge. After configuration, floating point only estimates square roots: the speed
+//! profile takes one as the FPU gives it, all others are corrected in integers.
 #![no_std]
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]

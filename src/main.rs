@@ -25,7 +25,7 @@ use fingertip::state::Fault;
 use fingertip::store::{Remark, settle};
 use static_cell::StaticCell;
 
-/// Runs control above everything but the scan and the guard.
+/// Runs control above everything but the scan, the guard and the bus's line.
 static CONTROL: InterruptExecutor = InterruptExecutor::new();
 
 static PIPELINE: StaticCell<Pipeline> = StaticCell::new();

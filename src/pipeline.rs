@@ -3,7 +3,7 @@
 //! | stage | file | from | to |
 //! | --- | --- | --- | --- |
 //! | fit level | `pipeline/budget.rs` | time of the last answer | rows of the fit in this frame |
-//! | motion | `control/observer.rs` | encoder count, last g V (Q8 mm/s^2) | travel (Q24 mm), speed (Q16 mm/s), disturbance (Q8 mm/s^2) |
+//! | motion | `control/observer.rs` | encoder count, last g V - c v (Q8 mm/s^2) | travel (Q24 mm), speed (Q16 mm/s), disturbance (Q8 mm/s^2) |
 //! | array | `pressure.rs`, by the pass of `lanes/src/rows.rs` | codes | sixteenths of a code above the tare, their sum and moments, flags |
 //! | contact | `contact.rs`, `contact/fit.rs` | sums; a row of taxels | force (Q16 N), centre (Q24 mm), uncertainty |
 //! | requests | `pipeline/requests.rs` | the command | tare, clear, another activity |
@@ -100,7 +100,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
 
     /// Computes the duty from a frame. Infallible: accepts any frame, any sense and any command. The status is lent:
     /// to copy it takes as long as the speed law.
-    // One function in the image: each function that it calls has one caller and is inlined into it.
+    // One function in the image: what it calls is inlined, but for what few frames need.
     #[inline(never)]
     pub fn step(&mut self, frame: &Frame<ROWS, COLUMNS>, sense: &Sense, command: &Command) -> (Duty, &Status) {
         let mut limits = self.count_frames(frame.sequence);

@@ -250,7 +250,7 @@ impl Touch {
         self.shown
     }
 
-    /// Distance of the tip in front of the surface.
+    /// Distance of the tip beyond the surface, into the object.
     pub fn deep(&self, travel: Millimetres) -> Millimetres {
         Millimetres(travel.0.saturating_sub(self.surface.0))
     }

@@ -1,4 +1,4 @@
-//! The control task: one turn a frame, on an executor that only the guard and the scan interrupt.
+//! The control task: one turn a frame, on an executor that only the guard, the scan and the bus interrupt.
 //!
 //! Nothing here waits, allocates, logs or holds a lock for longer than a copy of a snapshot.
 //! A capture's start, a new configuration, new gains and a save take longer than a frame: the scan stops for them and
@@ -24,7 +24,7 @@ use super::scan::{Completed, Scan, WAKE};
 use super::watchdog::Watchdogs;
 use super::{health, trace};
 
-/// The first frame may come this many frame times after the start, before the guard trips.
+/// The guard waits this many times as long for the first frame of a start as for a later one.
 const FRAMES_TO_START: u32 = 4;
 
 /// Everything that control owns.

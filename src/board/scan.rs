@@ -1,8 +1,8 @@
 //! The scan: rows, conversions and memory are moved by timers and DMA alone; see "Scan" in `docs/board.md`.
 //!
-//! The processor sees one interrupt a frame, from the second bank's stream. It counts the frame, notes the instant and
-//! wakes the control task. Another, from the rows' stream when half of them are driven, wakes it for a check of the
-//! partial frame. The two halves of the buffers take turns, so the lowest bit of the sequence number names the half.
+//! The processor sees two interrupts a frame. That of the second bank's stream counts the frame, notes the instant and
+//! wakes the control task. That of the rows' stream, when half of them are driven, wakes it for a check of the partial
+//! frame. The two halves of the buffers take turns, so the lowest bit of the sequence number names the half.
 
 use core::sync::atomic::{AtomicBool, AtomicU16, AtomicU32, Ordering, fence};
 

@@ -59,16 +59,16 @@ impl<const ROWS: usize, const COLUMNS: usize> Budget<ROWS, COLUMNS> {
     }
 
     const MODEL_CYCLES: [[u32; 2]; FitLevel::ALL.len()] = {
-        let mut ticks = [[0; 2]; FitLevel::ALL.len()];
+        let mut cycles = [[0; 2]; FitLevel::ALL.len()];
         let mut fit_level = 0;
-        while fit_level < ticks.len() {
-            ticks[fit_level] = Self::ticks(FitLevel::ALL[fit_level]);
+        while fit_level < cycles.len() {
+            cycles[fit_level] = Self::cycles(FitLevel::ALL[fit_level]);
             fit_level += 1;
         }
-        ticks
+        cycles
     };
 
-    const fn ticks(fit_level: FitLevel) -> [u32; 2] {
+    const fn cycles(fit_level: FitLevel) -> [u32; 2] {
         let rows = fit_level.rows(ROWS);
         if rows == 0 {
             return [0, 0];

@@ -295,7 +295,7 @@ impl Guard {
     /// Compares the encoder with the model, and returns a fault once they have disagreed for a while.
     #[inline(always)]
     fn disagreement(&mut self, seen: &Seen, config: &Config) -> Option<Fault> {
-        // A quarter of the force's effect is left to its errors.
+        // The force's error may have a quarter of the force's effect: `>> 18` below.
         let force = self.force.max(seen.force.to_bits());
         let expected = self.late_change.saturating_abs();
         if expected < config.bounds.change_least {

@@ -158,8 +158,8 @@ control_table! {
     340 LIMIT_ERRORS: U16 ReadOnly, |view, _| view.refused(StatusError::Limit);
     /// Refused with the access error.
     342 ACCESS_ERRORS: U16 ReadOnly, |view, _| view.refused(StatusError::Access);
-    /// Bytes that were no complete packet. Like all error
-    /// counters it stops at its maximum and is 0 after a reset.
+    /// Runs of bytes that were no complete packet. Like all
+    /// error counters it stops at its maximum and is 0 after a reset.
     344 FRAMING_ERRORS: U16 ReadOnly, |view, _| view.state.counters.framing.into();
     /// Valid packets for this device, with broadcasts; wraps.
     346 GOOD_PACKETS: U32 ReadOnly, |view, _| view.state.counters.good_packets;

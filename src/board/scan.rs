@@ -116,11 +116,11 @@ impl Scan {
     /// DMA wrote to this half meanwhile.
     pub fn copy(&mut self, completed: Completed, frame: &mut Frame) -> bool {
         let half = completed.sequence as usize & 1;
-        let arrived = bank_a_completed(half) && !overrun() && in_step();
+        let arrived = bank_a_completed(half) && !overrun();
         copy_slots(half, SLOTS, frame);
         frame.sequence = completed.sequence;
         let untouched = [STREAM_A, STREAM_B].into_iter().all(|stream| written_half(stream) != half);
-        // Twice: for the last part of a slot, banks that are one slot behind seem to be in step.
+        // Checked last: banks that are behind the rows stay behind.
         let whole = arrived && untouched && in_step() && newest() == completed;
         if !whole {
             health::note_broken(what_broke(half));

@@ -241,7 +241,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Head<ROWS, COLUMNS> {
         self.words(&mut |word| rest.next().into_iter().for_each(|to| *to = word.to_le_bytes()));
     }
 
-    /// Passes every word of the head on.
+    /// Calls `each` with every word of the head, in order.
     #[inline(never)]
     fn words(&self, each: &mut dyn FnMut(u32)) {
         let [magic, shape] = [MAGIC, [ROWS as u8, COLUMNS as u8, self.ended as u8, 0]].map(u32::from_le_bytes);

@@ -187,7 +187,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         if !self.activity.fits() {
             self.fit.lose();
         }
-        self.budget.note(fits && self.fit.at_work() || matches!(self.activity, Activity::Tare { .. }));
+        // A tare takes its own time, without the model.
+        let tares = matches!(self.activity, Activity::Tare { .. });
+        self.budget.note((!tares).then_some(fits && self.fit.at_work()));
         contact
     }
 

@@ -49,7 +49,7 @@ impl Loop {
             self.taken +=
                 (least + (((most - least) * with.model_q8) >> 8)) * (REFINEMENT - 1 - self.turn) / (REFINEMENT - 1);
         }
-        self.budget.note(with.contact && most > 0);
+        self.budget.note(Some(with.contact && most > 0));
         (fit_level, self.taken)
     }
 }
@@ -198,7 +198,7 @@ fn it_falls_at_once_where_the_dearest_frame_would_not_fit() {
     for fit_level in [FitLevel::OneRow, FitLevel::TwoRows, FitLevel::FiveRows, FitLevel::AllRows] {
         for (modelled, longest) in [(false, USABLE - most(fit_level)), (true, USABLE)] {
             let mut budget = at(fit_level);
-            budget.note(modelled);
+            budget.note(Some(modelled));
             assert_eq!(next(&mut budget, fit_level, longest), fit_level);
             assert_eq!(next(&mut budget, fit_level, longest + 1), fit_level.lower(), "{fit_level:?}");
         }
@@ -225,7 +225,7 @@ fn with_a_contact_the_models_least_is_taken_off() {
     let longest = USABLE - ROOM - most(next) + Budget::model_cycles(fit_level)[1];
     for (taken, rises) in [(longest, Some((WINDOW, next))), (longest + 1, None)] {
         let mut budget = at(fit_level);
-        budget.note(true);
+        budget.note(Some(true));
         assert_eq!(frames_to_change(&mut budget, FitLevel::AllRows, taken, 20 * WINDOW), rises, "{taken}");
     }
 }
@@ -269,10 +269,10 @@ fn a_contact_that_comes_or_goes_begins_the_window_anew() {
         let mut budget = at(FitLevel::OneRow);
         for _ in 0..before {
             assert_eq!(budget.next(FitLevel::AllRows, CoreCycles(2_000), CoreCycles(TICKS)), FitLevel::OneRow);
-            budget.note(false);
+            budget.note(Some(false));
         }
-        budget.note(true);
-        budget.note(true);
+        budget.note(Some(true));
+        budget.note(Some(true));
         let rises = frames_to_change(&mut budget, FitLevel::AllRows, 2_000, 3 * WINDOW);
         assert_eq!(rises, Some((WINDOW, FitLevel::TwoRows)), "after {before}");
     }
@@ -302,4 +302,17 @@ fn there_is_no_fall_below_the_sum() {
     // The window that they were in, and the next.
     let rises = frames_to_change(&mut budget, FitLevel::AllRows, 10, 10 * WINDOW);
     assert_eq!(rises, Some((2 * WINDOW - 10, FitLevel::Moments)));
+}
+
+#[test]
+fn the_time_of_a_tare_is_not_weighed() {
+    let mut budget = at(FitLevel::OneRow);
+    let mut next = |modelled| {
+        budget.note(modelled);
+        budget.next(FitLevel::OneRow, CoreCycles(TICKS), CoreCycles(TICKS))
+    };
+    for _ in 0..3 * WINDOW {
+        assert_eq!(next(None), FitLevel::OneRow);
+    }
+    assert!(next(Some(true)) < FitLevel::OneRow, "a frame that is weighed");
 }

@@ -367,7 +367,7 @@ fn another_parameter_or_a_step_that_answers_otherwise_is_found_where_it_is() {
         replayed.difference.expect("a difference")
     };
     let mut bytes = Recorded::<BYTES>::pressed().capture.data().to_vec();
-    // A parameter whose effect comes late.
+    // The modulus changes no result before a contact, but the digest starts from all parameters.
     let place = Params::RANGES.iter().position(|(name, ..)| *name == "modulus_pa").expect("a parameter");
     bytes[72 + 4 * place] ^= 1;
     let found = difference(&bytes);

@@ -80,7 +80,7 @@ pub fn holding(goal_mn: i32) -> Bench {
 
 /// Several frames of a bench.
 pub trait InFrames {
-    /// Steps these frames. Returns the status after the last one.
+    /// Runs `count` frames. Returns the status after the last one.
     fn frames(&mut self, count: u32) -> Status;
 
     /// Sets a goal and steps for a time. Returns the largest true force, N.

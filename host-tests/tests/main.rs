@@ -1,5 +1,5 @@
-//! Tests of the core as one program: it is linked once, and both cores of this machine have work until the end. One
-//! file of them: `cargo test -p host-tests --test all winding::`.
+//! Tests of the core. All files are linked into one program, so its threads have work until the end. To run one file:
+//! `cargo test -p host-tests --test all winding::`.
 
 mod bad_input;
 mod baseline_touched;

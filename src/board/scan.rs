@@ -57,9 +57,19 @@ pub fn newest() -> Completed {
     }
 }
 
-/// Returns true if half of the rows were driven since the last call.
+/// Returns true if half of the rows were driven since the last call. While control runs, the interrupt waits and its flag
+/// shows it.
 pub fn take_halfway() -> bool {
-    HALFWAY.swap(false, Ordering::AcqRel)
+    take_halfway_flag() || HALFWAY.swap(false, Ordering::AcqRel)
+}
+
+/// Takes the flag of the rows' stream.
+fn take_halfway_flag() -> bool {
+    let set = pac::DMA2.isr(0).read().htif(STREAM_ROWS);
+    if set {
+        pac::DMA2.ifcr(0).write(|w| w.set_htif(STREAM_ROWS, true));
+    }
+    set
 }
 
 /// The scan's hardware.
@@ -116,11 +126,11 @@ impl Scan {
     /// DMA wrote to this half meanwhile.
     pub fn copy(&mut self, completed: Completed, frame: &mut Frame) -> bool {
         let half = completed.sequence as usize & 1;
-        let arrived = bank_a_completed(half) && !overrun();
+        let arrived = bank_a_completed(half) && !overrun() && in_step();
         copy_slots(half, SLOTS, frame);
         frame.sequence = completed.sequence;
         let untouched = [STREAM_A, STREAM_B].into_iter().all(|stream| written_half(stream) != half);
-        // Checked last: banks that are behind the rows stay behind.
+        // Twice: for the last part of a slot, banks that are one slot behind seem to be in step.
         let whole = arrived && untouched && in_step() && newest() == completed;
         if !whole {
             health::note_broken(what_broke(half));
@@ -176,9 +186,11 @@ fn copy_slots(half: usize, slots: usize, frame: &mut Frame) {
 
 #[embassy_stm32::interrupt]
 fn DMA2_STREAM1() {
-    pac::DMA2.ifcr(0).write(|w| w.set_htif(STREAM_ROWS, true));
-    HALFWAY.store(true, Ordering::Release);
-    WAKE.signal(());
+    // Control may have taken it already.
+    if take_halfway_flag() {
+        HALFWAY.store(true, Ordering::Release);
+        WAKE.signal(());
+    }
 }
 
 #[embassy_stm32::interrupt]
@@ -360,13 +372,12 @@ fn written_half(stream: usize) -> usize {
 /// While slot n of a frame is set, each bank has completed n slots of this frame, or n + 1. A lost trigger leaves the
 /// banks behind the rows permanently; only a restart of the scan aligns them again.
 fn in_step() -> bool {
-    let slots = SLOTS as u16;
-    // The count falls from `slots` to 1; twice that keeps the difference above 0.
-    let current = (2 * slots - pac::DMA2.st(STREAM_ROWS).ndtr().read().ndt() - 1) % slots;
-    [STREAM_A, STREAM_B].into_iter().all(|stream| {
-        let completed = stored(stream) / BANK_COLUMNS as u16 % slots;
-        completed == current || completed == (current + 1) % slots
-    })
+    // The rows' count falls from the number of slots to 1. Its double keeps the differences above 0.
+    let slots_before = 2 * SLOTS as u16 - 1 - pac::DMA2.st(STREAM_ROWS).ndtr().read().ndt();
+    let codes_before = slots_before * BANK_COLUMNS as u16;
+    [STREAM_A, STREAM_B]
+        .into_iter()
+        .all(|stream| (stored(stream) + BUFFER_LEN - codes_before) % HALF_LEN < 2 * BANK_COLUMNS as u16)
 }
 
 /// Returns true if the first bank's stream, which does not interrupt, has completed this half too.

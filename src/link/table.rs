@@ -107,7 +107,7 @@ pub(super) struct Staged<'a, const ROWS: usize, const COLUMNS: usize> {
     pub settings: Settings<ROWS, COLUMNS>,
     pub actions: Actions,
     pub snapshot: &'a Snapshot<'a, ROWS, COLUMNS>,
-    /// The board's.
+    /// Clocks of the board, which bound some parameters.
     pub clocks: &'static Clocks,
 }
 

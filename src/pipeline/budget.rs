@@ -20,8 +20,8 @@ pub struct Budget<const ROWS: usize, const COLUMNS: usize> {
     fit_level: FitLevel,
     /// Last requested fit level, and last deadline in cycles.
     asked: (FitLevel, u32),
-    /// True if the model was used in the frame whose time comes next.
-    modelled: bool,
+    /// True if the model was used in the frame whose time comes next; none if that time is not weighed.
+    modelled: Option<bool>,
     /// Longest time of a frame without the model, cycles.
     without_model: u32,
     /// Longest time of this window's frames, cycles.
@@ -38,7 +38,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Budget<ROWS, COLUMNS> {
         Self {
             fit_level: FitLevel::Sum,
             asked: (FitLevel::Sum, 0),
-            modelled: false,
+            modelled: Some(false),
             without_model: 0,
             longest: 0,
             frames: 0,
@@ -106,8 +106,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Budget<ROWS, COLUMNS> {
         self.fit_level
     }
 
-    /// Takes note if the present frame used the model, or is of a mode that never does: either takes no longer with it.
-    pub fn note(&mut self, modelled: bool) {
+    /// Takes note if the present frame used the model; none for a frame whose time shows nothing about those in which
+    /// the model may be used.
+    pub fn note(&mut self, modelled: Option<bool>) {
         if modelled != self.modelled {
             self.modelled = modelled;
             self.restart();
@@ -115,9 +116,10 @@ impl<const ROWS: usize, const COLUMNS: usize> Budget<ROWS, COLUMNS> {
     }
 
     fn weigh(&mut self, taken: u32, usable: u32) {
+        let Some(modelled) = self.modelled else { return };
         let [most, least] = Self::model_cycles(self.fit_level);
         let (expected, surely) =
-            if self.modelled { (taken, taken.saturating_sub(most)) } else { (taken.saturating_add(most), taken) };
+            if modelled { (taken, taken.saturating_sub(most)) } else { (taken.saturating_add(most), taken) };
         self.without_model = self.without_model.max(surely);
         if expected > usable && self.fit_level > FitLevel::Sum {
             self.wait = self.wait_next;
@@ -130,7 +132,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Budget<ROWS, COLUMNS> {
             return;
         }
         // The longest frame of a window took at least this for the model.
-        self.without_model = if self.modelled { self.longest.saturating_sub(least) } else { self.longest };
+        self.without_model = if modelled { self.longest.saturating_sub(least) } else { self.longest };
         self.restart();
         self.wait = self.wait.saturating_sub(1);
         // A rise needs slightly more time than staying, so that a small variation does not undo it.

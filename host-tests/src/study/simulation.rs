@@ -12,7 +12,7 @@ use std::time::Instant;
 
 /// Steps, us; each is a divisor of [`SAMPLE_US`].
 const STEPS_US: [f64; 7] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0];
-/// The reference's.
+/// Step of the reference run, us.
 const FINEST_US: f64 = 0.1;
 const SAMPLE_US: f64 = 100.0;
 /// Instants that are compared: the tip runs into the wall, is held, is driven off.

@@ -230,10 +230,11 @@ impl Device for Converter {
                 return;
             }
             front_end.counts.triggers += 1;
+            let missed = std::mem::take(&mut front_end.trigger_missed);
             drop(front_end);
             self.triggered(None, registers, context);
             if self.nth == 0 {
-                for other in [ADC2, ADC3] {
+                for other in [ADC2, ADC3].into_iter().skip(missed.into()) {
                     context.write_to(other.base + u64::from(Register::Dr.spec().offset), Width::W32, 0, 0);
                 }
             }

@@ -26,6 +26,8 @@ const NOWHERE: u64 = 0xd000_0000;
 pub enum Fault {
     /// The timer's trigger no longer reaches the converters.
     ConvertersStall,
+    /// The second bank's converter misses the next trigger, so its codes lag behind the rows by a slot.
+    TriggerMissed,
     /// The bridge's driver pulls nFAULT low.
     BridgeFault,
     /// The scan's interrupt never reaches the core, as if its enable were lost.
@@ -52,6 +54,7 @@ impl Fault {
     fn apply(self, defect: bool, session: &mut Session<FingerBoard>, host: &mut dyn Host, stop: Stop) {
         match self {
             Self::ConvertersStall => session.board().part.front_end().lock().trigger_cut = defect,
+            Self::TriggerMissed => session.board().part.front_end().lock().trigger_missed = defect,
             Self::ScanInterruptLost => session.board().part.front_end().lock().scan_interrupt_lost = defect,
             Self::BridgeFault => session.board_mut().part.set_bridge_well(stop.at, !defect),
             Self::CoreHangs => host.hold(defect),

@@ -95,6 +95,8 @@ pub struct FrontEnd {
     pub world: Surroundings,
     /// The trigger line between timer and converters is cut.
     pub trigger_cut: bool,
+    /// The second bank's converter misses the next trigger.
+    pub trigger_missed: bool,
     /// The interrupt of the scan's stream does not reach the core.
     pub scan_interrupt_lost: bool,
     /// Counts of the converters.
@@ -123,6 +125,7 @@ impl Shared {
             world,
             scan,
             trigger_cut: false,
+            trigger_missed: false,
             scan_interrupt_lost: false,
             counts: ScanCounts::default(),
             pin_edges: None,

@@ -2,7 +2,7 @@
 //! number on the bus.
 
 use crate::common::{
-    force_n, hold_again, holding, read_u8, refused, travel_mm, write_and_run_ms, write_goal, write_u8,
+    force_n, hold_again, holding, read_u8, read_u16, refused, travel_mm, write_and_run_ms, write_goal, write_u8,
 };
 use fingertip::params::Params;
 use fingertip::shipped::address;
@@ -101,6 +101,10 @@ fn each_fault_stops_the_motor_in_time_and_the_mended_board_goes_on() {
     break_and_time(rig, "converters stall", &[Number::LostFrames], TWO_FRAMES_US, |rig| {
         rig.inject(Fault::ConvertersStall).expect("it runs");
     });
+    break_and_time(rig, "a trigger missed by a bank", &[Number::LostFrames], TWO_FRAMES_US, |rig| {
+        rig.inject(Fault::TriggerMissed).expect("it runs");
+    });
+    assert!(read_u16(rig, address::OUT_OF_STEP) > 0);
     let of_array = [Number::ArrayBroken, Number::RowStuck];
     for state in [Row::StuckLow, Row::StuckHigh] {
         break_and_time(rig, &format!("row {state:?}"), &of_array, TWO_FRAMES_US, |rig| {

@@ -161,7 +161,7 @@ control_table! {
     /// Runs of bytes that were no complete packet. Like all
     /// error counters it stops at its maximum and is 0 after a reset.
     344 FRAMING_ERRORS: U16 ReadOnly, |view, _| view.state.counters.framing.into();
-    /// Valid packets for this device, with broadcasts; wraps.
+    /// Number of valid packets for this device, broadcasts included; wraps.
     346 GOOD_PACKETS: U32 ReadOnly, |view, _| view.state.counters.good_packets;
     /// Work per frame for the contact: 0 force by the sum, 1 centre
     /// by the moments, 2 model with one row a frame, 3 with two, 4
@@ -262,8 +262,8 @@ control_table! {
     /// Byte of the capture at which capture_data begins.
     4272 CAPTURE_OFFSET: U32 ReadWrite = 0, |view, _| view.settings().capture_offset,
         |staged, value| { staged.settings.capture_offset = value as u32; Ok(()) };
-    /// Winding temperature by the motor model, which errs upwards.
-    /// After a reset it begins as after a stop at winding_max_c.
+    /// Winding temperature by the motor model, which errs upwards. After a reset the
+    /// estimate starts as if the motor had just stopped at winding_max_c.
     4400 PRESENT_WINDING_MC: I32 ReadOnly "mdegC" in -40_000..=8_500_000, |view, _| milli(view.status().winding.0);
     /// Microcontroller's temperature, from which the array's is estimated; -273,150 if unknown.
     4404 CHIP_MC: I32 ReadOnly "mdegC" in -273_150..=1_000_000,

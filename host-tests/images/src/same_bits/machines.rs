@@ -142,7 +142,7 @@ pub const STEPS: [Step; 20] = [
         let asked = FitLevel::from_number((s.share_q32 >> 29) as u8);
         let taken = s.words[0].unsigned_abs() >> 17;
         mix.add(m.budget.next(asked, CoreCycles(taken), CoreCycles(12_568)) as u32);
-        m.budget.note(s.words[1] > 0);
+        m.budget.note((s.words[2] > 0).then_some(s.words[1] > 0));
     }),
     ("Observer::measured", |m, s, mix| mix.add(m.observer.measured(s.words[0], &m.config).to_bits())),
     ("Observer::update", |m, s, mix| {

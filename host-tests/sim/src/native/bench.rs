@@ -51,7 +51,7 @@ impl<E: Set> Bench<E> {
         Ok(())
     }
 
-    /// Copies the bench of `scene`, exactly where no effect has a memory: noise, hysteresis and creep begin again.
+    /// Copies the bench of `scene`. Effects with a memory (noise, hysteresis, creep) start again in the copy.
     pub fn fork(&self, scene: &Scene) -> Result<Self, SimError> {
         let mut fork = Self::new(scene)?;
         let (from, to) = (&self.board, &mut fork.board);

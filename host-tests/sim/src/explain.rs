@@ -108,7 +108,10 @@ pub fn page() -> String {
         let _ = writeln!(page, "- `{}`{lasts}: {}", kind.name, kind.about);
         keys_on(&mut page, own, "  ");
     }
-    page.push_str("\n## Effects\n\nWithin a stage they act in this order, whatever their order in the scene.\n");
+    page.push_str(
+        "\n## Effects\n\nWithin a stage they act in this order, whatever their order in the scene. `cargo xtask sim --explain everything` prints \
+         the equations, the state and the sources of all effects; for another scene, those of its effects.\n",
+    );
     for family in [CONTACT, DRIVE, SENSOR, LINK] {
         let _ = write!(page, "\n### {}\n", family.title);
         for effect in family.effects {
@@ -171,13 +174,9 @@ fn stage_of(effect: &Description) -> Option<&'static str> {
 }
 
 fn effect_of(page: &mut String, effect: &Description) {
-    let Description { name, about, equations, state, reference, keys, .. } = effect;
+    let Description { name, about, keys, .. } = effect;
     let _ = write!(page, "\n#### `[effects.{name}]`\n\n{about}\n\n");
     keys_on(page, keys, "");
-    page.push_str("\n```text\n");
-    equations.iter().for_each(|line| *page += &format!("{line}\n"));
-    let state = if *state == "none" { String::new() } else { format!("State: {state}. ") };
-    let _ = writeln!(page, "```\n\n{state}Source: {reference}.");
 }
 
 /// Adds a list of keys to the page.

@@ -37,8 +37,8 @@ fn section(page: &mut String, kernel: &Kernel, points: &[Point]) {
     let (more, rule) = other.map_or((String::new(), ""), |other| (format!(" {other}, max | rms |"), " --- | --- |"));
     let _ = writeln!(
         page,
-        "| variant | instructions | cycles: low to high | estimate | with flash | {error}, max | rms |{more} |\n\
-        | --- | --- | --- | --- | --- | --- | --- |{rule} --- |"
+        "| variant | cycles | with flash | {error}, max | rms |{more} |\n\
+        | --- | --- | --- | --- | --- |{rule} --- |"
     );
     let beaten = beaten_by(points);
     let few = points.len() <= SHOWN_MAX;
@@ -74,12 +74,10 @@ fn costs(page: &mut String, kernel: &Kernel, points: &[Point]) {
     }
 }
 
-/// Cells with the cost of a call.
-fn costs_of(cost: &Cost) -> [String; 4] {
-    let Cost { instructions, low, estimate, high, flash } = cost;
-    let [instructions, estimate, flash] = [instructions, estimate, flash]
-        .map(|Passes { median, max }| if median == max { median.to_string() } else { format!("{median} ({max})") });
-    [instructions, format!("{} to {}", low.median, high.median), estimate, flash]
+/// Cells with the estimated cycles of a call.
+fn costs_of(cost: &Cost) -> [String; 2] {
+    [cost.estimate, cost.flash]
+        .map(|Passes { median, max }| if median == max { median.to_string() } else { format!("{median} ({max})") })
 }
 
 /// Position of a variant among the others.

@@ -67,11 +67,6 @@ impl Row {
     fn error_codes(&self) -> f64 {
         Array::CODES * (self.row + self.column) + self.noise_codes
     }
-
-    fn beats(&self, other: &Self) -> bool {
-        let (mine, theirs) = (self.error_codes(), other.error_codes());
-        self.rate_hz >= other.rate_hz && mine <= theirs && (self.rate_hz > other.rate_hz || mine < theirs)
-    }
 }
 
 /// The table.
@@ -84,22 +79,20 @@ pub fn markdown() -> String {
         remains; the converter's capacitor (4 pF behind 6 kOhm and a source of 10 kOhm) keeps a share of the column before. A conversion's noise is \
         **assumed** to be 1 code rms. *Error* is that of a taxel beside a saturated one, crosstalk and noise added; *force noise* is that of \
         the sum of 100 taxels. Bold is the default.\n\n\
-        | settle, us | sampling, cycles | frames averaged | results a second | of the row before | of the column before | noise, codes rms | \
-        error, codes | force noise, mN rms | |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
+        | settle, us | sampling, cycles | frames averaged | results a second | of the row before | of the column before | \
+        error, codes | force noise, mN rms |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     for row in &rows {
         let (settle_ns, sample_cycles, frames) = row.setting;
         let bold = if row.setting == DEFAULT { "**" } else { "" };
-        let place = if rows.iter().any(|other| other.beats(row)) { "beaten" } else { "front" };
         // A string takes every write.
         let _ = writeln!(
             page,
-            "| {bold}{}{bold} | {bold}{sample_cycles}{bold} | {frames} | {:.0} | {} | {} | {} | {} | {} | {place} |",
+            "| {bold}{}{bold} | {bold}{sample_cycles}{bold} | {frames} | {:.0} | {} | {} | {} | {} |",
             f64::from(settle_ns) * 1e-3,
             row.rate_hz,
             figure(row.row),
             figure(row.column),
-            figure(row.noise_codes),
             figure(row.error_codes()),
             figure(row.noise_codes * MN_PER_CODE * (TAXELS as f64).sqrt()),
         );

@@ -70,20 +70,26 @@ fn errors(page: &mut String) {
 
 fn section(page: &mut String, title: &str, wanted: impl Fn(&Register) -> bool) {
     *page += &format!(
-        "\n## {title}\n\n| address | name | type | access | range | default | meaning |\n\
-        | --- | --- | --- | --- | --- | --- | --- |\n"
+        "\n## {title}\n\n| address | name | type | access | range (default) | meaning |\n\
+        | --- | --- | --- | --- | --- | --- |\n"
     );
     for register in REGISTERS.iter().filter(|register| wanted(register)) {
-        let default = register.default.map_or(String::new(), |value| value.to_string());
+        // The registers of a block share their documentation.
+        let first =
+            REGISTERS.iter().find(|other| other.doc == register.doc).filter(|other| other.name != register.name);
+        let meaning = match first {
+            Some(first) => format!("As {}.", first.name.to_lowercase()),
+            None => format!("{}{}", register.doc.trim(), unusual_step(register)),
+        };
+        let default = register.default.map(|value| format!("({value})"));
+        let range = [Some(range(register)), default].into_iter().flatten().collect::<Vec<_>>().join(" ");
         *page += &format!(
-            "| {} | {} | {} | {} | {} | {default} | {}{} |\n",
+            "| {} | {} | {} | {} | {} | {meaning} |\n",
             register.address,
             register.name.to_lowercase(),
             kind(register),
             access(register.access),
-            range(register),
-            register.doc.trim(),
-            unusual_step(register),
+            range.trim(),
         );
     }
 }
@@ -91,12 +97,12 @@ fn section(page: &mut String, title: &str, wanted: impl Fn(&Register) -> bool) {
 fn parameters(page: &mut String) {
     page.push_str(
         "\n## Parameters\n\nEach is an i32 with access S.\n\n\
-        | address | name | range | default | meaning |\n| --- | --- | --- | --- | --- |\n",
+        | address | name | range (default) | meaning |\n| --- | --- | --- | --- |\n",
     );
     for register in REGISTERS.iter().filter(|register| param(register).is_some()) {
         let Register { address, name, min, max, default, doc, .. } = register;
         let (default, doc) = (default.unwrap_or_default(), doc.trim());
-        *page += &format!("| {address} | {name} | {min} to {max} | {default} | {doc} |\n");
+        *page += &format!("| {address} | {name} | {min} to {max} ({default}) | {doc} |\n");
     }
 }
 

@@ -1,8 +1,9 @@
 //! The STM32F4's flash with its accelerator: wait states, a cache of instruction lines with the next line fetched
 //! ahead, and a small cache of data lines.
 //!
-//! The flash is 128 bits wide. A line that is neither cached nor on its way costs the wait states; one that is on its
-//! way costs what is left of them. What lies outside the flash costs nothing.
+//! The flash is 128 bits wide. A line that is neither cached nor on its way costs the wait states; a line that is on its
+//! way costs what is left of them. Addresses outside the flash cost nothing. When the core enters a line, the next one
+//! is fetched if it is not cached, in straight code two cycles earlier. The caches replace the least recently used line.
 
 /// Bits of an address within a line of 128 bits.
 const LINE_BITS: u32 = 4;

@@ -1,7 +1,7 @@
 //! The record of a press, as the chip delivers it.
 //!
 //! The chip moves the tip into a flat plate and back, and averages frames over short stretches of time. It fits nothing
-//! and judges nothing. `docs/solve.md` lists the fields with their units, and the motion that gives them.
+//! and judges nothing. `docs/solve.md` describes the motion.
 
 use crate::gains::{Condition, Gain};
 use crate::model::{At, Pose, Square};

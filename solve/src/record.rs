@@ -1,7 +1,7 @@
 //! The bytes of a recorded series, as the chip delivers them.
 //!
-//! A series is a head of 32 bytes and a body of records, little-endian throughout. `docs/solve.md` has the layout. A damaged
-//! series gives a [`NoRecord`]; no bytes make this module panic.
+//! A series is a head of 32 bytes and a body of records, little-endian throughout; [`fingertip::measure::series`] has the
+//! layout. A damaged series gives a [`NoRecord`]; no bytes make this module panic.
 //!
 //! Lengths in millimetres, the tip and the array's scale are not in the series: they come from the controller's parameters.
 

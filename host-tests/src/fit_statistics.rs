@@ -24,8 +24,6 @@ pub const CUT_MIN: f64 = 0.01;
 pub const WAYS: usize = 1 + Refined::ALL.len() + 1;
 /// Frames, each with its own noise, that [`Fit`] sees of a case.
 pub const FRAMES: usize = 90;
-/// Frames after which [`Fit`] is judged besides.
-pub const EARLIER: [usize; 5] = [6, 12, 24, 36, 48];
 
 /// Pictures of one kind.
 #[derive(Clone, Copy, Debug)]
@@ -169,8 +167,6 @@ pub struct Verdict {
     pub case: Case,
     /// Outcome of each reading method.
     pub outcomes: [Outcome; WAYS],
-    /// Outcome of [`Fit`] after each number of frames in [`EARLIER`].
-    pub earlier: [Outcome; EARLIER.len()],
 }
 
 /// Verdicts on a series.
@@ -186,17 +182,13 @@ impl Verdict {
         let mut fit = Fit::new(fit_level);
         let sums = Outcome::of(&contact::from_sums(&case.picture, config), &case.scene, noisy);
         let mut last = sums;
-        let mut earlier = [last; EARLIER.len()];
-        for frame in 1..=FRAMES {
+        for _ in 0..FRAMES {
             let (picture, _) = series.reading.picture(&case.pressures, case.picture.bad, &mut rng);
             last = Outcome::of(&fit.read(&picture, config), &case.scene, noisy);
-            if let Some(place) = EARLIER.iter().position(|at| *at == frame) {
-                earlier[place] = last;
-            }
         }
         let read = |refined| Outcome::of(&single::read(&case.picture, refined, config), &case.scene, noisy);
         let [one, two, full] = Refined::ALL.map(read);
-        Self { case, outcomes: [sums, one, two, full, last], earlier }
+        Self { case, outcomes: [sums, one, two, full, last] }
     }
 }
 
@@ -262,14 +254,13 @@ pub fn markdown(cases: usize, fit_level: FitLevel, progress: &(impl Fn(&str, usi
     errors(&mut page, &good);
     alarms(&mut page, &bad);
     edges(&mut page, &bad);
-    settling(&mut page, &good);
     motion(&mut page, cases, fit_level, progress);
     page
 }
 
-/// Reading methods in the tables: the plain sum, the best result from one image, and the firmware's. `docs/study.md` has
-/// the errors of the two others.
-const SHOWN: [(usize, &str); 3] = [(0, "Moments"), (3, "Full"), (WAYS - 1, "Fit")];
+/// Reading methods in the tables: the best result from one image, and the firmware's. `docs/study.md` has the errors of
+/// the others.
+const SHOWN: [(usize, &str); 2] = [(3, "Full"), (WAYS - 1, "Fit")];
 
 fn errors(page: &mut String, good: &[(&Series, Judged)]) {
     page.push_str(
@@ -284,9 +275,9 @@ fn errors(page: &mut String, good: &[(&Series, Judged)]) {
                 format!("{:.3} | {:.3} | {over}", quantile(values(), 0.99), quantile(values(), 1.0))
             };
             let (force, centre) = (half(|outcome| outcome.force), half(|outcome| outcome.centre));
-            let alarms = if way == 0 { String::new() } else { format!("{} ", flagged(judged, way)) };
+            let alarms = flagged(judged, way);
             // Writing to a string cannot fail.
-            let _ = writeln!(page, "| {} | {name} | {force} | {centre} | {alarms}|", series.name);
+            let _ = writeln!(page, "| {} | {name} | {force} | {centre} | {alarms} |", series.name);
         }
     }
 }
@@ -315,7 +306,7 @@ fn edges(page: &mut String, bad: &[(&Series, Judged)]) {
             let class = || judged.iter().filter(|verdict| (low..high).contains(&verdict.case.cut));
             let size = class().count();
             any |= size > 0;
-            if SHOWN[1..].iter().any(|(way, _)| flagged(class(), *way) < size) {
+            if SHOWN.iter().any(|(way, _)| flagged(class(), *way) < size) {
                 let share = |way| percent(flagged(class(), way), size);
                 let _ = writeln!(page, "| {} | {low} to {high}, {size} | {} |", series.name, row(share));
             }
@@ -326,23 +317,6 @@ fn edges(page: &mut String, bad: &[(&Series, Judged)]) {
         }
     }
     let _ = writeln!(page, "\nEdges below {} are not judged: {}.", CUTS[0].0, left_out.join("; "));
-}
-
-fn settling(page: &mut String, good: &[(&Series, Judged)]) {
-    let frames: Vec<_> = EARLIER.iter().chain([&FRAMES]).map(usize::to_string).collect();
-    let rule = "| --- ".repeat(frames.len() + 1);
-    let _ = write!(
-        page,
-        "\nForces of `Fit` beyond the bound, by the number of frames since the contact appeared:\n\n\
-        | series | {} |\n{rule}|\n",
-        frames.join(" | ")
-    );
-    for (series, judged) in good {
-        let over = |of: &dyn Fn(&Verdict) -> f64| judged.iter().filter(|verdict| of(verdict) > 1.0).count().to_string();
-        let mut cells: Vec<_> = (0..EARLIER.len()).map(|place| over(&|verdict| verdict.earlier[place].force)).collect();
-        cells.push(over(&|verdict| verdict.outcomes[WAYS - 1].force));
-        let _ = writeln!(page, "| {} | {} |", series.name, cells.join(" | "));
-    }
 }
 
 fn motion(page: &mut String, cases: usize, fit_level: FitLevel, progress: &(impl Fn(&str, usize) + Sync)) {
@@ -374,9 +348,9 @@ fn motion(page: &mut String, cases: usize, fit_level: FitLevel, progress: &(impl
     }
 }
 
-/// Returns a cell for each method that has a confidence.
+/// Returns a cell for each method.
 fn row(cell: impl Fn(usize) -> String) -> String {
-    SHOWN[1..].iter().map(|(way, _)| cell(*way)).collect::<Vec<_>>().join(" | ")
+    SHOWN.iter().map(|(way, _)| cell(*way)).collect::<Vec<_>>().join(" | ")
 }
 
 fn percent(part: usize, of: usize) -> String {

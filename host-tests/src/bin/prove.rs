@@ -41,19 +41,18 @@ fn main() -> ExitCode {
         all.extend(exhaustive::peaks(&tip, 0..reach(tip.peak_pressure(tip.depth_max()).to_bits()), progress));
         all
     });
-    report.section("A grid of the reference tip, by integers", |progress| {
-        exhaustive::pressures(&tip, 4_000 / share, 2_500, progress).to_vec()
+    report.section("A grid of the reference tip, pressures by integers", |progress| {
+        let mut all = exhaustive::pressures(&tip, 4_000 / share, 2_500, progress).to_vec();
+        all.extend(random::touching_angles(&tip, 1_000_000 / share, progress));
+        all
     });
-    report.section("A grid of the reference tip, in arbitrary precision", |progress| {
-        random::touching_angles(&tip, 1_000_000 / share, progress).to_vec()
+    report.section("Boundaries and random points of the whole domain, also by integers", |progress| {
+        let mut all = random::boundaries(progress);
+        let points = random::points(0..10_000_000 / share, progress);
+        all.iter_mut().zip(&points).for_each(|(all, points)| all.merge(points));
+        all.to_vec()
     });
-    report.section("Boundaries of the whole domain, in arbitrary precision and by integers", |progress| {
-        random::boundaries(progress).to_vec()
-    });
-    report.section("Random points of the whole domain, in arbitrary precision and by integers", |progress| {
-        random::points(0..10_000_000 / share, progress).to_vec()
-    });
-    report.section("The rest of the model at random points, in arbitrary precision", |progress| {
+    report.section("The rest of the model at random points", |progress| {
         let points = 0..200_000 / share;
         let mut all = beyond::geometry(points.clone(), progress).to_vec();
         all.extend(beyond::tilt(points.clone(), progress));

@@ -1,9 +1,25 @@
 //! The option bytes: brown-out level 3, written so that nothing can interrupt.
 //!
 //! A write erases and programs the sector of the option bytes. If a reset or a power loss cuts it short, the device can come up
-//! with read protection level 1, and leaving level 1 erases the whole flash (sources: docs/board.md, Option bytes). The
-//! image's window watchdog resets a halted core too, after 1 ms. So the write begins behind a reset that halts the core
-//! before its first instruction: no code has started a watchdog, and none can request a reset.
+//! with read protection level 1, and leaving level 1 erases the whole flash. The image's window watchdog resets a halted
+//! core too, after 1 ms. So the write begins behind a reset that halts the core before its first instruction: no code has
+//! started a watchdog, and none can request a reset.
+//!
+//! Sources:
+//!
+//! - Order of the write (BSY = 0, OPTCR, OPTSTRT, BSY = 0): RM0390 3.6.2. RM0383 has the same words, quoted in an answer by
+//!   ST: [STM32F411](https://community.st.com/t5/stm32-mcus-products/question-regarding-stm32f411re-option-bytes-0xff-issue/td-p/833681).
+//! - An interrupted write reads as level 1: reports of other parts. Reset: [STM32F7, "normal behavior" for
+//!   ST](https://github.com/STMicroelectronics/STM32CubeF7/issues/96), where resets within 1 s of the start cause trouble
+//!   and later ones do not. Lost power:
+//!   [STM32F429](https://community.st.com/t5/stm32-mcus-products/stm32f429zit6-reset-values-for-flash-option-bytes-when-power/td-p/394565),
+//!   [STM32F427](https://community.st.com/thread/32256-stm32f4xx-question-about-option-bytes-setting-the-write-protection).
+//! - Level 1 to 0 erases the flash: RM0390 3.6.3, as [RM0090 table 13 and figure
+//!   5](https://www.manualslib.com/manual/2767128/St-Stm32f40-Series.html?page=73).
+//! - DBGMCU_IDCODE at 0xE0042000 is 0x421: RM0390 33.6.1,
+//!   [stlink](https://github.com/stlink-org/stlink/blob/115f7c846adf612c1ee818713530dbf17287ed9b/config/chips/F446.chip).
+//! - Flash below 2.7 V: [micropython 4387](https://github.com/micropython/micropython/issues/4387). The falling edge of
+//!   V_BOR3 is from DS10693, not checked against a public text.
 
 use anyhow::{Result, anyhow, bail};
 use std::fmt;

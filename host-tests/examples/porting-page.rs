@@ -18,8 +18,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         ("16x16", here::<16, 16>(937)?),
     ]);
     let mut table =
-        "| core | taxels | target | flags | DSP | FPU | instructions per frame, mean | largest | true force held, mN | flash of the program |\n\
-        | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
+        "| core | taxels | target | flags | instructions per frame, mean | largest | true force held, mN | flash, bytes |\n\
+        | --- | --- | --- | --- | --- | --- | --- | --- |\n"
             .to_owned();
     let mut lines = Vec::new();
     for line in list.lines() {
@@ -43,13 +43,10 @@ fn main() -> Result<(), Box<dyn Error>> {
                 format!("FAILED: {name}, {target}: digest {emulated}, and this machine's is {digest:016x}").into()
             );
         }
-        let used = |name| figure(name).map(|used| if used == "1" { "yes" } else { "no" });
-        let flags = if flags.is_empty() { "default".into() } else { format!("`{flags}`") };
+        let flags = if flags.is_empty() { String::new() } else { format!("`{flags}`") };
         writeln!(
             table,
-            "| {name} | {array} | `{target}` | {flags} | {} | {} | {} | {} | {true_mn} | {bytes} bytes |",
-            used("dsp")?,
-            used("fpu")?,
+            "| {name} | {array} | `{target}` | {flags} | {} | {} | {true_mn} | {bytes} |",
             figure("instructions_mean")?,
             figure("instructions_max")?,
         )?;

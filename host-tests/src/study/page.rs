@@ -34,18 +34,20 @@ fn section(page: &mut String, kernel: &Kernel, points: &[Point]) {
     }
     // A string takes every write.
     let _ = write!(page, "\n## {title}\n\n{text}\n\n![{title}: {error} over cycles](pictures/study-{name}.svg)\n\n");
-    let (more, rule) = other.map_or((String::new(), ""), |other| (format!(" {other}, max | rms |"), " --- | --- |"));
+    let (more, rule) =
+        other.map_or((String::new(), ""), |other| (format!(" rms | {other}, max | rms |"), " --- | --- | --- |"));
     let _ = writeln!(
         page,
-        "| variant | cycles | with flash | {error}, max | rms |{more} |\n\
-        | --- | --- | --- | --- | --- |{rule} --- |"
+        "| variant | cycles | with flash | {error}, max |{more} |\n\
+        | --- | --- | --- | --- |{rule} --- |"
     );
     let beaten = beaten_by(points);
     let few = points.len() <= SHOWN_MAX;
     for (point, by) in points.iter().zip(&beaten).filter(|(_, by)| few || by.is_none()) {
         let Point { name, firmware, cost, error_max, error_rms, other } = point;
         let bold = if *firmware { "**" } else { "" };
-        let errors = [[*error_max, *error_rms]].into_iter().chain(*other).flatten().map(figure);
+        let more = other.iter().flat_map(|[max, rms]| [*error_rms, *max, *rms]);
+        let errors = [*error_max].into_iter().chain(more).map(figure);
         let cells = costs_of(cost).into_iter().chain(errors).collect::<Vec<_>>().join(" | ");
         let place = by.map_or_else(|| verdict(point, None), |_| String::new());
         let _ = writeln!(page, "| {bold}{name}{bold} | {cells} | {place} |");

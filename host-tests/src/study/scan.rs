@@ -75,12 +75,11 @@ pub fn markdown() -> String {
     let mut rows: Vec<_> = SETTINGS.into_iter().filter_map(|setting| Row::of(setting, &array)).collect();
     rows.sort_by(|a, b| b.rate_hz.total_cmp(&a.rate_hz));
     let mut page = String::from(
-        "\n## Scan settings\n\nBy the board's electrical model; no code was run. A row's edge settles with tau = 0.2 us, so a share of the row before \
-        remains; the converter's capacitor (4 pF behind 6 kOhm and a source of 10 kOhm) keeps a share of the column before. A conversion's noise is \
-        **assumed** to be 1 code rms. *Error* is that of a taxel beside a saturated one, crosstalk and noise added; *force noise* is that of \
-        the sum of 100 taxels. Bold is the default.\n\n\
-        | settle, us | sampling, cycles | frames averaged | results a second | of the row before | of the column before | \
-        error, codes | force noise, mN rms |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n",
+        "\n## Scan settings\n\nBy the board's electrical model; no code was run. A row's edge settles with tau = 0.2 us, and the converter's capacitor \
+        (4 pF behind 6 kOhm and a source of 10 kOhm) keeps a share of the column before. A conversion's noise is **assumed** to be 1 code rms. \
+        *Error* is that of a taxel beside a saturated one; *force noise* is that of the sum of 100 taxels. Bold is the default.\n\n\
+        | settle, us | sampling, cycles | frames averaged | results a second | error, codes | \
+        force noise, mN rms |\n| --- | --- | --- | --- | --- | --- |\n",
     );
     for row in &rows {
         let (settle_ns, sample_cycles, frames) = row.setting;
@@ -88,11 +87,9 @@ pub fn markdown() -> String {
         // A string takes every write.
         let _ = writeln!(
             page,
-            "| {bold}{}{bold} | {bold}{sample_cycles}{bold} | {frames} | {:.0} | {} | {} | {} | {} |",
+            "| {bold}{}{bold} | {bold}{sample_cycles}{bold} | {frames} | {:.0} | {} | {} |",
             f64::from(settle_ns) * 1e-3,
             row.rate_hz,
-            figure(row.row),
-            figure(row.column),
             figure(row.error_codes()),
             figure(row.noise_codes * MN_PER_CODE * (TAXELS as f64).sqrt()),
         );

@@ -147,11 +147,11 @@ fn formats() -> String {
     let mut page = format!(
         "\nWord length, for the [pressure](#pressure-at-a-distance-from-the-centre) with every intermediate result rounded to n bits of its range. \
          The sensor resolves one code, {code_kpa:.3} kPa.\n\n\
-         | bits | error, kPa, max | error, codes |\n| --- | --- | --- |\n"
+         | bits | error, codes, max |\n| --- | --- |\n"
     );
     for bits in BITS {
         let kpa = rounded_error_kpa(bits);
-        let _ = writeln!(page, "| {bits} | {} | {} |", figure(kpa), figure(kpa / code_kpa));
+        let _ = writeln!(page, "| {bits} | {} |", figure(kpa / code_kpa));
     }
     page
 }

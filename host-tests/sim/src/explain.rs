@@ -1,10 +1,9 @@
 //! Descriptions of a scene, of all keys, and the reference page.
 
-use crate::effects::{Build, Part};
 use crate::events::{EVENT, KINDS, own_keys};
 use crate::metrics;
 use crate::registry::{self, CONTACT, DRIVE, Description, LINK, SENSOR};
-use crate::scene::tables::{EXPECT, Key, ROOT, SCRIPT, TABLES, Values};
+use crate::scene::tables::{EXPECT, Key, ROOT, SCRIPT, TABLES};
 use crate::scene::{Scene, library, read};
 use std::fmt::Write as _;
 
@@ -82,7 +81,6 @@ pub fn page() -> String {
         include_str!("explain/scenes.md").trim().replace("{wall}", include_str!("../scenes/wall.toml"))
     );
     library_of(&mut page);
-    stages(&mut page);
     page.push_str(
         "\n## Tables\n\nAfter each key: its range, and its default if it has one. A unit is the end of the key's name.\n",
     );
@@ -109,13 +107,16 @@ pub fn page() -> String {
         keys_on(&mut page, own, "  ");
     }
     page.push_str(
-        "\n## Effects\n\nWithin a stage they act in this order, whatever their order in the scene. `cargo xtask sim --explain everything` prints \
-         the equations, the state and the sources of all effects; for another scene, those of its effects.\n",
+        "\n## Effects\n\nEffects of a family act in this order, whatever their order in the scene; `burst` acts before `noise`. \
+         Without effects the readout is ideal: equal taxels, a perfect row switch and virtual ground, no settling time, 12 bits \
+         rounded down. `cargo xtask sim --explain everything` prints the equations, the state and the sources of all effects; for \
+         another scene, those of its effects.\n",
     );
     for family in [CONTACT, DRIVE, SENSOR, LINK] {
         let _ = write!(page, "\n### {}\n", family.title);
         for effect in family.effects {
-            effect_of(&mut page, effect);
+            let _ = write!(page, "\n#### `[effects.{}]`\n\n{}\n\n", effect.name, effect.about);
+            keys_on(&mut page, effect.keys, "");
         }
     }
     let _ = write!(
@@ -138,45 +139,6 @@ fn library_of(page: &mut String) {
             let _ = writeln!(page, "- `{name}`: {}", about.trim());
         }
     }
-}
-
-/// Adds the stages from pressure to codes, with the effects at each.
-fn stages(page: &mut String) {
-    page.push_str(
-        "\n## From pressure to codes\n\nWithout effects the readout is ideal: equal taxels, a perfect row switch and virtual ground, \
-         no settling time, 12 bits rounded down. Each row is sampled at its own instant. Stages and effects, in order:\n\n\
-         | stage | content | effects |\n| --- | --- | --- |\n",
-    );
-    for (stage, about) in [
-        ("pressure", "kPa of each taxel of the row"),
-        ("conductance", "G_0 + alpha p of each taxel, S"),
-        ("network", "what each column sees of the driven row, S"),
-        ("volts", "at the column amplifiers: V_g + R_f G V_drive"),
-        ("codes", "before the converter rounds down: 4096 V / V_ref"),
-    ] {
-        let effects: Vec<_> = registry::all().filter(|effect| stage_of(effect) == Some(stage)).collect();
-        let names: Vec<_> = effects.iter().map(|effect| format!("`{}`", effect.name)).collect();
-        let _ = writeln!(page, "| {stage} | {about} | {} |", names.join(", "));
-    }
-}
-
-/// Returns the stage of the readout at which an effect acts.
-fn stage_of(effect: &Description) -> Option<&'static str> {
-    let values = Values::defaults(effect.keys);
-    match (effect.build)(&Build::new(&values, 0)) {
-        Part::Pressure(_) => Some("pressure"),
-        Part::Conductance(_) => Some("conductance"),
-        Part::Network(_) => Some("network"),
-        Part::Volts(_) => Some("volts"),
-        Part::Codes(_) => Some("codes"),
-        _ => None,
-    }
-}
-
-fn effect_of(page: &mut String, effect: &Description) {
-    let Description { name, about, keys, .. } = effect;
-    let _ = write!(page, "\n#### `[effects.{name}]`\n\n{about}\n\n");
-    keys_on(page, keys, "");
 }
 
 /// Adds a list of keys to the page.

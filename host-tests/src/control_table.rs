@@ -28,15 +28,21 @@ pub fn markdown() -> String {
     );
     errors(&mut page);
     section(&mut page, "Registers", |register| param(register).is_none() && second_name_of(register).is_none());
-    page += &format!(
-        "\n## Second names\n\nFor drivers that cannot reach the first address: 124 to 132 as in an X-series servo, 148 to 166 \
-        for addresses up to 255, {picture} to {end} for reads of at most 255 bytes (state, time and all pressures in \
-        {together} bytes).\n\n| address | name | same as |\n| --- | --- | --- |\n"
+    page.push_str("\n## Second names\n\nThey serve drivers that cannot reach the first address. Brackets have the first name.\n\n");
+    let reads = format!(
+        "{picture} to {end}, for reads of at most 255 bytes (state, time and all pressures in {together} bytes)"
     );
-    for register in REGISTERS {
-        if let Some(first) = second_name_of(register) {
-            page += &format!("| {} | {} | {first} |\n", register.address, register.name.to_lowercase());
-        }
+    for (title, addresses) in [
+        ("124 to 132, as in an X-series servo", 0..148),
+        ("148 to 166, for addresses up to 255", 148..256),
+        (reads.as_str(), 256..u16::MAX),
+    ] {
+        let inside = REGISTERS.iter().filter(|register| addresses.contains(&register.address));
+        let names = inside.filter_map(|register| {
+            let first = second_name_of(register)?;
+            Some(format!("{} `{}` (`{first}`)", register.address, register.name.to_lowercase()))
+        });
+        page += &format!("- {title}: {}\n", names.collect::<Vec<_>>().join(", "));
     }
     parameters(&mut page);
     page

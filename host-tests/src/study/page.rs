@@ -6,6 +6,7 @@ use super::output::{Cost, Passes};
 use super::{scan, simulation};
 use crate::page::Page;
 use std::fmt::Write as _;
+use std::iter;
 
 /// The page of the study; the README has a short table between the same lines.
 pub const PAGE: Page = Page { name: "docs/study.md", tables: "study", command: "cargo xtask study" };
@@ -38,8 +39,8 @@ fn section(page: &mut String, kernel: &Kernel, points: &[Point]) {
         other.map_or((String::new(), ""), |other| (format!(" rms | {other}, max | rms |"), " --- | --- | --- |"));
     let _ = writeln!(
         page,
-        "| variant | cycles | with flash | {error}, max |{more} |\n\
-        | --- | --- | --- | --- |{rule} --- |"
+        "| variant | cycles | {error}, max |{more} |\n\
+        | --- | --- | --- |{rule} --- |"
     );
     let beaten = beaten_by(points);
     let few = points.len() <= SHOWN_MAX;
@@ -48,7 +49,7 @@ fn section(page: &mut String, kernel: &Kernel, points: &[Point]) {
         let bold = if *firmware { "**" } else { "" };
         let more = other.iter().flat_map(|[max, rms]| [*error_rms, *max, *rms]);
         let errors = [*error_max].into_iter().chain(more).map(figure);
-        let cells = costs_of(cost).into_iter().chain(errors).collect::<Vec<_>>().join(" | ");
+        let cells = iter::once(cycles(cost)).chain(errors).collect::<Vec<_>>().join(" | ");
         let place = by.map_or_else(|| verdict(point, None), |_| String::new());
         let _ = writeln!(page, "| {bold}{name}{bold} | {cells} | {place} |");
     }
@@ -76,10 +77,10 @@ fn costs(page: &mut String, kernel: &Kernel, points: &[Point]) {
     }
 }
 
-/// Cells with the estimated cycles of a call.
-fn costs_of(cost: &Cost) -> [String; 2] {
-    [cost.estimate, cost.flash]
-        .map(|Passes { median, max }| if median == max { median.to_string() } else { format!("{median} ({max})") })
+/// Cell with the estimated cycles of a call.
+fn cycles(cost: &Cost) -> String {
+    let Passes { median, max } = cost.estimate;
+    if median == max { median.to_string() } else { format!("{median} ({max})") }
 }
 
 /// Position of a variant among the others.

@@ -242,8 +242,6 @@ pub fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
 pub const PAGE: Page = Page { name: "docs/contact.md", tables: "tables", command: "cargo xtask fit --write" };
 /// Cases a series where nothing else is asked.
 pub const CASES: usize = 10_000;
-/// Classes of edges by the share of the seen force that they take: the ends of each.
-const CUTS: [(f64, f64); 4] = [(0.01, 0.03), (0.03, 0.1), (0.1, 0.3), (0.3, 1.0)];
 
 /// All tables, with this fit level of `Fit`; `progress` hears a series' name and how many of its cases are done.
 pub fn markdown(cases: usize, fit_level: FitLevel, progress: &(impl Fn(&str, usize) + Sync)) -> String {
@@ -253,7 +251,6 @@ pub fn markdown(cases: usize, fit_level: FitLevel, progress: &(impl Fn(&str, usi
     let mut page = format!("{cases} cases a series, `Fit` with fit level {}.\n\n", fit_level as u8);
     errors(&mut page, &good);
     alarms(&mut page, &bad);
-    edges(&mut page, &bad);
     motion(&mut page, cases, fit_level, progress);
     page
 }
@@ -292,31 +289,6 @@ fn alarms(page: &mut String, bad: &[(&Series, Judged)]) {
         let share = |way| percent(flagged(judged, way), judged.len());
         let _ = writeln!(page, "| {} | {} |", series.name, row(share));
     }
-}
-
-fn edges(page: &mut String, bad: &[(&Series, Judged)]) {
-    page.push_str(
-        "\nThe same for edges by the share of the seen force that they take; the classes that are not shown are all flagged:\n\n\
-        | image | share, cases | Full | Fit |\n| --- | --- | --- | --- |\n",
-    );
-    let mut left_out = Vec::new();
-    for (series, judged) in bad {
-        let mut any = false;
-        for (low, high) in CUTS {
-            let class = || judged.iter().filter(|verdict| (low..high).contains(&verdict.case.cut));
-            let size = class().count();
-            any |= size > 0;
-            if SHOWN.iter().any(|(way, _)| flagged(class(), *way) < size) {
-                let share = |way| percent(flagged(class(), way), size);
-                let _ = writeln!(page, "| {} | {low} to {high}, {size} | {} |", series.name, row(share));
-            }
-        }
-        if any {
-            let cases: usize = judged.iter().map(|verdict| verdict.case.invisible).sum();
-            left_out.push(format!("{cases} of {}", series.name));
-        }
-    }
-    let _ = writeln!(page, "\nEdges below {} are not judged: {}.", CUTS[0].0, left_out.join("; "));
 }
 
 fn motion(page: &mut String, cases: usize, fit_level: FitLevel, progress: &(impl Fn(&str, usize) + Sync)) {

@@ -67,7 +67,7 @@ fn main() -> ExitCode {
     }
     match reference::check() {
         Ok(tallies) => {
-            report.section("The points of `host-tests/oracle/park2003.csv`, 25 digits each", |_| tallies.to_vec())
+            report.judged("The points of `host-tests/oracle/park2003.csv`", |_| tallies.to_vec());
         }
         Err(error) => {
             eprintln!("{}: {error}", reference::path().display());
@@ -85,7 +85,14 @@ struct Report {
 }
 
 impl Report {
+    /// Judges functions for the tables of `docs/model.md`.
     fn section(&mut self, title: &str, judge: impl FnOnce(exhaustive::Progress<'_>) -> Vec<Tally>) {
+        let tallies = self.judged(title, judge);
+        self.sections.push((title.to_owned(), tallies));
+    }
+
+    /// Judges functions and prints how they did.
+    fn judged(&mut self, title: &str, judge: impl FnOnce(exhaustive::Progress<'_>) -> Vec<Tally>) -> Vec<Tally> {
         println!("{title}");
         let progress = Progress::begin();
         let tallies = judge(&|done, of| progress.show(format_args!("  {done} of {of}   ")));
@@ -95,7 +102,7 @@ impl Report {
             self.inputs += tally.inputs;
             self.broken += u64::from(!tally.holds());
         }
-        self.sections.push((title.to_owned(), tallies));
+        tallies
     }
 
     /// Ends the program; writes or checks the tables of `docs/model.md` if wanted.

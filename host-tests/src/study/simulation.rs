@@ -1,11 +1,7 @@
-//! Cost of the simulation's own accuracy: the plant's integrator and step, and the points at which a taxel's
-//! pressure is taken.
+//! Cost of the simulation's own accuracy: the plant's integrator and step.
 
 use super::page::figure;
-use core::f64::consts::TAU;
-use fingertip::shipped::{COLUMNS, ROWS};
 use sim::bridge::Bridge;
-use sim::mechanics::pressures::Cell;
 use sim::plant::{Plant, Setup};
 use std::fmt::Write as _;
 use std::time::Instant;
@@ -17,12 +13,8 @@ const FINEST_US: f64 = 0.1;
 const SAMPLE_US: f64 = 100.0;
 /// Instants that are compared: the tip runs into the wall, is held, is driven off.
 const SAMPLES: usize = 1_000;
-/// Points along a taxel's side.
-const POINTS: [usize; 5] = [1, 2, 4, 8, 16];
-const FINEST_POINTS: usize = 200;
-const DEPTHS_MM: [f64; 3] = [0.5, 2.0, 4.0];
 
-/// The tables; how long each took beside the usual one is only printed, as it is not the same twice.
+/// The table; how long each took beside the usual one is only printed, as it is not the same twice.
 pub fn markdown() -> String {
     let mut page = String::from(
         "\n## The simulation\n\nThe plant: a tip is driven into the wall, held and driven off in 100 ms. Error of the contact force, N, largest, against \
@@ -50,28 +42,6 @@ pub fn markdown() -> String {
         // A string takes every write.
         let _ = writeln!(page, "| {bold}{step_us}{bold} | {} |", errors.join(" | "));
     }
-    page.push_str(
-        "\nThe contact: mean pressure on a taxel by n x n points, against 200 x 200, for contacts of 0.5, 2 and 4 mm. *Gauss* is the simulation's \
-        rule, which cuts taxels at the rim.\n\n\
-        | rule | points a taxel | error of a taxel, kPa, max | error of the force, N, max |\n| --- | --- | --- | --- |\n",
-    );
-    let exact: Vec<_> =
-        DEPTHS_MM.iter().map(|d| array(*d, &|cell, setup| sampled(cell, setup, *d, FINEST_POINTS))).collect();
-    let mut row = |name: &str, points: String, of: &dyn Fn(&Cell, &Setup, f64) -> f64| {
-        let started = Instant::now();
-        let seen: Vec<_> = DEPTHS_MM.iter().map(|d| array(*d, &|cell, setup| of(cell, setup, *d))).collect();
-        lines.push((format!("{name}, {points} points"), started.elapsed().as_secs_f64()));
-        let worst = seen.iter().zip(&exact).map(|(seen, exact)| largest(seen, exact)).fold(0.0, f64::max);
-        let force = |kpa: &[f64]| kpa.iter().sum::<f64>() * 1.5 * 1.5 * 1e-3;
-        let closed = |d: &f64| Setup::default().tip.force_n(*d);
-        // The deepest contact reaches beyond the array: its force cannot be compared.
-        let forces = seen.iter().zip(&DEPTHS_MM).take(2).map(|(seen, d)| (force(seen) - closed(d)).abs());
-        let _ = writeln!(page, "| {name} | {points} | {} | {} |", figure(worst), figure(forces.fold(0.0, f64::max)));
-    };
-    for points in POINTS {
-        row("midpoints", (points * points).to_string(), &|cell, setup, d| sampled(cell, setup, d, points));
-    }
-    row("**Gauss**", "9; 15 a strip at the rim".into(), &|cell, setup, d| cell.mean_kpa(&setup.tip.flattened(d)));
     for (name, taken_s) in lines {
         println!("{name:<40} {:>8.2} times the wall time of the plant at 10 us", taken_s / usual_s);
     }
@@ -125,22 +95,6 @@ fn forces(step_us: f64, integrator: Integrator) -> Vec<f64> {
         state.world.force_n()
     };
     (0..SAMPLES).map(at).collect()
-}
-
-/// All taxels of a contact near the array's middle.
-fn array(d_mm: f64, of: &dyn Fn(&Cell, &Setup) -> f64) -> Vec<f64> {
-    let mut setup = Setup::default();
-    (setup.wall.centre_x_mm, setup.wall.centre_y_mm) = (d_mm / TAU, d_mm / 10.0);
-    let places = (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column)));
-    places.map(|(row, column)| of(&Cell::of(&setup, row, column), &setup)).collect()
-}
-
-fn sampled(cell: &Cell, setup: &Setup, d_mm: f64, points: usize) -> f64 {
-    let tip = setup.tip.flattened(d_mm);
-    let at = |side: [f64; 2], n: usize| side[0] + (side[1] - side[0]) * (n as f64 + 0.5) / points as f64;
-    let places = (0..points).flat_map(|i| (0..points).map(move |j| (i, j)));
-    let sum: f64 = places.map(|(i, j)| tip.pressure_kpa(at(cell.x_mm, i).powi(2) + at(cell.y_mm, j).powi(2))).sum();
-    sum / (points * points) as f64
 }
 
 fn largest(values: &[f64], exact: &[f64]) -> f64 {

@@ -132,7 +132,7 @@ pub fn page() -> String {
 /// Adds the scenes of the library; none without the sources.
 fn library_of(page: &mut String) {
     page.push_str(
-        "\n## The library\n\nComments in each file of `host-tests/sim/scenes` explain it. A test runs all scenes against their bounds.\n\n",
+        "\n## The library\n\nComments in each file of `host-tests/sim/scenes` explain it.\n\n",
     );
     for line in list().unwrap_or_default().lines() {
         if let Some((name, about)) = line.split_once(' ') {

@@ -19,7 +19,7 @@ pub fn markdown() -> String {
     let mut page = String::from(
         "\n## The simulation\n\nThe plant: a tip is driven into the wall, held and driven off in 100 ms. Error of the contact force, N, largest, against \
         steps of 0.1 us. *Plant* is the simulation's integrator, of second order; *Euler* computes speed, then angle, from the same torques. \
-        `cargo xtask study` prints the wall times. Bold: used by the tests.\n\n\
+        Bold: used by the tests.\n\n\
         | step, us | plant | Euler |\n| --- | --- | --- |\n",
     );
     let exact = forces(FINEST_US, plant);

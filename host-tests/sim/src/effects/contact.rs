@@ -162,7 +162,7 @@ pub const EFFECTS: &[Description] = &[
         equations: &["h = -(R - sqrt(R^2 - r^2)); nothing beyond R"],
         state: "none",
         reference: "as `tilted_plane`; Hertz compares with a radius 1 / (1/a + 1/R)",
-        keys: &[Key::number("curvature_per_mm", "1 / R; 0 is a plane.", 0.0, 1.0, 0.05)],
+        keys: &[Key::number("curvature_per_mm", "1 / radius; 0 is a plane.", 0.0, 1.0, 0.05)],
         zero: &[("curvature_per_mm", 0.0)],
         build: |build: &Build| {
             let per_mm = build.number("curvature_per_mm");
@@ -176,7 +176,7 @@ pub const EFFECTS: &[Description] = &[
         state: "none",
         reference: "as `tilted_plane`",
         keys: &[
-            Key::number("curvature_per_mm", "1 / R; 0 is a plane.", 0.0, 1.0, 0.1),
+            Key::number("curvature_per_mm", "1 / radius; 0 is a plane.", 0.0, 1.0, 0.1),
             Key::number("axis_deg", "Angle from the columns to the axis.", -180.0, 180.0, 90.0),
         ],
         zero: &[("curvature_per_mm", 0.0)],

@@ -91,15 +91,16 @@ struct Programs {
 }
 
 impl Programs {
-    /// Builds them in the profile that this test was built in.
+    /// Builds them with the tests of their packages, as plain `cargo test` has done: another selection of packages could
+    /// give them other features, and compile them again.
     fn new() -> Self {
         let own = std::env::current_exe().expect("this program");
         let folder = own.ancestors().nth(2).expect("the profile's folder").to_owned();
         let profile = folder.file_name().expect("its name").to_string_lossy().replace("debug", "dev");
         let mut build = Command::new(env!("CARGO"));
-        build.args(["build", "--quiet", "--bins", "--profile", &profile]).current_dir(root());
-        for package in ["xtask", "sim", "serve", "fingertip-cli"] {
-            build.args(["--package", package]);
+        build.args(["test", "--no-run", "--quiet", "--profile", &profile]).current_dir(root());
+        for test in ["commands", "files", "served", "finger"] {
+            build.args(["--test", test]);
         }
         assert!(build.status().expect("cargo").success(), "the programs do not build");
         Self { folder, known: BTreeMap::new() }

@@ -6,9 +6,8 @@
 //! `cargo run --profile host -p sim --example unnamed-cost -- [SCENE] [PAIRS]`
 
 use sim::cli;
-use sim::effects::{Named, Set};
+use sim::effects::{self, Description, Named, Set};
 use sim::native::simulate_with;
-use sim::registry::{self, Description};
 use sim::scene::{Scene, read, text};
 use sim::watch::{Step, Watch};
 use std::error::Error;
@@ -75,7 +74,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         at(0.75),
         quickest[1] / quickest[0]
     );
-    let all: Vec<_> = registry::all().collect();
+    let all: Vec<_> = effects::all().collect();
     let mut sum = 0.0;
     for effect in &all {
         sum += more(&named(&scene, &[effect])?, &scene, pairs.div_ceil(5))?;

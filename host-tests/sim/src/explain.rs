@@ -1,9 +1,8 @@
 //! Descriptions of a scene, of all keys, and the reference page.
 
-use crate::effects::{Build, Part};
+use crate::effects::{self, Build, CONTACT, DRIVE, Description, LINK, Part, SENSOR};
 use crate::events::{EVENT, KINDS, own_keys};
 use crate::metrics;
-use crate::registry::{self, CONTACT, DRIVE, Description, LINK, SENSOR};
 use crate::scene::tables::{EXPECT, Key, ROOT, SCRIPT, TABLES, Values};
 use crate::scene::{Scene, library, read};
 use std::fmt::Write as _;
@@ -25,7 +24,7 @@ pub fn scene(scene: &Scene) -> String {
     }
     for named in &scene.effects {
         let Description { name, about, equations, state, reference, .. } = named.effect;
-        let _ = writeln!(text, "\n{name} ({})\n  {about}", registry::family_of(named.effect));
+        let _ = writeln!(text, "\n{name} ({})\n  {about}", effects::family_of(named.effect));
         equations.iter().for_each(|line| text += &format!("    {line}\n"));
         let _ = writeln!(text, "  state: {state}\n  source: {reference}");
         for (name, value) in named.values.iter() {
@@ -57,7 +56,7 @@ pub fn keys() -> String {
     for kind in &KINDS {
         keys_of(&mut text, &kind.title(), kind.about, own_keys(kind));
     }
-    for effect in registry::all() {
+    for effect in effects::all() {
         keys_of(&mut text, &format!("[effects.{}]", effect.name), effect.about, effect.keys);
     }
     text
@@ -151,7 +150,7 @@ fn stages(page: &mut String) {
         ("volts", "at the column amplifiers: V_g + R_f G V_drive"),
         ("codes", "before the converter rounds down: 4096 V / V_ref"),
     ] {
-        let effects: Vec<_> = registry::all().filter(|effect| stage_of(effect) == Some(stage)).collect();
+        let effects: Vec<_> = effects::all().filter(|effect| stage_of(effect) == Some(stage)).collect();
         let names: Vec<_> = effects.iter().map(|effect| format!("`{}`", effect.name)).collect();
         let _ = writeln!(page, "| {stage} | {about} | {} |", names.join(", "));
     }

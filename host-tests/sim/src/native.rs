@@ -8,13 +8,12 @@ pub mod bench;
 pub mod calibrated;
 pub mod served;
 
-use crate::bridge::Bridge;
 use crate::effects::link::{self, Stages as _};
 use crate::effects::sensor::{Readout, Stages as _};
-use crate::effects::{Named, Parts, Set};
+use crate::effects::{self, Family, Named, Parts, Set};
 use crate::host::{Host, Reading};
+use crate::mechanics::Bridge;
 use crate::mechanics::contact::Place;
-use crate::registry::{self, Family};
 use crate::run::{RunError, by_effect};
 use crate::scene::Scene;
 use crate::setup::Setup;
@@ -125,8 +124,8 @@ struct StageTimes {
 const TIMED: u64 = 64;
 /// Stages of a frame, and the families of the effects whose time is not counted with each: it has its own row.
 const STAGES: [(&str, &[Family]); 4] = [
-    ("motion", &[registry::CONTACT, registry::DRIVE]),
-    ("readout", &[registry::SENSOR]),
+    ("motion", &[effects::CONTACT, effects::DRIVE]),
+    ("readout", &[effects::SENSOR]),
     ("control step", &[]),
     ("truth and metrics", &[]),
 ];

@@ -7,8 +7,8 @@ pub mod text;
 
 pub use crate::scene::reader::{SceneError, SceneErrors, read};
 
+use crate::effects::NamedEffect;
 use crate::events::Event;
-use crate::registry::Named;
 use crate::scene::tables::Values;
 use crate::setup::{Array, Setup};
 use fingertip::params::Params;
@@ -32,8 +32,8 @@ pub struct Scene {
     pub script: Vec<Goal>,
     /// Events, in order of time.
     pub events: Vec<Event>,
-    /// Effects of the scene, in the order of the registry.
-    pub effects: Vec<Named>,
+    /// Effects of the scene, in the order of [`crate::effects::all`].
+    pub effects: Vec<NamedEffect>,
     pub bounds: Vec<Bound>,
 }
 

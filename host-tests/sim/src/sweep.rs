@@ -10,9 +10,8 @@ pub(crate) use files::complete;
 pub use files::{Shard, merge};
 pub use summary::Table;
 
-use crate::effects::draws;
+use crate::effects::{self, NamedEffect, draws};
 use crate::metrics::METRICS;
-use crate::registry::{self, Named};
 use crate::run::{Run, RunError, run};
 use crate::scene::Scene;
 use crate::{cli, cores};
@@ -49,7 +48,7 @@ pub fn sweep(plan: &Plan, board: Run) -> Result<(Table, PathBuf), RunError> {
     let points = points(plan)?;
     let first = &points.first().ok_or("there is nothing to run")?.1;
     if seeds > 1 && !points.iter().any(|(_, scene)| is_random(scene)) {
-        let drawing: Vec<&str> = registry::all().filter(|effect| draws(effect)).map(|effect| effect.name).collect();
+        let drawing: Vec<&str> = effects::all().filter(|effect| draws(effect)).map(|effect| effect.name).collect();
         return Err(format!(
             "nothing in {} is random: all {seeds} seeds would give the same run. Leave --seeds out, or name an effect that draws: {}",
             first.name,
@@ -161,7 +160,7 @@ impl std::str::FromStr for Vary {
 
 /// True if another seed may give another run.
 fn is_random(scene: &Scene) -> bool {
-    scene.effects.iter().any(|Named { effect, values }| {
+    scene.effects.iter().any(|NamedEffect { effect, values }| {
         let idle = |keys: &[(&str, f64)]| keys.iter().all(|(key, zero)| values.number(key) == *zero);
         let zero = if effect.name == "tangential" { &[("spread_percent", 0.0)] } else { effect.zero };
         draws(effect) && (zero.is_empty() || !idle(zero))

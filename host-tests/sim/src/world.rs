@@ -1,12 +1,10 @@
 //! World of a scene: fingers and their object, moved by steps, with weight, floor, shaking and the lifting hand.
 
-use crate::bridge::Bridge;
-use crate::effects::Set;
-use crate::effects::contact;
 use crate::effects::drive::Stages as _;
+use crate::effects::{Set, contact};
 use crate::events::{Event, Happened};
 use crate::mechanics::contact::{Contact, Place};
-use crate::mechanics::finger::Finger;
+use crate::mechanics::{Bridge, Finger};
 use crate::native::SimError;
 use crate::scene::Scene;
 use crate::setup::{Setup, Tip};

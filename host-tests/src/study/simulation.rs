@@ -4,7 +4,7 @@
 use super::page::figure;
 use core::f64::consts::TAU;
 use fingertip::shipped::{COLUMNS, ROWS};
-use sim::bridge::Bridge;
+use sim::mechanics::Bridge;
 use sim::mechanics::pressures::Cell;
 use sim::plant::{Plant, Setup};
 use std::fmt::Write as _;

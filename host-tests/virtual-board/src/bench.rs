@@ -14,7 +14,7 @@ use rigless::emulator::{Access, AccessKind, Host};
 use rigless::session::Session;
 use rigless::soc::stm32f427::generated::{DAC, GPIOC, TIM1, USART2};
 use rigless::time::VirtualNanos;
-use sim::bridge::Bridge;
+use sim::mechanics::Bridge;
 
 /// The plant's step, and the least of a scene's world.
 pub const STEP_NS: u64 = 10_000;

@@ -13,7 +13,7 @@ use rigless::soc::Error;
 use rigless::soc::stm32f427::generated::flash::{Register, optcr};
 use rigless::soc::stm32f427::peripherals::gpio::{Gpio, Pin};
 use rigless::soc::stm32f427::peripherals::tim::Channel;
-use sim::bridge::Bridge;
+use sim::mechanics::Bridge;
 use std::num::{NonZeroU32, NonZeroU64};
 
 /// The clock that the ST-LINK feeds to PH0.

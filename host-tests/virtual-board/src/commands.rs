@@ -2,7 +2,7 @@
 
 use output::{kept, say};
 use serve::{Place, Port};
-use sim::demo::{DemoError, figures};
+use sim::demo::{DemoError, draw, missed, table};
 use sim::plant::{Plant, Setup};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -88,14 +88,14 @@ pub fn bringup(image: &Path, frames: u32, estimates: Option<&Path>, json: Option
 pub fn demo(image: PathBuf, json: Option<&Path>, out: &Path, quick: bool) -> Result<(), Error> {
     let (figures, run) = demo::run(&Plan { image, quick })?;
     // The files first: the reader of the output may close the pipe.
-    let drawn = figures::draw(&run, &figures.forces, out);
+    let drawn = draw(&run, &figures.forces, out);
     if let Some(path) = json {
         let written = serde_json::to_string_pretty(&figures).map_err(std::io::Error::from);
         let written = written.and_then(|text| kept::write(path, text + "\n"));
         written.map_err(|error| DemoError::from(format!("cannot write {}: {error}", path.display())))?;
     }
     say::line(format_args!("sha-256  {} ({} bytes, as flashed)\n", figures.image_sha256, figures.image_bytes));
-    say::text(figures::table(&figures.checks, &figures.forces));
+    say::text(table(&figures.checks, &figures.forces));
     say::line(format_args!("\ntrace    {}", figures.trace_sha256));
     if let Some(repeated) = &figures.repeated_trace_sha256 {
         say::line(format_args!("repeated {repeated}"));
@@ -106,7 +106,7 @@ pub fn demo(image: PathBuf, json: Option<&Path>, out: &Path, quick: bool) -> Res
     if let Some(path) = json {
         say::line(format_args!("figures  {}", path.display()));
     }
-    match figures::missed(&figures.checks) {
+    match missed(&figures.checks) {
         0 => Ok(()),
         missed => Err(Error::Missed(missed)),
     }

@@ -3,7 +3,7 @@
 use crate::bench::STEP_NS;
 use crate::inside::ROOM_C;
 use crate::scene::finger::Finger;
-use sim::bridge::Bridge;
+use sim::mechanics::Bridge;
 use sim::plant::Plant;
 
 /// The world behind the board's pins.

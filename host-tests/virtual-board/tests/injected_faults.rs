@@ -7,7 +7,7 @@ use crate::common::{
 use fingertip::params::Params;
 use fingertip::shipped::address;
 use fingertip::state::{Fault as Number, Mode};
-use sim::bridge::Bridge;
+use sim::mechanics::Bridge;
 use sim::plant::{Faults, Plant, Row, Taxel};
 use virtual_board::{Fault, Options, Rig};
 

@@ -2,7 +2,7 @@
 
 use crate::common::{image, scratch};
 use sim::agreement::{Agreement, BEYOND_MM, BEYOND_N, Path};
-use sim::demo::figures::{draw, missed, table};
+use sim::demo::{draw, missed, table};
 use sim::scene::{Scene, library, read};
 use sim::watch::{Controller, Step, Summary, Watch};
 use sim::{cores, metrics};

@@ -6,9 +6,8 @@
 //! plane without friction: d = x, F = pi Y d^2. All forces of a step are the mean slope of one energy, so a step
 //! creates no energy.
 
-use crate::effects::{Build, Metered, Part, normal_within_3};
+use crate::effects::{Build, Description, Metered, Part, normal_within_3};
 use crate::mechanics::decay;
-use crate::registry::Description;
 use crate::scene::tables::Key;
 use crate::watch::{Cost, Truth};
 

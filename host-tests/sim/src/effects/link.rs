@@ -1,7 +1,6 @@
 //! Effects on the clock of the controller, interference, and packets of the host.
 
-use crate::effects::{Build, Metered, Part, normal, waiting_s};
-use crate::registry::Description;
+use crate::effects::{Build, Description, Metered, Part, normal, waiting_s};
 use crate::scene::tables::{Key, Kind};
 use crate::watch::Cost;
 use fingertip::link::packet::{CRC_START, HEADER, instruction, update_crc};

@@ -6,7 +6,7 @@ use crate::population::{Counted, Events, Place, Population};
 use crate::scene::library;
 use crate::scene::reader::{SceneError, SceneErrors, did_you_mean, item_span, key_span, not_toml};
 use crate::scene::tables::{EXPECT, Key, Kind, ROOT, SCRIPT, TABLES};
-use crate::{metrics, registry};
+use crate::{effects, metrics};
 use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -498,7 +498,7 @@ fn described(path: &str) -> Option<&'static Key> {
         "event" | "events" => EVENT.keys,
         name => match TABLES.iter().chain(&KINDS).find(|table| table.name == name) {
             Some(table) => table.keys,
-            None => registry::all().find(|effect| effect.name == name)?.keys,
+            None => effects::all().find(|effect| effect.name == name)?.keys,
         },
     };
     keys.iter().find(|key| key.name == name)

@@ -1,6 +1,6 @@
 //! Changes to the text of a scene, and the text of a scene that was read.
 
-use crate::registry::Description;
+use crate::effects::Description;
 use crate::scene::Scene;
 use crate::scene::tables::{Value, Values};
 use toml_edit::{DocumentMut, Item, Table, Value as TomlValue};

@@ -2,8 +2,7 @@
 
 use crate::folder;
 use output::plot;
-use sim::demo::figures::{draw, missed, table};
-use sim::demo::{self, Forces, Run, Taxels, Trace};
+use sim::demo::{self, Forces, Run, Taxels, Trace, draw, missed, table};
 use sim::simulate;
 use sim::watch::{Step, Watch};
 

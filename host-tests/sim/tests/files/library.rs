@@ -6,7 +6,7 @@ use sim::metrics::Verdict;
 use sim::run::run;
 use sim::scene::{Bound, library};
 use sim::watch::{Step, Watch};
-use sim::{cores, native, registry};
+use sim::{cores, effects, native};
 use std::collections::BTreeSet;
 
 /// Runs a scene, and says which bounds it breaks.
@@ -118,7 +118,7 @@ fn the_library_shows_every_effect() {
     let everything = scene("everything", &[], None);
     let named: Vec<&str> = everything.effects.iter().map(|named| named.effect.name).collect();
     let missing: Vec<&str> =
-        registry::all().map(|effect| effect.name).filter(|effect| !named.contains(effect)).collect();
+        effects::all().map(|effect| effect.name).filter(|effect| !named.contains(effect)).collect();
     assert!(missing.is_empty(), "everything.toml does not name {missing:?}");
 }
 

@@ -8,7 +8,7 @@ use sim::events::{EVENT, KINDS};
 use sim::scene::tables::{EXPECT, Key, Kind, ROOT, SCRIPT, TABLES};
 use sim::scene::text::{self, set};
 use sim::scene::{self, Scene, SceneErrors, read};
-use sim::{metrics, registry};
+use sim::{effects, metrics};
 use std::collections::BTreeSet;
 
 /// Names and texts of the library.
@@ -137,7 +137,7 @@ const PLAIN: &[&str] = &[
 fn described() -> Vec<(&'static str, &'static Key)> {
     let tables =
         TABLES.iter().chain([&ROOT, &SCRIPT, &EVENT, &EXPECT]).chain(&KINDS).map(|table| (table.name, table.keys));
-    let effects = registry::all().map(|effect| (effect.name, effect.keys));
+    let effects = effects::all().map(|effect| (effect.name, effect.keys));
     tables.chain(effects).flat_map(|(name, keys)| keys.iter().map(move |key| (name, key))).collect()
 }
 
@@ -192,8 +192,8 @@ fn every_default_lies_within_its_range_and_every_key_says_what_it_is() {
 #[test]
 fn every_effect_is_described_and_no_name_comes_twice() {
     let distinct = |names: Vec<&str>| BTreeSet::from_iter(names.iter().copied()).len() == names.len();
-    assert!(distinct(registry::all().map(|effect| effect.name).collect()));
-    for effect in registry::all() {
+    assert!(distinct(effects::all().map(|effect| effect.name).collect()));
+    for effect in effects::all() {
         assert!(distinct(effect.keys.iter().map(|key| key.name).collect()), "{}", effect.name);
         assert!(!effect.equations.is_empty() && !effect.state.is_empty() && !effect.reference.is_empty());
     }

@@ -1,9 +1,9 @@
 //! Effects and the clock.
 
 use crate::{Last, run, scene, world};
-use sim::bridge::Bridge;
 use sim::effects::Named;
 use sim::host::Host;
+use sim::mechanics::Bridge;
 use sim::native::{Begun, Clock, simulate_from};
 use sim::watch::{Step, Truth, Watch};
 use sim::world::World;

@@ -2,9 +2,9 @@
 
 use crate::{close, part, run, world};
 use core::f64::consts::TAU;
-use sim::bridge::Bridge;
 use sim::effects::drive::{Circuit, Friction};
 use sim::effects::{Named, Part};
+use sim::mechanics::Bridge;
 use sim::world::World;
 
 const FAR: &str = "[object]\ndistance_mm = 100.0\n";

@@ -1,9 +1,9 @@
 //! No passive effect creates energy: a million random steps of each.
 
 use crate::world;
-use sim::bridge::Bridge;
 use sim::cores;
 use sim::effects::Named;
+use sim::mechanics::Bridge;
 use sim::world::World;
 
 const WALL_MM: f64 = 0.3;

@@ -3,9 +3,8 @@
 use crate::part;
 use fingertip::shipped::{COLUMNS, SLOTS};
 use sim::effects::link::{Named, Stages};
-use sim::effects::{Part, stream};
+use sim::effects::{self, Part, stream};
 use sim::host::Host;
-use sim::registry;
 use sim::scene::Scene;
 
 fn scene(tables: &str) -> Scene {
@@ -14,7 +13,7 @@ fn scene(tables: &str) -> Scene {
 
 fn stages(scene: &Scene, seed: u64) -> Named {
     let mut stages = Named::default();
-    for (name, part) in registry::build(&scene.effects, seed, 0) {
+    for (name, part) in effects::build(&scene.effects, seed, 0) {
         assert!(stages.take(name, part).is_none());
     }
     stages

@@ -8,8 +8,8 @@ use fingertip::config::newtons;
 use fingertip::shipped;
 use fingertip::state::Mode;
 use proptest::test_runner::{Config, RngSeed};
-use sim::bridge::Bridge;
 use sim::effects::Named;
+use sim::mechanics::Bridge;
 use sim::native::bench::Bench;
 use sim::plant::{Plant, Setup};
 

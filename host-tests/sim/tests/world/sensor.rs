@@ -5,9 +5,8 @@ mod network;
 
 use crate::scene;
 use fingertip::shipped::{COLUMNS, ROWS, SLOTS};
-use sim::effects::Part;
 use sim::effects::sensor::{self, Codes, Network, Pressure, Readout, Row, Volts};
-use sim::registry;
+use sim::effects::{self, Part};
 use sim::scene::text;
 use sim::setup::Array;
 
@@ -45,7 +44,7 @@ fn all(value: f64) -> Row {
 fn stages(tables: &str, seed: u64) -> sensor::Named {
     let scene = scene(&format!("duration_s = 1\n{tables}"));
     let mut stages = sensor::Named::default();
-    for (name, part) in registry::build(&scene.effects, seed, 0) {
+    for (name, part) in effects::build(&scene.effects, seed, 0) {
         stages.take(name, part);
     }
     stages
@@ -102,7 +101,7 @@ fn every_effect_by_its_default_changes_something() {
 fn without_magnitude_no_bit_changes() {
     let plain = scan(&mut (), 1000, 1);
     assert_eq!(scan(&mut stages("", 1), 1000, 1), plain);
-    let all: String = registry::all().filter(|effect| names().contains(&effect.name)).map(text::zero).collect();
+    let all: String = effects::all().filter(|effect| names().contains(&effect.name)).map(text::zero).collect();
     let mut zero = stages(&all, 1);
     assert_eq!(scan(&mut zero, 1000, 1), plain);
     for cost in zero.costs() {

@@ -3,7 +3,7 @@
 
 use super::{STEP_S, free, pressed, run};
 use proptest::prelude::*;
-use sim::bridge::Bridge;
+use sim::mechanics::Bridge;
 use sim::optimal::{Reason, minimum_time_s, profile};
 use sim::plant::{Plant, Setup};
 

@@ -3,8 +3,8 @@
 //! It runs on the native board and, in the package `virtual-board`, on the flash image. [`Trace`] watches both and
 //! keeps the goals, the world at every frame, and the array at the end of each hold.
 
+use crate::mechanics::rotor::minimum_time_s;
 use crate::metrics::{self, Meter, newtons};
-use crate::optimal::minimum_time_s;
 use crate::run::RunError;
 use crate::scene::{Scene, library, read};
 use crate::setup::Setup;

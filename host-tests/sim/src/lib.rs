@@ -24,7 +24,6 @@ pub mod host;
 pub mod mechanics;
 pub mod metrics;
 pub mod native;
-pub mod optimal;
 #[cfg(feature = "files")]
 mod part;
 pub mod plant;

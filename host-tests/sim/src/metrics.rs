@@ -5,14 +5,11 @@
 
 mod conduct;
 mod finger;
-mod response;
 
 pub use crate::metrics::conduct::Hold;
-pub use crate::metrics::finger::{Finger, duty, newtons};
-pub use crate::metrics::response::AtGoal;
+pub use crate::metrics::finger::{AtGoal, Finger, duty, newtons};
 
-use crate::metrics::finger::DROPPED_MM;
-use crate::metrics::response::Response;
+use crate::metrics::finger::{DROPPED_MM, Response};
 use crate::scene::Bound;
 use crate::watch::{Controller, Step, Watch};
 use Worst::{FirstFault, Largest, Least, Sum};

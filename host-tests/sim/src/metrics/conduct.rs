@@ -1,8 +1,7 @@
 //! Conduct of a finger: what it must never do, and its holds and rests. Only the true state of the finger counts, never
 //! what the controller reports.
 
-use super::finger::{duty, newtons, trimmed};
-use super::response::{AtGoal, note};
+use super::finger::{AtGoal, duty, newtons, note, trimmed};
 use crate::watch::Step;
 use fingertip::params::Params;
 use serde::{Deserialize, Serialize};

@@ -4,7 +4,7 @@
 use super::{STEP_S, free, pressed, run};
 use proptest::prelude::*;
 use sim::mechanics::Bridge;
-use sim::optimal::{Reason, minimum_time_s, profile};
+use sim::mechanics::rotor::{Reason, minimum_time_s, profile};
 use sim::plant::{Plant, Setup};
 
 const FULL: Bridge = Bridge::Driven { duty: 1.0 };

@@ -8,7 +8,7 @@
 use sim::cli;
 use sim::effects::{self, Description, Named, Set};
 use sim::native::simulate_with;
-use sim::scene::{Scene, read, text};
+use sim::scene::{self, Scene, read};
 use sim::watch::{Step, Watch};
 use std::error::Error;
 use std::time::Instant;
@@ -27,7 +27,7 @@ fn seconds<E: Set>(scene: &Scene) -> Result<f64, Box<dyn Error>> {
 
 /// The scene with these effects alone, without magnitude.
 fn named(scene: &Scene, effects: &[&'static Description]) -> Result<Scene, Box<dyn Error>> {
-    let tables: String = effects.iter().map(|effect| text::zero(effect)).collect();
+    let tables: String = effects.iter().map(|effect| scene::zero(effect)).collect();
     let effects = read("named.toml", &format!("about = \"\"\nduration_s = 1\n{tables}"), &[])?.effects;
     Ok(Scene { effects, ..scene.clone() })
 }

@@ -6,7 +6,7 @@
 use crate::mechanics::rotor::minimum_time_s;
 use crate::metrics::{self, Meter, newtons};
 use crate::run::RunError;
-use crate::scene::{Scene, library, read};
+use crate::scene::{self, Scene, read};
 use crate::setup::Setup;
 use crate::watch::{Controller, Step, Watch};
 use fingertip::params::Params;
@@ -67,7 +67,7 @@ pub type DemoError = RunError;
 
 /// Returns the scene. The quick one holds the same goals for a shorter time.
 pub fn scene(quick: bool) -> Result<Scene, DemoError> {
-    let (path, text) = library::text(SCENE)?;
+    let (path, text) = scene::library_text(SCENE)?;
     let mut scene = read(&path.to_string_lossy(), &text, &metrics::names())?;
     if quick {
         scene.duration_s = 0.0;

@@ -4,7 +4,7 @@ use crate::effects::{self, Build, CONTACT, DRIVE, Description, LINK, Part, SENSO
 use crate::events::{EVENT, KINDS, own_keys};
 use crate::metrics;
 use crate::scene::tables::{EXPECT, Key, ROOT, SCRIPT, TABLES, Values};
-use crate::scene::{Scene, library, read};
+use crate::scene::{self, Scene, read};
 use std::fmt::Write as _;
 
 /// Describes the effects of a scene, with the equations and the state of each.
@@ -36,11 +36,11 @@ pub fn scene(scene: &Scene) -> String {
 
 /// Lists the scenes of the library, each with its description.
 pub fn list() -> Result<String, Box<dyn std::error::Error + Send + Sync>> {
-    let names = library::names()?;
+    let names = scene::library_names()?;
     let width = names.iter().map(String::len).max().unwrap_or(0);
     let mut text = String::new();
     for name in names {
-        let (path, scene) = library::text(&name)?;
+        let (path, scene) = scene::library_text(&name)?;
         let about = read(&path.to_string_lossy(), &scene, &metrics::names())?.about;
         let _ = writeln!(text, "{name:width$}  {about}");
     }

@@ -11,7 +11,6 @@
 
 #![expect(missing_docs, reason = "a name that tells quantity and unit has no comment that repeats it")]
 
-pub mod agreement;
 #[cfg(feature = "files")]
 pub mod cli;
 pub mod cores;

@@ -92,7 +92,7 @@ enum Command {
         #[arg(long, value_name = "ELF")]
         image: PathBuf,
         #[command(flatten)]
-        population: sim::population::cli::Args,
+        population: sim::population::Args,
     },
 }
 
@@ -119,7 +119,7 @@ fn main() -> ExitCode {
         }
         #[cfg(feature = "scenes")]
         Command::Population { image, population } => {
-            use sim::population::cli::{Board, answer};
+            use sim::population::{Board, answer};
             return answer(&population, &|of, watch| match population.board {
                 Board::Native => sim::native::board(of, watch),
                 Board::Calibrated => sim::native::calibrated::board(of, watch),

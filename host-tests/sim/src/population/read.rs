@@ -3,10 +3,9 @@
 use crate::events::{EVENT, KINDS, own_keys};
 use crate::population::draw::{self, Draw, Drawn};
 use crate::population::{Counted, Events, Place, Population};
-use crate::scene::library;
 use crate::scene::reader::{SceneError, SceneErrors, did_you_mean, item_span, key_span, not_toml};
 use crate::scene::tables::{EXPECT, Key, Kind, ROOT, SCRIPT, TABLES};
-use crate::{effects, metrics};
+use crate::{effects, metrics, scene};
 use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -177,7 +176,7 @@ pub fn folder() -> PathBuf {
 
 /// Loads a population by its path, or by its name in the project. The error is for people.
 pub fn load(name: &str) -> Result<Population, String> {
-    let (path, text) = library::find(&folder(), "population", name)?;
+    let (path, text) = scene::find(&folder(), "population", name)?;
     let file = path.to_string_lossy();
     let over: DocumentMut =
         text.parse().map_err(|error: toml_edit::TomlError| format!("{file}: this is not TOML: {error}"))?;
@@ -186,7 +185,7 @@ pub fn load(name: &str) -> Result<Population, String> {
     let beside = path.with_file_name(base).with_extension("toml");
     let found = if beside.is_file() { beside } else { folder().join(base).with_extension("toml") };
     let told = |why: String| format!("{file} extends {base}: {why}");
-    let unknown = |error| told(library::unknown(&folder(), "population", base, &error));
+    let unknown = |error| told(scene::unknown(&folder(), "population", base, &error));
     let text = fs::read_to_string(&found).map_err(unknown)?;
     let whole: Result<DocumentMut, toml_edit::TomlError> = text.parse();
     if whole.as_ref().is_ok_and(|whole| whole.contains_key("extends")) {

@@ -1,9 +1,8 @@
 //! Data of a report, collected during the run: a bounded number of stretches at any length of the run, and the modes,
 //! faults and limits that occurred.
 
-use crate::agreement::Path;
 use crate::metrics::{duty, newtons};
-use crate::watch::{Step, Watch};
+use crate::watch::{Path, Step, Watch};
 use fingertip::pipeline::Status;
 use fingertip::shipped::{COLUMNS, Frame, ROWS};
 use fingertip::state::{Fault, Limits, Mode};

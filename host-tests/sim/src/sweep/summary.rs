@@ -4,7 +4,7 @@ use crate::metrics::shown;
 use crate::part::cannot_write;
 use crate::report::around;
 use crate::run::RunError;
-use crate::sweep::files::{DIGEST, EXPECT, PASSED, SEED};
+use crate::sweep::{DIGEST, EXPECT, PASSED, SEED};
 use csv::Writer;
 use output::kept::Lock;
 use output::plot::{Curve, Curves, PlotError, curves};

@@ -4,7 +4,7 @@ use crate::scene;
 use fingertip::shipped::{COLUMNS, ROWS, SLOTS};
 use sim::metrics::Verdict;
 use sim::run::run;
-use sim::scene::{Bound, library};
+use sim::scene::{self, Bound};
 use sim::watch::{Step, Watch};
 use sim::{cores, effects, native};
 use std::collections::BTreeSet;
@@ -92,7 +92,7 @@ fn unbroken(name: &str, keys: &[&str]) -> BTreeSet<(String, &'static str)> {
 #[test]
 fn each_bound_of_the_library_breaks_on_either_side_when_something_is_wrong() {
     let names: Vec<&str> = BREAKERS.iter().map(|(name, _)| *name).collect();
-    assert_eq!(names, library::names().expect("the library is there"));
+    assert_eq!(names, scene::library_names().expect("the library is there"));
     cores::map(BREAKERS, |(name, keys)| assert_eq!(unbroken(name, keys), BTreeSet::new(), "{name}"));
 }
 

@@ -6,15 +6,14 @@ use fingertip::params::Params;
 use sim::cli::load;
 use sim::events::{EVENT, KINDS};
 use sim::scene::tables::{EXPECT, Key, Kind, ROOT, SCRIPT, TABLES};
-use sim::scene::text::{self, set};
-use sim::scene::{self, Scene, SceneErrors, read};
+use sim::scene::{self, Scene, SceneErrors, read, set};
 use sim::{effects, metrics};
 use std::collections::BTreeSet;
 
 /// Names and texts of the library.
 fn library() -> Vec<(String, String)> {
-    let names = scene::library::names().unwrap();
-    names.into_iter().map(|name| (name.clone(), scene::library::text(&name).unwrap().1)).collect()
+    let names = scene::library_names().unwrap();
+    names.into_iter().map(|name| (name.clone(), scene::library_text(&name).unwrap().1)).collect()
 }
 
 fn read_it(text: &str) -> Result<Scene, SceneErrors> {
@@ -31,9 +30,9 @@ fn every_scene_reads_and_writes_the_same() {
     let event = "about = \"\"\nduration_s = 1\n[[event]]\nkind = \"encoder_slip\"\nat_s = 0.5\nby_counts = -4\n";
     for (name, text) in library().into_iter().chain([("event".into(), event.into())]) {
         let once = read_it(&text).unwrap_or_else(|errors| panic!("{name}: {errors}"));
-        let written = text::write(&once);
+        let written = scene::write(&once);
         let again = read_it(&written).unwrap_or_else(|errors| panic!("{name}: {errors}"));
-        assert_eq!(text::write(&again), written);
+        assert_eq!(scene::write(&again), written);
         let named = |scene: &Scene| {
             scene.effects.iter().map(|named| (named.effect.name, named.values.clone())).collect::<Vec<_>>()
         };
@@ -121,7 +120,7 @@ fn any_setting_is_answered() {
     for _ in 0..5_000 {
         let mut some = |most| (0..rng.usize(0..most)).map(|_| TOKENS[rng.usize(0..TOKENS.len())]).collect::<String>();
         let (place, value) = (some(5), some(3));
-        if let Ok(changed) = text::set(&scenes[0].1, &place, &value) {
+        if let Ok(changed) = scene::set(&scenes[0].1, &place, &value) {
             answers(&changed);
         }
     }

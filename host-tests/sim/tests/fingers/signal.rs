@@ -9,7 +9,7 @@ use fingertip::params::Params;
 use fingertip::shipped::{COLUMNS, Config, ROWS};
 use images::record::Record;
 use sim::run::run;
-use sim::scene::{Goal, Scene, library, read};
+use sim::scene::{self, Goal, Scene, read};
 use sim::{cores, metrics, native};
 
 /// Largest true force of a run in which all codes keep their last values, or go back to those of the tare as when the
@@ -89,7 +89,7 @@ fn at_rest(scene: &Scene, what: &str) -> [Case; 2] {
 
 #[test]
 fn a_flickering_taxel_does_not_shake_the_motor() {
-    let (path, text) = library::text("raspberry").unwrap_or_else(|error| panic!("{error}"));
+    let (path, text) = scene::library_text("raspberry").unwrap_or_else(|error| panic!("{error}"));
     let names = metrics::names();
     let raspberry = read(&path.to_string_lossy(), &text, &names).unwrap_or_else(|errors| panic!("{errors}"));
     let mut cases = Vec::new();

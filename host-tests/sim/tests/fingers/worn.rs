@@ -2,13 +2,12 @@
 //! against creep and temperature and after a calibration.
 
 use crate::{number, replaced};
-use sim::cores;
 use sim::native::calibrated::{Calibrated, errors_text, fingers, percentiles};
 use sim::native::{self, simulate_calibrated};
 use sim::run::{Run, run};
-use sim::scene::{Scene, library, read};
+use sim::scene::{self, Scene, read};
 use sim::watch::Watch;
-use sim::{metrics, population};
+use sim::{cores, metrics, population};
 
 /// Permille and ms.
 const CREEP: (i32, i32) = (100, 200);
@@ -24,7 +23,7 @@ fn controller((permille, time_ms): (i32, i32)) -> String {
 
 /// Scene of worn sensors with other values, and keys of the controller.
 fn changed(seed: u64, changes: &[(&str, &str)], controller: &str) -> Scene {
-    let (path, text) = library::text("worn_sensor").expect("it is there");
+    let (path, text) = scene::library_text("worn_sensor").expect("it is there");
     let text = format!("seed = {seed}\n{}\n[controller]\n{controller}", replaced(&text, changes));
     read(&path.to_string_lossy(), &text, &metrics::names()).unwrap_or_else(|errors| panic!("{errors}"))
 }

@@ -16,7 +16,7 @@ use fingertip::state::Mode;
 use sim::effects::{self, Named, Part, Set};
 use sim::mechanics::Bridge;
 use sim::native::simulate_with;
-use sim::scene::{Scene, read, text};
+use sim::scene::{self, Scene, read};
 use sim::watch::{Cost, Step, Summary, Truth, Watch};
 use sim::world::{Surroundings, World};
 
@@ -160,12 +160,12 @@ fn compiled_in_but_not_named_changes_no_bit_and_is_never_called() {
 #[test]
 fn effects_without_magnitude_change_no_bit_and_are_called_alike_alone_and_together() {
     let plain = run_script::<()>("").digest;
-    let all = run_script::<Named>(&effects::all().map(text::zero).collect::<String>());
+    let all = run_script::<Named>(&effects::all().map(scene::zero).collect::<String>());
     assert_eq!((all.digest.as_str(), all.ledger.len()), (plain.as_str(), effects::all().count()));
     // Calls of one do not depend on which others are named: cost is linear in their number, to the call.
     for cost in &all.ledger {
         let effect = effects::all().find(|effect| effect.name == cost.effect).unwrap();
-        let alone = run_script::<Named>(&text::zero(effect));
+        let alone = run_script::<Named>(&scene::zero(effect));
         let [Cost { evaluations, .. }] = alone.ledger[..] else { panic!("{}: {:?}", effect.name, alone.ledger) };
         assert_eq!((&alone.digest, evaluations), (&plain, cost.evaluations), "{}", effect.name);
         assert!(evaluations > 0, "{} was not called", effect.name);

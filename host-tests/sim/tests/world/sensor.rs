@@ -7,7 +7,6 @@ use crate::scene;
 use fingertip::shipped::{COLUMNS, ROWS, SLOTS};
 use sim::effects::sensor::{self, Codes, Network, Pressure, Readout, Row, Volts};
 use sim::effects::{self, Part};
-use sim::scene::text;
 use sim::setup::Array;
 
 /// An effect by its keys.
@@ -101,7 +100,7 @@ fn every_effect_by_its_default_changes_something() {
 fn without_magnitude_no_bit_changes() {
     let plain = scan(&mut (), 1000, 1);
     assert_eq!(scan(&mut stages("", 1), 1000, 1), plain);
-    let all: String = effects::all().filter(|effect| names().contains(&effect.name)).map(text::zero).collect();
+    let all: String = effects::all().filter(|effect| names().contains(&effect.name)).map(sim::scene::zero).collect();
     let mut zero = stages(&all, 1);
     assert_eq!(scan(&mut zero, 1000, 1), plain);
     for cost in zero.costs() {

@@ -3,10 +3,8 @@
 //! Effects that a scene does not name must cost nothing, and effects without magnitude must change nothing. This file
 //! also has the functions that the tests share.
 
-mod clock;
 mod contact;
 mod drive;
-mod energy;
 mod events;
 mod link;
 mod plant;

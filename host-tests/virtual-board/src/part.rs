@@ -7,15 +7,13 @@
 //! - A divider of the PLL that the manual forbids is reported as a gap, see `clock`.
 //! - The converters take external triggers and read the fingertip's array; DMA2 takes their words a sequence at a time.
 
-use crate::bus_port::BusPort;
 use crate::converter::Converter;
 use crate::flash;
 use crate::front_end::Shared;
-use crate::pwm_timer::PwmTimer;
-use crate::scan_timer::ScanTimer;
 use crate::streams::Streams;
+use crate::timers::{PwmTimer, ScanTimer};
 use crate::window_watchdog::WindowWatchdog;
-use crate::wire::Wire;
+use crate::wire::{BusPort, Wire};
 use rigless::device::{Device, ErasedDevice, Level, RegisterFile, ResetCause};
 use rigless::mcu::Mcu;
 use rigless::soc::stm32f427::Stm32f427;

@@ -4,14 +4,12 @@
 //! at a halt, between two instructions; nothing runs without an order. The same calls give the same run.
 
 use crate::bench::{Bench, STEP_NS};
-use crate::board::FingerBoard;
-use crate::error::Error;
+use crate::board::{FingerBoard, Surroundings};
 use crate::flash::SECTOR;
 use crate::front_end::{ScanCounts, Shared};
 use crate::image::Firmware;
-use crate::inside;
 use crate::scene::finger::Finger;
-use crate::surroundings::Surroundings;
+use crate::{Error, converter};
 use fingertip::chip::Factory;
 use fingertip::params::Params;
 use fingertip::shipped::Record;
@@ -47,7 +45,7 @@ impl Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { presets: Vec::new(), brown_out_bits: 0, factory: inside::factory() }
+        Self { presets: Vec::new(), brown_out_bits: 0, factory: converter::factory() }
     }
 }
 
@@ -59,7 +57,7 @@ fn images(image: &Firmware, options: &Options) -> Result<Vec<Image>, Error> {
     let mut images = vec![read(image.path(), image.elf().to_vec(), None)?];
     let Factory { reference, sensor: [cold, hot] } = options.factory;
     let factory = [reference, cold, hot].map(u16::to_le_bytes).concat();
-    images.push(read(Path::new("factory"), factory, Some(inside::FACTORY_AT))?);
+    images.push(read(Path::new("factory"), factory, Some(converter::FACTORY_AT))?);
     for (address, bytes) in &options.presets {
         images.push(read(Path::new("preset"), bytes.clone(), Some(*address))?);
     }

@@ -15,13 +15,11 @@
 //!
 //! A scene with two fingers has two boards in one world, each on a separate bus.
 
-pub mod bus;
 pub mod finger;
 pub mod host;
-mod joint;
 
 use crate::bench::Bench;
-use crate::surroundings::Surroundings;
+use crate::board::Surroundings;
 use crate::{Error, Options, Rig, flash};
 use finger::{Clock, Finger};
 use fingertip::contact::FitLevel;
@@ -244,6 +242,6 @@ fn frame_offset(rig: &mut Rig) -> Result<u32, Error> {
 
 fn write_u8(rig: &mut Rig, doing: &str, register: u16, value: u8) -> Result<(), Error> {
     let at_ms = rig.now_ns() as f64 * 1e-6;
-    let written = rig.client(WAIT_NS, move |line| line.write_u8(bus::ID, register, value).map(drop))?;
+    let written = rig.client(WAIT_NS, move |line| line.write_u8(host::ID, register, value).map(drop))?;
     written.map_err(|why| Error::Host { at_ms, why: format!("{doing}: {why}") })
 }

@@ -3,7 +3,7 @@
 //! It runs on the native board and, in the package `virtual-board`, on the flash image. [`Trace`] watches both and
 //! keeps the goals, the world at every frame, and the array at the end of each hold.
 
-use crate::mechanics::rotor::minimum_time_s;
+use crate::mechanics::rotor::profile;
 use crate::metrics::{self, Meter, newtons};
 use crate::run::RunError;
 use crate::scene::{self, Scene, read};
@@ -349,8 +349,8 @@ impl StepFigures {
         let [volts, amperes] =
             [Params::DEFAULT.voltage_max_mv, Params::DEFAULT.current_max_ma].map(|milli| f64::from(milli) * 1e-3);
         let [d_from_mm, d_to_mm] = [asked.from_n, asked.goal_n].map(|force_n| setup.tip.indentation_mm(force_n));
-        let time_optimal_s = minimum_time_s(&setup, d_from_mm, d_to_mm, volts, amperes);
-        let time_optimal_ms = 1e3 * time_optimal_s.map_err(|why| format!("no bound for a step: {why}"))?;
+        let optimal = profile(&setup, d_from_mm, d_to_mm, volts, amperes);
+        let time_optimal_ms = 1e3 * optimal.map_err(|why| format!("no bound for a step: {why}"))?.total_s;
         let measured = asked.meter.measured();
         let settling_ms = measured.get("settling_ms");
         Ok(Self {

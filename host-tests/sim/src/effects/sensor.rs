@@ -188,7 +188,7 @@ pub const EFFECTS: &[Description] = &[
         keys: &[Key::number("width_percent", "Width of the loop, of the pressure.", 0.0, 100.0, 10.0)],
         zero: &[("width_percent", 0.0)],
         build: |build: &Build| {
-            let half = build.values.number("width_percent") / 200.0;
+            let half = build.number("width_percent") / 200.0;
             let mut held_kpa = [Row::default(); ROWS];
             Part::Pressure(Box::new(move |row: usize, _: f64, kpa: &mut Row| {
                 for (held, kpa) in held_kpa[row].iter_mut().zip(kpa) {
@@ -212,7 +212,7 @@ pub const EFFECTS: &[Description] = &[
         keys: &[Key::number("rate_percent_per_decade", "Growth of the reading.", 0.0, 50.0, 5.0)],
         zero: &[("rate_percent_per_decade", 0.0)],
         build: |build: &Build| {
-            let share = build.values.number("rate_percent_per_decade") / 100.0;
+            let share = build.number("rate_percent_per_decade") / 100.0;
             let (mut since, mut crept_kpa) = (Since::default(), [[[0.0; COLUMNS]; TERMS]; ROWS]);
             Part::Pressure(Box::new(move |row: usize, time_s: f64, kpa: &mut Row| {
                 let step_s = since.step_s(row, time_s);
@@ -242,7 +242,7 @@ pub const EFFECTS: &[Description] = &[
         zero: &[("rms_percent", 0.0)],
         build: |build: &Build| {
             let mut rng = build.rng();
-            let share = build.values.number("rms_percent") / 100.0;
+            let share = build.number("rms_percent") / 100.0;
             let gains: [Row; ROWS] =
                 [(); ROWS].map(|()| Row::default().map(|_| (1.0 + share * normal_within_3(&mut rng)).max(0.0)));
             Part::Pressure(Box::new(move |row: usize, _: f64, kpa: &mut Row| {
@@ -276,7 +276,7 @@ pub const EFFECTS: &[Description] = &[
         ],
         zero: &[("warming_k", 0.0)],
         build: |build: &Build| {
-            let number = |name| build.values.number(name);
+            let number = |name| build.number(name);
             Part::Pressure(Box::new(TemperatureDrift {
                 warming_k: number("warming_k"),
                 time_constant_s: number("time_constant_s"),
@@ -307,13 +307,11 @@ pub const EFFECTS: &[Description] = &[
             let mut taxels = [[Taxel::Sound; COLUMNS]; ROWS];
             let shorted = Taxel::Fixed(Array::default().short_siemens);
             for (name, taxel) in [("stuck", Taxel::Stuck), ("shorted", shorted), ("dead", Taxel::Fixed(0.0))] {
-                build
-                    .values
-                    .pairs(name)
-                    .iter()
-                    .for_each(|[row, column]| taxels[*row as usize][*column as usize] = taxel);
+                for [row, column] in build.values.pairs(name) {
+                    taxels[*row as usize][*column as usize] = taxel;
+                }
             }
-            let at_s = build.values.number("at_s");
+            let at_s = build.number("at_s");
             Part::Conductance(Box::new(move |row, time_s, siemens| {
                 if time_s < at_s {
                     return;
@@ -342,7 +340,7 @@ pub const EFFECTS: &[Description] = &[
         keys: &[Key::number("hold_ohm", "Resistance to the virtual ground; 0 is perfect.", 0.0, 1e12, 1000.0)],
         zero: &[("hold_ohm", 0.0)],
         build: |build: &Build| {
-            let hold_ohm = build.values.number("hold_ohm");
+            let hold_ohm = build.number("hold_ohm");
             Part::Network(Box::new(move |row, array, seen| {
                 if hold_ohm > 0.0 {
                     *seen = short_circuit(row, array, 1.0 / hold_ohm);
@@ -359,7 +357,7 @@ pub const EFFECTS: &[Description] = &[
         keys: &[Key::number("switch_ohm", "Resistance of switch and trace, R_on.", 0.0, 300.0, 30.0)],
         zero: &[("switch_ohm", 0.0)],
         build: |build: &Build| {
-            let switch_ohm = build.values.number("switch_ohm");
+            let switch_ohm = build.number("switch_ohm");
             Part::Network(Box::new(move |_, _, seen| {
                 let left = 1.0 + switch_ohm * seen.iter().sum::<f64>();
                 seen.iter_mut().for_each(|siemens| *siemens /= left);
@@ -381,7 +379,7 @@ pub const EFFECTS: &[Description] = &[
         ],
         zero: &[("tau_us", 0.0)],
         build: |build: &Build| {
-            let [tau_s, after_s] = ["tau_us", "after_us"].map(|key| build.values.number(key) * 1e-6);
+            let [tau_s, after_s] = ["tau_us", "after_us"].map(|key| build.number(key) * 1e-6);
             let mut settling = Settling::new(tau_s, after_s);
             Part::Volts(Box::new(move |_, time_s, volts| settling.sample(time_s, volts)))
         },
@@ -401,7 +399,7 @@ pub const EFFECTS: &[Description] = &[
         )],
         zero: &[("headroom_mv", 0.0)],
         build: |build: &Build| {
-            let rail_v = Array::default().reference_v - build.values.number("headroom_mv") * 1e-3;
+            let rail_v = Array::default().reference_v - build.number("headroom_mv") * 1e-3;
             Part::Volts(Box::new(move |_, _, volts| volts.iter_mut().for_each(|volts| *volts = volts.min(rail_v))))
         },
     },
@@ -414,7 +412,7 @@ pub const EFFECTS: &[Description] = &[
         keys: &[Key::number("rms_codes", "Deviation, 12-bit codes.", 0.0, 500.0, 1.5)],
         zero: &[("rms_codes", 0.0)],
         build: |build: &Build| {
-            let rms_codes = build.values.number("rms_codes");
+            let rms_codes = build.number("rms_codes");
             let mut rng = build.rng();
             Part::Codes(Box::new(move |_, _, codes| {
                 let noise: Row = normals(&mut rng);
@@ -432,7 +430,7 @@ pub const EFFECTS: &[Description] = &[
         zero: &[("rms_codes", 0.0)],
         build: |build: &Build| {
             let mut rng = build.rng();
-            let rms_codes = build.values.number("rms_codes");
+            let rms_codes = build.number("rms_codes");
             let offsets = [(); SLOTS].map(|()| Row::default().map(|_| rms_codes * normal_within_3(&mut rng)));
             Part::Codes(Box::new(move |slot, _, codes| {
                 codes.iter_mut().zip(offsets[slot]).for_each(|(code, offset)| *code += offset);
@@ -455,7 +453,7 @@ pub const EFFECTS: &[Description] = &[
         zero: &[("bits", 12.0), ("inl_codes", 0.0)],
         build: |build: &Build| {
             let step = f64::from(1 << (12 - build.values.whole("bits")));
-            let inl_codes = build.values.number("inl_codes");
+            let inl_codes = build.number("inl_codes");
             Part::Codes(Box::new(move |_, _, codes| {
                 for code in codes {
                     let x = (*code / Array::CODES).clamp(0.0, 1.0);

@@ -378,17 +378,6 @@ pub enum Reason {
     RunsAway,
 }
 
-/// Shortest time from rest at one indentation to rest at another; see [`profile`].
-pub fn minimum_time_s(
-    setup: &Setup,
-    d_from_mm: f64,
-    d_to_mm: f64,
-    voltage_limit: f64,
-    current_limit: f64,
-) -> Result<f64, Unreachable> {
-    profile(setup, d_from_mm, d_to_mm, voltage_limit, current_limit).map(|profile| profile.total_s)
-}
-
 /// Returns the time-optimal motion from rest at one indentation to rest at another, with which force steps are compared.
 /// The voltage is at most that of the supply.
 ///

@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
 use sim::effects::Named;
 use sim::mechanics::pressures::Cell;
-use sim::mechanics::rotor::{Reason, minimum_time_s, profile};
+use sim::mechanics::rotor::{Reason, profile};
 use sim::mechanics::{Bridge, decay};
 use sim::native::bench::Bench;
 use sim::plant::{Plant, Row, Setup, Taxel};
@@ -482,7 +482,7 @@ fn the_world_driven_so_arrives_at_rest() {
 fn no_other_single_switch_is_faster() {
     // With less drive or less brake, whoever stops at the target stops later.
     let setup = Setup::default();
-    let time_s = |volts, amperes| minimum_time_s(&setup, 0.5, 1.6, volts, amperes).unwrap();
+    let time_s = |volts, amperes| profile(&setup, 0.5, 1.6, volts, amperes).unwrap().total_s;
     assert!([6.0, 5.0, 4.0, 3.0].map(|volts| time_s(volts, NO_LIMIT)).is_sorted_by(|a, b| a < b));
     assert!([NO_LIMIT, 1.5, 1.0, 0.5].map(|amperes| time_s(6.0, amperes)).is_sorted_by(|a, b| a < b));
 }
@@ -490,12 +490,12 @@ fn no_other_single_switch_is_faster() {
 #[test]
 fn what_the_motor_cannot_do_is_said() {
     let setup = Setup::default();
-    let weak = minimum_time_s(&setup, 0.5, 3.0, 6.0, 0.1).unwrap_err();
+    let weak = profile(&setup, 0.5, 3.0, 6.0, 0.1).unwrap_err();
     assert_eq!((weak.reason, weak.to_mm), (Reason::TooWeak, 3.0));
     assert!(weak.to_string().contains("allow more voltage or current"), "{weak}");
     let mut slick = Setup::default();
     slick.transmission.efficiency = 1.0;
     slick.motor.friction_nm = 0.0;
-    assert_eq!(minimum_time_s(&slick, 3.0, 2.0, 6.0, 0.05).unwrap_err().reason, Reason::RunsAway);
-    assert_eq!(minimum_time_s(&setup, 2.0, 2.0, 6.0, 1.0), Ok(0.0));
+    assert_eq!(profile(&slick, 3.0, 2.0, 6.0, 0.05).unwrap_err().reason, Reason::RunsAway);
+    assert_eq!(profile(&setup, 2.0, 2.0, 6.0, 1.0).unwrap().total_s, 0.0);
 }

@@ -9,7 +9,7 @@
 //! A run is slow because of the halts of the emulated core, and of the code that must be translated after each halt. So
 //! the world advances when something depends on it, and otherwise in steps of
 //! [`finger::Finger::grid_ns`]; the scan's slots are simulated together ([`crate::front_end::Scan`]), the bridge's
-//! timer sleeps ([`crate::pwm_timer`]), and the host acts only where the core is stopped anyway.
+//! timer sleeps ([`crate::timers`]), and the host acts only where the core is stopped anyway.
 //!
 //! The world is frozen until a millisecond before the scene's start: the boards boot and are tared in it.
 //!

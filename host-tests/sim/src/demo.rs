@@ -45,7 +45,6 @@ pub struct Asked {
 
 #[derive(Clone, Debug, Default)]
 pub struct Run {
-    /// Goals in order.
     pub goals: Vec<Asked>,
     /// State of the world at each frame.
     pub trace: Vec<Sample>,
@@ -173,7 +172,6 @@ pub struct Taxels {
 }
 
 impl Taxels {
-    /// Conversion for the array of a scene.
     pub fn of(scene: &Scene) -> Self {
         let params = scene.params();
         Self {
@@ -205,7 +203,6 @@ pub struct Forces {
     pub release: Release,
 }
 
-/// The first touch of an object.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Touch {
     pub goal_n: f64,
@@ -222,7 +219,6 @@ pub struct Touch {
     pub steady_error_mn: Option<f64>,
 }
 
-/// A step from one force to another.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct StepFigures {
     /// True force when the goal changed.
@@ -250,7 +246,6 @@ pub struct Release {
     pub clearance_mm: f64,
 }
 
-/// Figure and its bounds.
 #[derive(Clone, Debug, Serialize)]
 pub struct Check {
     pub name: String,
@@ -279,7 +274,6 @@ pub fn missed(checks: &[Check]) -> usize {
 }
 
 impl Forces {
-    /// Takes the figures of a run.
     pub fn of(run: &Run) -> Result<Self, DemoError> {
         let (mut touch, mut steps, mut release) = (None, Vec::new(), None);
         for (place, asked) in run.goals.iter().enumerate() {
@@ -297,7 +291,6 @@ impl Forces {
         Ok(Self { touch, steps, release })
     }
 
-    /// Compares each figure with its bounds.
     pub fn checks(&self) -> Vec<Check> {
         let at_most = |most: f64| [None, Some(most)];
         let within = |least: f64, most: f64| [Some(least), Some(most)];

@@ -62,7 +62,6 @@ impl<'a> Build<'a> {
         Self { values, seed, drawn: Cell::new(false) }
     }
 
-    /// The random numbers of the effect.
     pub fn rng(&self) -> Rng {
         self.drawn.set(true);
         Rng::with_seed(self.seed)
@@ -222,12 +221,10 @@ pub struct Parts<E: Set + ?Sized> {
     pub sensor: E::Sensor,
     pub contact: contact::Named,
     pub drive: E::Drive,
-    /// Effects on clock and bus.
     pub link: link::Named,
 }
 
 impl<E: Set> Parts<E> {
-    /// Effects on array and drive alone.
     pub fn new(sensor: E::Sensor, drive: E::Drive) -> Self {
         Self { sensor, contact: contact::Named::default(), drive, link: link::Named::default() }
     }
@@ -235,9 +232,7 @@ impl<E: Set> Parts<E> {
 
 /// Set of effects: [`Named`], or `()`, which has none compiled in.
 pub trait Set {
-    /// Effects on the array.
     type Sensor: sensor::Stages;
-    /// Effects on the drive.
     type Drive: drive::Stages;
 
     fn of(scene: &Scene, finger: usize) -> Parts<Self>;
@@ -284,7 +279,6 @@ impl Set for Named {
 pub struct Description {
     /// Name in a scene: `[effects.NAME]`.
     pub name: &'static str,
-    /// Description in one line.
     pub about: &'static str,
     /// Equations in plain text, one per line.
     pub equations: &'static [&'static str],
@@ -323,7 +317,6 @@ pub const LINK: Family =
 /// All families, in the order in which their effects act within a stage: interference comes before the converter.
 const FAMILIES: [Family; 4] = [LINK, SENSOR, CONTACT, DRIVE];
 
-/// Effect of a scene.
 #[derive(Clone, Debug)]
 pub struct NamedEffect {
     pub effect: &'static Description,

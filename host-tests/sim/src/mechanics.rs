@@ -240,7 +240,6 @@ impl<D: drive::Stages> Finger<D> {
         if load_share < 1.0 { holding_nm / (self.mm_per_rad * 1e-3 * (1.0 - load_share)) } else { f64::INFINITY }
     }
 
-    /// Sets the speed of the tip.
     pub fn launch(&mut self, mm_per_s: f64) {
         self.now.shaft.speed_rad_per_s = mm_per_s / self.mm_per_rad;
     }
@@ -281,7 +280,6 @@ impl<D: drive::Stages> Finger<D> {
         self.now.tip_mm
     }
 
-    /// Angle and speed of the motor.
     pub fn shaft(&self) -> Shaft {
         self.now.shaft
     }

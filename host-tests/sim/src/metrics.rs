@@ -48,12 +48,10 @@ pub fn names() -> Vec<&'static str> {
     METRICS.iter().map(|metric| metric.name).chain(OF_FINGERS.iter().map(String::as_str)).collect()
 }
 
-/// Measures a run, step by step.
 #[derive(Clone, Debug, Default)]
 pub struct Meter(Vec<Finger>);
 
 impl Meter {
-    /// Returns the results after the run.
     pub fn measured(&self) -> Measured {
         let scene = METRICS.iter().map(|metric| (metric.name.to_owned(), self.scene(metric)));
         let several = if self.0.len() > 1 { &self.0[..] } else { &[] };
@@ -95,7 +93,6 @@ impl Meter {
         known.map_or(Vec::new(), |(_, values)| fingers.iter().flat_map(values).collect())
     }
 
-    /// Returns the forces that were held.
     pub fn holds(&self) -> Vec<Hold> {
         self.0.iter().flat_map(|finger| finger.conduct.ended().holds).collect()
     }
@@ -142,7 +139,6 @@ impl Measured {
     }
 }
 
-/// Comparison of a result with its bound.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verdict {
     pub bound: Bound,
@@ -257,7 +253,6 @@ pub const METRICS: &[Metric] = &[
 /// Name of a metric that has a value for each goal, and these values.
 type ByGoal = (&'static str, fn(&Finger) -> Vec<AtGoal>);
 
-/// Metrics that have a value for each goal.
 pub const BY_GOAL: [ByGoal; 4] = [
     ("over_force_mn", |f| f.conduct.over_force_mn.clone()),
     ("over_force_defective_mn", |f| f.conduct.over_force_defective_mn.clone()),

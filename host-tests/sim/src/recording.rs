@@ -228,7 +228,6 @@ struct Core {
     digest: String,
 }
 
-/// Replays a file.
 pub fn replay(path: &Path) -> Result<Replay, RunError> {
     let bytes = fs::read(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
     replay_bytes(&bytes).map_err(|error| format!("{}: {error}", path.display()).into())
@@ -312,7 +311,6 @@ const FRAME_S: f64 = 0.01;
 /// Codes per grey level: 2040 codes are white.
 const CODES_PER_GREY: u16 = 8;
 
-/// Records a run.
 pub struct Recorder {
     path: PathBuf,
     out: Writer<BufWriter<Whole>>,

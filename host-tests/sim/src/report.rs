@@ -38,7 +38,6 @@ const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 
 const LIBRARY: &str = include_str!("report/uplot/uPlot.iife.min.js");
 const LIBRARY_STYLE: &str = include_str!("report/uplot/uPlot.min.css");
 const LICENSE: &str = include_str!("report/uplot/LICENSE");
-/// Scripts of the page, in order.
 const SCRIPTS: [&str; 5] = [
     include_str!("report/script/view.js"),
     include_str!("report/script/plots.js"),
@@ -252,7 +251,6 @@ fn table_of(report: &Report, metrics: &[&Metric]) -> Markup {
     }
 }
 
-/// Lists the cost of each effect.
 fn ledger(report: &Report) -> Markup {
     html! {
         div.scroll tabindex="0" { table {
@@ -270,7 +268,6 @@ fn ledger(report: &Report) -> Markup {
     }
 }
 
-/// Lists the changes by each effect.
 fn ablation(report: &Report) -> Markup {
     html! {
         p.note { "What each effect adds to a metric: the run as it is, less a run without the effect." }
@@ -297,10 +294,8 @@ const GROUPS: [(&str, &[&str]); 6] = [
     ("Slip and object", &["slip", "object_"]),
     ("Motor and energy", &["duty", "rest_duty", "energy", "current", "winding"]),
 ];
-/// Title for the other metrics.
 const REST: &str = "More";
 
-/// Metrics under a title.
 struct Group {
     pub title: &'static str,
     pub metrics: Vec<&'static Metric>,

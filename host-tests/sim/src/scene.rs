@@ -16,7 +16,6 @@ use std::path::{Path, PathBuf};
 use std::{fs, io};
 use toml_edit::{DocumentMut, Item, Table, Value as TomlValue};
 
-/// Scene, read and checked.
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// The file's name without its ending.
@@ -25,7 +24,6 @@ pub struct Scene {
     /// Values that the command line replaced, as `TABLE.KEY=VALUE`. `text` has them too.
     pub set: Vec<String>,
     pub about: String,
-    /// Seed of all random numbers.
     pub seed: u64,
     /// Virtual time from the moment at which the finger is tared and its torque enabled.
     pub duration_s: f64,
@@ -41,7 +39,6 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Returns the values of a table.
     pub fn table(&self, name: &str) -> &Values {
         let found = self.tables.iter().find(|(known, _)| *known == name);
         &found.unwrap_or_else(|| panic!("no table [{name}] is described")).1

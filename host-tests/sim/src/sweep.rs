@@ -234,7 +234,6 @@ impl Rows {
         self.rows.contains_key(&number)
     }
 
-    /// Number of runs that are done.
     pub fn count(&self) -> usize {
         self.rows.len()
     }
@@ -281,7 +280,6 @@ fn refuse_others(file: &Path, id: &str) -> Result<(), RunError> {
     }
 }
 
-/// Merges shards.
 pub fn merge(files: &[PathBuf], out: &Path) -> Result<Table, RunError> {
     let table = table(files)?;
     make_folder(out)?;
@@ -302,7 +300,6 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// All runs.
     pub const WHOLE: Self = Self { number: 1, of: 1 };
 
     /// True if a run, counted from 0, is in the share.
@@ -379,7 +376,6 @@ pub fn table(files: &[PathBuf]) -> Result<Table, RunError> {
     Ok(Table { head, rows: complete(rows, all, "run")? })
 }
 
-/// Checks the names of the columns.
 fn check_head(head: &[String]) -> Result<(), String> {
     let seed =
         head.iter().position(|column| column == SEED).filter(|_| head.starts_with(&[ID, RUN, RUNS].map(String::from)));

@@ -39,7 +39,6 @@ pub struct Step<'a> {
     pub command: &'a Command,
     /// Output of the core, with the duty.
     pub status: &'a Status,
-    /// True state of the simulated world.
     pub truth: &'a Truth,
 }
 
@@ -95,7 +94,6 @@ pub trait Watch {
         false
     }
 
-    /// Receives a control step.
     fn step(&mut self, step: &Step);
 }
 

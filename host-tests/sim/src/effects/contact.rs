@@ -16,7 +16,6 @@ use crate::watch::{Cost, Truth};
 /// radius of the tip.
 type Height = dyn Fn(f64, f64, f64) -> f64 + Send;
 
-/// Surface of the object.
 pub struct Surface {
     /// True if the height is 0 within reach of a tip, so that the closed forms of the plane hold.
     plain: bool,
@@ -52,7 +51,6 @@ pub struct Grip {
     pub slipping: f64,
     /// Speed of an object that the scene moves.
     pub drift_mm_per_s: f64,
-    /// Start of that motion.
     pub drift_from_s: f64,
 }
 
@@ -307,7 +305,6 @@ pub const EFFECTS: &[Description] = &[
 /// Largest radius of a tip (`[tip]`, `radius_mm`).
 const LARGEST_TIP_MM: f64 = 16.0;
 
-/// Relaxation of the tip.
 pub struct Relaxation {
     share: f64,
     tau_s: f64,

@@ -462,7 +462,6 @@ impl Cogging {
         self.torque_nm * libm::sin(0.5 * self.teeth * (from_rad + to_rad)) * spread
     }
 
-    /// Largest slope of the torque.
     fn steepest_nm_per_rad(&self) -> f64 {
         self.torque_nm * self.teeth
     }

@@ -32,7 +32,6 @@ pub struct Place {
 }
 
 impl Place {
-    /// No contact.
     pub const NOWHERE: Self = Self { between: Between::NOTHING, share: 1.0 };
 }
 

@@ -18,7 +18,6 @@ use crate::setup::{Setup, Tip};
 use core::f64::consts::PI;
 use fingertip::shipped::{COLUMNS, ROWS};
 
-/// Pressures on the taxels of a row.
 type Row = [f64; COLUMNS];
 /// Distance of knots in the square root of the indentation, sqrt(mm): the rim moves 0.07 mm per knot.
 const ROOT: f64 = 1.0 / 64.0;
@@ -53,7 +52,6 @@ pub struct Between {
 }
 
 impl Between {
-    /// No contact.
     pub const NOTHING: Self = Self { root: 0, weights: [0.0; 4], peak_kpa: 0.0, shift_mm: 0.0 };
 }
 

@@ -33,7 +33,6 @@ pub struct Source {
 }
 
 impl Source {
-    /// An open circuit.
     pub const OPEN: Self = Self { volts: 0.0, ohms: f64::INFINITY, limit_a: f64::INFINITY, kept_a: 0.0 };
 }
 
@@ -237,7 +236,6 @@ impl Dynamics {
     }
 }
 
-/// Wall, friction and source.
 impl Acting for (&Dynamics, &Source) {
     fn resistance(&mut self, from_rad: f64, to_rad: f64) -> Resistance {
         let Dynamics { friction_nm, friction_share, wall_mm, force_per_mm2, nm_per_n, .. } = *self.0;
@@ -347,7 +345,6 @@ const HALVINGS: usize = 40;
 /// Largest distance of the end from the target. Beyond it no switch time makes the motion stop there.
 const END_MM: f64 = 1e-6;
 
-/// The time-optimal profile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Profile {
     /// Time of the change from full drive to full brake.

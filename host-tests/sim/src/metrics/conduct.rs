@@ -20,7 +20,6 @@ const LAST_S: f64 = 0.2;
 const JUDGED_S: f64 = 0.4;
 const JUDGED_TOUCH_S: f64 = 0.22;
 
-/// True state at a step.
 #[derive(Clone, Copy, Debug)]
 struct Sample {
     time_s: f64,

@@ -14,14 +14,12 @@ use toml_edit::{ArrayOfTables, Document, DocumentMut, InlineTable, Item, Table, 
 /// Place and text of a mistake, and allowed values.
 pub type Wrong = (Range<usize>, String, String);
 
-/// Names of the draws.
 pub const WAYS: [&str; 6] = ["uniform", "log_uniform", "normal", "choice", "is", "by"];
 const EXAMPLES: &str = "{ uniform = [1, 10] }, { log_uniform = [0.3, 3] }, { normal = [0, 0.05] } (mean, deviation), \
     { choice = [256, 512], weights = [1, 2] }, { is = \"1000 * modulus_kpa\" }, { by = \"thing\", ball = 0.05, otherwise = 0 }; \
     with follows = \"magnitude\" or \"1 / magnitude\"";
 
 impl Parts {
-    /// Reads a draw or a constant.
     pub fn draw(&self, value: &Value) -> Result<Draw, Wrong> {
         let number = number(value).map(Drawn::Number);
         match (value.as_inline_table(), number.or_else(|| value.as_str().map(|word| Drawn::Word(word.into())))) {
@@ -152,7 +150,6 @@ fn ends(value: &Value) -> Result<[f64; 2], Wrong> {
     Ok([low, high])
 }
 
-/// Reads a finite number.
 pub fn number(value: &Value) -> Option<f64> {
     value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64)).filter(|number| number.is_finite())
 }
@@ -474,7 +471,6 @@ fn own_text(root: &Table, name: &str) -> Vec<Range<usize>> {
     }
 }
 
-/// Number of events of a finger.
 const COUNT: Key = Key { name: "count", about: "", kind: Kind::Whole { min: 0, max: 100, default: None } };
 
 fn is_table(key: &str) -> bool {

@@ -3,7 +3,7 @@
 use crate::{Last, part, run, scene, world};
 use fingertip::shipped::{COLUMNS, SLOTS};
 use sim::effects::link::{self, Stages};
-use sim::effects::{self, Named, Part, stream};
+use sim::effects::{Named, Part, Set as _, stream};
 use sim::host::Host;
 use sim::mechanics::Bridge;
 use sim::native::{Begun, Clock, simulate_from};
@@ -16,11 +16,7 @@ fn long_scene(tables: &str) -> Scene {
 }
 
 fn stages(scene: &Scene, seed: u64) -> link::Named {
-    let mut stages = link::Named::default();
-    for (name, part) in effects::build(&scene.effects, seed, 0) {
-        assert!(stages.take(name, part).is_none());
-    }
-    stages
+    Named::of(&Scene { seed, ..scene.clone() }, 0).link
 }
 
 #[test]

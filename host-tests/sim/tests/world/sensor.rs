@@ -4,7 +4,8 @@
 use crate::scene;
 use fingertip::shipped::{COLUMNS, ROWS, SLOTS};
 use sim::effects::sensor::{self, Codes, Network, Pressure, Readout, Row, Volts};
-use sim::effects::{self, Part};
+use sim::effects::{self, Named, Part, Set as _};
+use sim::scene::Scene;
 use sim::setup::Array;
 
 /// An effect by its keys.
@@ -40,11 +41,7 @@ fn all(value: f64) -> Row {
 /// The readout with these effects.
 fn stages(tables: &str, seed: u64) -> sensor::Named {
     let scene = scene(&format!("duration_s = 1\n{tables}"));
-    let mut stages = sensor::Named::default();
-    for (name, part) in effects::build(&scene.effects, seed, 0) {
-        stages.take(name, part);
-    }
-    stages
+    Named::of(&Scene { seed, ..scene }, 0).sensor
 }
 
 /// The effects that act in the readout, one of the link's among them.

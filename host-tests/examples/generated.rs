@@ -2,7 +2,7 @@
 
 use fingertip::link::table::{Access, Kind};
 use fingertip::shipped::REGISTERS;
-use host_tests::{analogue, control_table, model_file, page};
+use host_tests::{analogue, control_table, page};
 
 fn main() -> Result<(), String> {
     let name = std::env::args().nth(1).unwrap_or_default();
@@ -10,8 +10,8 @@ fn main() -> Result<(), String> {
         "docs/board.md" => analogue::PAGE.renewed(&analogue::markdown())?,
         "docs/control-table.md" => control_table::markdown(),
         "docs/firmware.md" => page::PAGE.renewed(&page::table())?,
-        "examples/dynamixel/fingertip.model" => model_file::text(false),
-        "examples/dynamixel/fingertip_direct.model" => model_file::text(true),
+        "examples/dynamixel/fingertip.model" => control_table::text(false),
+        "examples/dynamixel/fingertip_direct.model" => control_table::text(true),
         "python/fingertip/registers.py" => registers(),
         _ => return Err(format!("usage: generated FILE; `{name}` is not one of the generated files")),
     };

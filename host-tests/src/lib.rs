@@ -5,11 +5,9 @@
 pub mod analogue;
 pub mod control_table;
 pub mod figures;
-pub mod finger;
 pub mod fit_cases;
 pub mod fit_statistics;
 pub mod long_run;
-pub mod model_file;
 pub mod page;
 pub mod program;
 /// The proof of the model's error bounds: every result against its exact value.
@@ -18,9 +16,7 @@ pub mod program;
 /// of pi), so that whole input ranges can be walked in seconds; [`mod@prove::reference`] computes in arbitrary precision with
 /// a crate and covers what has no such form. `cargo xtask prove` runs all of it; the tests run a part.
 pub mod prove {
-    pub mod beyond;
     pub mod exact;
-    pub mod exhaustive;
     pub mod random;
     pub mod reference;
     pub mod tally;
@@ -32,7 +28,6 @@ pub mod stimulus;
 /// The image runs every variant on the emulated Cortex-M4F and says what each returned; errors are worked out here,
 /// against arbitrary precision, so they are exactly the target's.
 pub mod study {
-    pub mod front;
     pub mod inputs;
     pub mod kernels;
     pub mod output;

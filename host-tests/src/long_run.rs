@@ -5,16 +5,19 @@
 //! A cycle of length 1 is rest. What is left to measure is how far the outputs swing within the cycle, which is the
 //! limit cycle, and where they stand.
 
-mod cases;
-
-pub use cases::all;
-
-use crate::long_run::cases::cool;
+use crate::stimulus::config;
 use fingertip::command::Command;
-use fingertip::config::newtons;
+use fingertip::config::{GAIN_SETS, newtons};
+use fingertip::control::{Drive, Observer, SpeedLoop, Winding};
 use fingertip::frame::Sense;
+use fingertip::params::Params;
 use fingertip::pipeline::Status;
-use fingertip::shipped::{Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
+use fingertip::shipped::{Array, Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
+use fingertip::state::Limits;
+use fingertip::units::{Millimetres, Newtons};
+use paper::units::Ratio;
+use paper::{Relaxation, RelaxationState, RelaxationTerm};
+use sim::cores;
 
 /// Inputs that a run represents.
 pub const STEPS: u64 = 1_000_000_000;
@@ -139,12 +142,12 @@ impl<S: Clone + PartialEq + 'static> Machine<S> {
 /// model 256: the pipeline can repeat itself no sooner than after this many steps.
 const PERIOD: u64 = 14_080;
 
-/// The frame of a tip that presses, or not, in the middle of the array.
-fn frame(codes: u16) -> Frame {
+/// Frame with this preload, in codes above a level of 372, and as many more on the 16 taxels under a tip.
+fn frame(preload: u16, codes: u16) -> Frame {
     let mut frame = Frame::EMPTY;
     for (slot, column) in (0..SLOTS).flat_map(|slot| (0..10).map(move |column| (slot, column))) {
         let pressed = (3..7).contains(&slot) && (3..7).contains(&column);
-        let preload = if slot < ROWS { 40 } else { 0 };
+        let preload = if slot < ROWS { preload } else { 0 };
         frame.set_code(slot, column, 372 + preload + if pressed { codes } else { 0 });
     }
     frame
@@ -159,7 +162,7 @@ pub fn hold(name: &str, torque: bool, goal_mn: i32, codes: u16, most: u64) -> (O
     let mut pipeline = Pipeline::new(&Config::shipped(&cool()).expect("the defaults are allowed"));
     let sense = Sense { supply_mv: 6_000, ..Sense::default() };
     let mut command = Command { tare_request: 1, ..Command::default() };
-    let mut shown = frame(0);
+    let mut shown = frame(40, 0);
     let step = |pipeline: &mut Pipeline, command: &Command, shown: &mut Frame| {
         shown.sequence = shown.sequence.wrapping_add(1);
         *pipeline.step(shown, &sense, command).1
@@ -169,7 +172,7 @@ pub fn hold(name: &str, torque: bool, goal_mn: i32, codes: u16, most: u64) -> (O
     }
     command.torque = torque;
     command.goal = newtons(goal_mn);
-    let mut shown = Frame { sequence: shown.sequence, ..frame(codes) };
+    let mut shown = Frame { sequence: shown.sequence, ..frame(40, codes) };
 
     let (mut taken, mut next) = (0, 1_024);
     while taken < most {
@@ -194,4 +197,254 @@ pub fn hold(name: &str, torque: bool, goal_mn: i32, codes: u16, most: u64) -> (O
 /// Every field of the pipeline, but the frames' number.
 fn state(pipeline: &Pipeline, sequence: u32) -> String {
     format!("{pipeline:?}").replacen(&format!("sequence: {sequence},"), "", 1)
+}
+
+/// Steps within which a machine must come to its cycle.
+const MOST: u64 = 200_000_000;
+/// The supply of the reference finger, mV.
+const SUPPLY_MV: u16 = 6_000;
+/// Fastest and slowest scan, and the one between.
+const SCANS: [(&str, i32, i32); 3] = [("fast", 500, 3), ("default", 2_400, 15), ("slow", 100_000, 480)];
+
+/// Documented limit cycles of the observer, in units of the last place: 60 pm, 2 um/s, 4 mm/s^2.
+const TRAVEL_SWING: i64 = 1;
+/// Limit cycle of the travel with the calmest gain set: at most 0.7 nm.
+const CALM_TRAVEL_SWING: i64 = 12;
+const SPEED_SWING: i64 = 131;
+const DISTURBANCE_SWING: i64 = 1_024;
+
+/// All machines. With `whole`, those that are quick enough also take all their steps one by one, and the relaxation has
+/// its longest time constant.
+pub fn all(whole: bool) -> Vec<Outcome> {
+    let mut runs: Vec<Run> = Vec::new();
+    for (scan, settle_ns, sample_cycles) in SCANS {
+        let config = Config::shipped(&Params { settle_ns, sample_cycles, ..cool() }).expect("allowed");
+        // Every single step is taken for the default scan only.
+        let whole = whole && scan == "default";
+        queue(&mut runs, observers(scan, &config), whole);
+        queue(&mut runs, drives(scan, &config), whole);
+        queue(&mut runs, loops(scan, &config), whole);
+    }
+    queue(&mut runs, baselines(), false);
+    queue(&mut runs, tares(), false);
+    queue(&mut runs, relaxations(whole), whole);
+    queue(&mut runs, windings(whole), whole);
+    cores::map(runs, |run| run())
+}
+
+/// Parameters of a motor that stays cool, for the machines that contain the winding model. The winding is examined
+/// alone, as it limits the current: current and winding state together repeat after too many steps to wait for.
+pub fn cool() -> Params {
+    Params { winding_k_per_w: 0, housing_k_per_w: 0, ..images::CONFIRMED }
+}
+
+type Run = Box<dyn FnOnce() -> Outcome + Send>;
+
+fn queue<S: Clone + PartialEq + Send + 'static>(runs: &mut Vec<Run>, machines: Vec<Machine<S>>, whole: bool) {
+    runs.extend(machines.into_iter().map(|machine| Box::new(move || machine.run(MOST, whole)) as Run));
+}
+
+/// Encoder and acceleration, held or in turns.
+fn observers(scan: &str, config: &Config) -> Vec<Machine<Observer>> {
+    let limit = config.current_max_q8_mm_per_s2;
+    let inputs = [
+        ("nothing", [(0, 0); 2]),
+        ("one count", [(1, 0); 2]),
+        ("a blocked motor at its current limit", [(0, limit); 2]),
+        ("the least acceleration", [(0, 1); 2]),
+        ("the encoder at its end", [(i32::MAX, limit); 2]),
+        ("the encoder at its other end", [(i32::MIN, -limit); 2]),
+        ("one count in turns", [(0, 0), (1, 0)]),
+        ("the current limit in turns", [(0, limit), (0, -limit)]),
+        ("the encoder's ends in turns", [(i32::MIN, i32::MAX), (i32::MAX, i32::MIN)]),
+        ("the ends of the acceleration's type in turns", [(0, i32::MAX), (1, i32::MIN)]),
+    ];
+    let machine = |(input, pair): (&str, [(i32, i32); 2]), gain_set: usize| {
+        let config = config.clone();
+        Machine {
+            name: format!("observer, {scan} scan, gain set {gain_set}, {input}"),
+            start: Observer::new(),
+            inputs: 2,
+            step: Box::new(move |observer: &mut Observer| {
+                let gains = &config.gain_sets[gain_set];
+                pair.iter()
+                    .for_each(|(encoder, acceleration)| observer.update(*encoder, *acceleration, gains, &config));
+            }),
+            outputs: vec![
+                (
+                    "travel",
+                    |observer| observer.travel.to_bits().into(),
+                    if gain_set == 0 { TRAVEL_SWING } else { CALM_TRAVEL_SWING },
+                ),
+                ("speed", |observer| observer.speed.to_bits().into(), SPEED_SWING),
+                ("disturbance", |observer| observer.disturbance.to_bits().into(), DISTURBANCE_SWING),
+            ],
+        }
+    };
+    inputs.into_iter().flat_map(|input| [0, GAIN_SETS - 1].map(|gain_set| machine(input, gain_set))).collect()
+}
+
+/// The wanted acceleration, held or in turns.
+fn drives(scan: &str, config: &Config) -> Vec<Machine<Drive>> {
+    let far = i32::MAX;
+    let inputs =
+        [("nothing", [0; 2]), ("all", [far; 2]), ("all in turns", [far, -far]), ("the least in turns", [1, -1])];
+    let machine = |(input, pair): (&str, [i32; 2])| {
+        let config = config.clone();
+        Machine {
+            name: format!("drive, {scan} scan, {input} wanted"),
+            start: Drive::new(),
+            inputs: 2,
+            step: Box::new(move |drive: &mut Drive| {
+                for wanted in pair {
+                    drive.apply(wanted, 0, SUPPLY_MV, &config, &mut Limits::default());
+                }
+            }),
+            outputs: vec![("acceleration", |drive| drive.acceleration().into(), 0)],
+        }
+    };
+    inputs.map(machine).into()
+}
+
+/// Observer and drive joined by the control law, with a blocked motor and a constant or alternating position error.
+fn loops(scan: &str, config: &Config) -> Vec<Machine<SpeedLoop>> {
+    let inputs =
+        [("none", [0; 2]), ("1 um", [1 << 14; 2]), ("far", [i32::MAX; 2]), ("far in turns", [i32::MAX, i32::MIN])];
+    let machine = |(input, pair): (&str, [i32; 2])| {
+        let config = config.clone();
+        Machine {
+            name: format!("speed loop, {scan} scan, blocked motor, error {input}"),
+            start: SpeedLoop::new(),
+            inputs: 2,
+            step: Box::new(move |motion: &mut SpeedLoop| {
+                for way in pair.map(Millimetres::from_bits) {
+                    motion.observe(0, &config);
+                    let (reference, _) = motion.towards(way, config.count, config.speed_max, &config);
+                    motion.follow(reference, SUPPLY_MV, &config, &mut Limits::default());
+                }
+            }),
+            outputs: vec![
+                ("travel", |motion| motion.observer.travel.to_bits().into(), CALM_TRAVEL_SWING),
+                ("speed", |motion| motion.observer.speed.to_bits().into(), SPEED_SWING),
+                ("disturbance", |motion| motion.observer.disturbance.to_bits().into(), DISTURBANCE_SWING),
+                ("acceleration", |motion| motion.drive.acceleration().into(), DISTURBANCE_SWING),
+            ],
+        }
+    };
+    inputs.map(machine).into()
+}
+
+/// Sum of the tares, codes in Q16.
+fn tare_sum(array: &Array) -> i64 {
+    array.tare().flatten().map(|tare| i64::from(*tare)).sum()
+}
+
+/// Frames held or in turns, from a tare at 40 codes.
+fn baselines() -> Vec<Machine<Array>> {
+    let most = config().saturated_codes - 372 - 1;
+    let inputs = [
+        ("as tared", [40; 2]),
+        ("one code more", [41; 2]),
+        ("almost dead", [12; 2]),
+        ("almost saturated", [most; 2]),
+        ("one code in turns", [40, 41]),
+        ("the extremes in turns", [12, most]),
+    ];
+    let machine = |(input, pair): (&str, [u16; 2])| {
+        let config = config();
+        let frames = pair.map(|preload| frame(preload, 0));
+        let mut start = Array::new();
+        tare(&mut start, &frame(40, 0), &config);
+        Machine {
+            name: format!("baseline, {input}"),
+            start,
+            inputs: ROWS as u64,
+            step: Box::new(move |array: &mut Array| {
+                // Ten rows, one a frame: the shortest time after which the same row meets the same frame.
+                for frame in frames.iter().cycle().take(ROWS) {
+                    array.read(frame, &config);
+                    array.follow_drift(64);
+                }
+            }),
+            outputs: vec![("sum of the tares", tare_sum, 0)],
+        }
+    };
+    inputs.map(machine).into()
+}
+
+fn tare(array: &mut Array, frame: &Frame, config: &Config) {
+    array.start_tare();
+    for _ in 0..TARE_FRAMES {
+        array.read(frame, config);
+        array.continue_tare();
+    }
+}
+
+/// Repeated tares of one frame, or of two alternating frames.
+fn tares() -> Vec<Machine<Array>> {
+    let inputs = [("one frame", [40, 40]), ("the extremes in turns", [12, config().saturated_codes - 372 - 1])];
+    let machine = |(input, pair): (&str, [u16; 2])| {
+        let config = config();
+        let frames = pair.map(|preload| frame(preload, 0));
+        Machine {
+            name: format!("tare, {input}"),
+            start: Array::new(),
+            inputs: 2 * u64::from(TARE_FRAMES),
+            step: Box::new(move |array: &mut Array| frames.iter().for_each(|frame| tare(array, frame, &config))),
+            outputs: vec![("sum of the tares", tare_sum, 0)],
+        }
+    };
+    inputs.map(machine).into()
+}
+
+/// Three terms from the shortest to the longest time constant.
+fn relaxations(longest: bool) -> Vec<Machine<RelaxationState<3>>> {
+    let period_us = 94;
+    let periods = if longest { paper::PERIODS_MAX } else { 1 << 14 };
+    let terms = [(20_000, 1), (20_000, 1_000), (25_536, periods)];
+    let terms = terms.map(|(share, periods)| RelaxationTerm {
+        share: Ratio::from_bits(share),
+        time_constant_us: periods * period_us,
+    });
+    let inputs =
+        [("none", [0; 2]), ("the least", [1; 2]), ("the largest", [i32::MAX; 2]), ("extremes in turns", [0, i32::MAX])];
+    let machine = |(input, pair): (&str, [i32; 2])| {
+        let filter = Relaxation::new(period_us, &terms).expect("allowed");
+        Machine {
+            name: format!("relaxation over {periods} periods, force {input}"),
+            start: RelaxationState::settled(Newtons::from_bits(1 << 20)),
+            inputs: 2,
+            step: Box::new(move |state: &mut RelaxationState<3>| {
+                for force in pair.map(Newtons::from_bits) {
+                    filter.step(state, force);
+                }
+            }),
+            outputs: vec![],
+        }
+    };
+    inputs.map(machine).into()
+}
+
+/// The usual lags, or the longest, without current, at the limit, and in turns.
+fn windings(longest: bool) -> Vec<Machine<Winding>> {
+    let [winding_time_ms, housing_time_ms] = if longest { [600_000, 10_000_000] } else { [5_000, 400_000] };
+    let params = Params { winding_time_ms, housing_time_ms, ..images::CONFIRMED };
+    let inputs = [("none", [0; 2]), ("the limit", [1; 2]), ("extremes in turns", [0, i32::MAX])];
+    let machine = |(input, pair): (&str, [i32; 2])| {
+        let config = Config::shipped(&params).expect("allowed");
+        let currents = if pair == [1; 2] { [config.current_max_q8_mm_per_s2; 2] } else { pair };
+        let frames = 1 << config.heat.frames_bits;
+        Machine {
+            name: format!("winding over {} s, {input}", housing_time_ms / 1_000),
+            start: Winding::new(),
+            inputs: frames,
+            step: Box::new(move |winding: &mut Winding| {
+                for net in currents.into_iter().cycle().take(frames as usize) {
+                    winding.observe(net, &config);
+                }
+            }),
+            outputs: vec![("share", |winding| winding.share().into(), 0)],
+        }
+    };
+    inputs.map(machine).into()
 }

@@ -4,12 +4,11 @@
 //! Computed where it is needed: the plant gives the same bits on every machine, and what breaks is drawn with a fixed
 //! seed.
 
-use crate::finger::config;
 use fastrand::Rng;
 use fingertip::command::Command;
 use fingertip::config::newtons;
 use fingertip::frame::Sense;
-use fingertip::shipped::{COLUMNS, Frame, Pipeline, ROWS, SLOTS};
+use fingertip::shipped::{Array, COLUMNS, Calibration, Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
 use fingertip::units::Newtons;
 use images::record::{Digest, MAGIC, Record};
 use sim::native::bench::Bench;
@@ -124,4 +123,23 @@ fn fill(frame: &mut Frame, mut code: impl FnMut(usize, usize, u16) -> u16) {
             frame.set_code(slot, column, new);
         }
     }
+}
+
+/// The configuration that the default parameters make, with the motor's direction confirmed.
+///
+/// # Panics
+/// If the core refuses its defaults: a mistake in the core.
+pub fn config() -> Config {
+    Config::shipped(&images::CONFIRMED).expect("the defaults are allowed")
+}
+
+/// An array that was tared with nothing on it.
+pub fn tared(calibration: &Calibration, blank: &Frame, config: &Config) -> Array {
+    let mut array = Array::new();
+    array.calibrate(calibration);
+    for _ in 0..TARE_FRAMES {
+        array.read(blank, config);
+        array.continue_tare();
+    }
+    array
 }

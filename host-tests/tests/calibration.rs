@@ -2,7 +2,7 @@
 
 use crate::common::*;
 use fingertip::pressure::{CalibrationError, GAIN_MAX};
-use host_tests::finger::tared;
+use host_tests::stimulus::tared;
 
 const GAINS: [[u16; COLUMNS]; ROWS] = [[GAIN_ONE; COLUMNS]; ROWS];
 

@@ -18,8 +18,8 @@ pub use fingertip::shipped::{
 };
 pub use fingertip::state::{Fault, Limits, Mode};
 pub use fingertip::units::{Celsius, CoreCycles, Duty, Millimetres, MillimetresPerSecond, Newtons};
-pub use host_tests::finger::config;
 pub use host_tests::fit_cases::{Noise, Object, Reading, Scene, Steps};
+pub use host_tests::stimulus::config;
 pub use images::record::Record;
 pub use proptest::prelude::*;
 pub use sim::effects::{Named, Set};

@@ -3,7 +3,7 @@
 use crate::common::*;
 use fingertip::pressure::{CODE_BITS, GAIN_MAX, TARE_BITS};
 use fingertip::shipped::Array;
-use host_tests::finger::tared;
+use host_tests::stimulus::tared;
 
 /// Codes above the column's level, or any codes.
 #[derive(Clone, Debug)]

@@ -4,9 +4,9 @@ use crate::common::*;
 use core::num::NonZeroU16;
 use fingertip::model::{MODULUS_MAX, MODULUS_MIN, RADIUS_MAX, RADIUS_MIN, Tip};
 use fingertip::units::Kilopascals;
-use host_tests::prove::random::{mm, newtons, reference_tip};
+use host_tests::prove::random::{self, mm, newtons, reference_tip};
 use host_tests::prove::tally::Tally;
-use host_tests::prove::{beyond, exhaustive, random, reference};
+use host_tests::prove::{exact, reference};
 use paper::units::{NewtonMillimetres, Radians, Ratio, SquareMillimetres};
 use paper::{Displacement, Relaxation, RelaxationState, RelaxationTerm, force_on, pressure_of, strain_of};
 use std::io::Write;
@@ -284,22 +284,22 @@ fn the_reference_tip_is_correctly_rounded_at_both_ends_and_in_the_middle() {
         [0..20_000, top / 2..top / 2 + 20_000, top - 20_000..top]
     };
     for part in parts(tip.depth_max().to_bits()) {
-        hold(&exhaustive::depths(&tip, part.start.max(1)..part.end, &quiet));
+        hold(&exact::depths(&tip, part.start.max(1)..part.end, &quiet));
     }
     for part in parts(tip.force_max().to_bits()) {
-        hold(&exhaustive::forces(&tip, part, &quiet));
+        hold(&exact::forces(&tip, part, &quiet));
     }
     for part in parts(tip.contact_radius(tip.depth_max()).to_bits()) {
-        hold(&exhaustive::radii(&tip, part, &quiet));
+        hold(&exact::radii(&tip, part, &quiet));
     }
     for part in parts(tip.peak_pressure(tip.depth_max()).to_bits()) {
-        hold(&exhaustive::peaks(&tip, part, &quiet));
+        hold(&exact::peaks(&tip, part, &quiet));
     }
 }
 
 #[test]
 fn the_pressure_is_correctly_rounded_and_falls_with_the_distance_on_a_grid() {
-    hold(&exhaustive::pressures(&reference_tip(), 100, 1_000, &quiet));
+    hold(&exact::pressures(&reference_tip(), 100, 1_000, &quiet));
 }
 
 #[test]
@@ -319,10 +319,10 @@ fn the_touching_angle_holds_over_the_reference_tip() {
 
 #[test]
 fn the_rest_of_the_model_holds() {
-    hold(&beyond::geometry(0..2_000, &quiet));
-    hold(&beyond::tilt(0..2_000, &quiet));
-    hold(&beyond::friction(0..2_000, &quiet));
-    hold(&beyond::relaxation(0..6, &quiet));
+    hold(&reference::geometry(0..2_000, &quiet));
+    hold(&reference::tilt(0..2_000, &quiet));
+    hold(&reference::friction(0..2_000, &quiet));
+    hold(&reference::relaxation(0..6, &quiet));
 }
 
 #[test]
@@ -338,9 +338,9 @@ fn the_oracle_holds() {
 
 #[test]
 fn a_pattern_fed_for_ever_ends_in_a_cycle_no_wider_than_the_pattern_makes_it() {
-    let settled = beyond::long_run(&[i32::MAX, i32::MAX], 1 << 10);
+    let settled = reference::long_run(&[i32::MAX, i32::MAX], 1 << 10);
     assert_eq!((settled.low, settled.high), (0.5, 0.5));
-    let swinging = beyond::long_run(&[i32::MAX, 0], 1 << 10);
+    let swinging = reference::long_run(&[i32::MAX, 0], 1 << 10);
     // The mean of the pattern relaxes to 1/65536 of it; the swing about it is symmetric.
     assert!((swinging.low + swinging.high - 0.5).abs() <= 2.0 / 65_536.0, "{swinging:?}");
     assert!(swinging.high < 16_384.0 && swinging.high > 15_000.0, "{swinging:?}");

@@ -3,7 +3,7 @@
 use crate::common::*;
 use fingertip::safety::monitor::{Monitor, MonitorInputs, array_broken, array_readable};
 use fingertip::units::MillimetresPerSecond2;
-use host_tests::finger::tared;
+use host_tests::stimulus::tared;
 
 /// Readings of a sound finger that presses with 1 N.
 #[derive(Clone, Copy)]

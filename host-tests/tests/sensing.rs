@@ -5,7 +5,7 @@ use fingertip::contact::from_sums;
 use fingertip::pressure::TARE_BITS;
 use fingertip::shipped::Array;
 use fingertip::touch::Touch;
-use host_tests::finger::tared;
+use host_tests::stimulus::tared;
 
 struct Bench {
     world: Plant,

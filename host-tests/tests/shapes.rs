@@ -9,7 +9,7 @@ use fingertip::config::Shaped;
 use fingertip::frame::{Frame, Shape};
 use fingertip::pipeline::Pipeline;
 use images::record::Digest;
-use sim::bridge::Bridge;
+use sim::mechanics::Bridge;
 use sim::mechanics::pressures::Cell;
 use sim::mechanics::rotor::{Dynamics, Shaft, Source};
 use sim::native::DUTY_DELAY_SLOTS;

@@ -1,12 +1,11 @@
 //! Command line of `sim`, the same for both boards, with the run and its files, and the replay.
 
-use crate::agreement::{Agreement, Path};
 use crate::part::{cannot_write, make_folder};
 use crate::recording::{Recorder, replay};
 use crate::report::{Over, Report, Trace, page};
 use crate::run::{Run, RunError, ablate, ablation_text, run};
-use crate::scene::{Scene, library, read, text};
-use crate::watch::Watch;
+use crate::scene::{self, Scene, read};
+use crate::watch::{Agreement, Path, Watch};
 use crate::{explain, metrics, native};
 use clap::{Parser, ValueEnum};
 use output::{kept, say};
@@ -87,7 +86,7 @@ impl Args {
 
 /// Loads a scene by its path or its name in the library, with `TABLE.KEY=VALUE` set in its text.
 pub fn load(scene: &str, set: &[String], seed: Option<u64>) -> Result<Scene, String> {
-    let (path, mut source) = library::text(scene)?;
+    let (path, mut source) = scene::library_text(scene)?;
     let file = path.to_string_lossy();
     let read = |source: &str| read(&file, source, &metrics::names()).map_err(|errors| errors.to_string());
     let seed = seed.map(|seed| format!("seed={seed}"));
@@ -101,7 +100,7 @@ pub fn load(scene: &str, set: &[String], seed: Option<u64>) -> Result<Scene, Str
         let (place, value) = assignment
             .split_once('=')
             .ok_or_else(|| format!("--set {assignment}: needs TABLE.KEY=VALUE, such as tip.modulus_kpa=300"))?;
-        source = text::set(&source, place.trim(), value.trim())?;
+        source = scene::set(&source, place.trim(), value.trim())?;
     }
     let scene = read(&source).map_err(|errors| format!("with {assignments:?} set, {errors}"))?;
     Ok(Scene { set: set.to_vec(), ..scene })

@@ -1,7 +1,14 @@
 //! Effects that a scene may name. The files of the families hold their equations, sources and keys.
 //!
-//! An effect acts at one stage and knows no other effect. A stage holds the named effects in the order of the registry.
+//! An effect acts at one stage and knows no other effect. A stage holds the named effects in the order of the families.
 //! An effect that is not named has no state and is never called.
+
+use crate::scene::Scene;
+use crate::scene::tables::{Key, Values};
+use crate::watch::Cost;
+use fastrand::Rng;
+use std::cell::Cell;
+use std::time::{Duration, Instant};
 
 /// Named effects of a family: a list for each stage.
 macro_rules! named {
@@ -41,14 +48,6 @@ pub mod drive;
 pub mod link;
 pub mod sensor;
 
-use crate::registry::{self, Description};
-use crate::scene::Scene;
-use crate::scene::tables::Values;
-use crate::watch::Cost;
-use fastrand::Rng;
-use std::cell::Cell;
-use std::time::{Duration, Instant};
-
 /// Input of the construction of an effect.
 #[derive(Clone, Debug)]
 pub struct Build<'a> {
@@ -63,7 +62,6 @@ impl<'a> Build<'a> {
         Self { values, seed, drawn: Cell::new(false) }
     }
 
-    /// The random numbers of the effect.
     pub fn rng(&self) -> Rng {
         self.drawn.set(true);
         Rng::with_seed(self.seed)
@@ -223,12 +221,10 @@ pub struct Parts<E: Set + ?Sized> {
     pub sensor: E::Sensor,
     pub contact: contact::Named,
     pub drive: E::Drive,
-    /// Effects on clock and bus.
     pub link: link::Named,
 }
 
 impl<E: Set> Parts<E> {
-    /// Effects on array and drive alone.
     pub fn new(sensor: E::Sensor, drive: E::Drive) -> Self {
         Self { sensor, contact: contact::Named::default(), drive, link: link::Named::default() }
     }
@@ -236,9 +232,7 @@ impl<E: Set> Parts<E> {
 
 /// Set of effects: [`Named`], or `()`, which has none compiled in.
 pub trait Set {
-    /// Effects on the array.
     type Sensor: sensor::Stages;
-    /// Effects on the drive.
     type Drive: drive::Stages;
 
     fn of(scene: &Scene, finger: usize) -> Parts<Self>;
@@ -267,7 +261,7 @@ impl Set for Named {
 
     fn of(scene: &Scene, finger: usize) -> Parts<Self> {
         let mut parts = Parts::<Self>::new(sensor::Named::default(), drive::Named::default());
-        for (name, part) in registry::build(&scene.effects, scene.seed, finger) {
+        for (name, part) in build(&scene.effects, scene.seed, finger) {
             let rest = parts.sensor.take(name, part).and_then(|part| parts.contact.take(name, part));
             let rest = rest.and_then(|part| parts.drive.take(name, part)).and_then(|part| parts.link.take(name, part));
             assert!(rest.is_none(), "{name} acts at no stage");
@@ -278,6 +272,72 @@ impl Set for Named {
     fn costs(sensor: &sensor::Named, contact: &contact::Named, drive: &drive::Named, link: &link::Named) -> Vec<Cost> {
         sensor.costs().chain(contact.costs()).chain(drive.costs()).chain(link.costs()).collect()
     }
+}
+
+/// Description of an effect. It is next to the equations in the table of its family.
+#[derive(Clone, Copy, Debug)]
+pub struct Description {
+    /// Name in a scene: `[effects.NAME]`.
+    pub name: &'static str,
+    pub about: &'static str,
+    /// Equations in plain text, one per line.
+    pub equations: &'static [&'static str],
+    /// Additional state; "none" without one.
+    pub state: &'static str,
+    /// Source of equations and magnitudes.
+    pub reference: &'static str,
+    pub keys: &'static [Key],
+    /// Values of keys at which the effect changes nothing. Other keys may have any value.
+    pub zero: &'static [(&'static str, f64)],
+    pub build: fn(&Build) -> Part,
+}
+
+/// A family of effects, by the place at which they act.
+#[derive(Clone, Copy, Debug)]
+pub struct Family {
+    pub name: &'static str,
+    /// Heading on the reference page.
+    pub title: &'static str,
+    /// Effects, in the order in which they act within a stage.
+    pub effects: &'static [Description],
+}
+
+/// Effects between tip and object.
+pub const CONTACT: Family =
+    Family { name: "contact", title: "Contact: between tip and object", effects: contact::EFFECTS };
+/// Effects from the duty to the travel of the tip.
+pub const DRIVE: Family =
+    Family { name: "drive", title: "Drive: from the duty to the tip's way", effects: drive::EFFECTS };
+/// Effects from the pressure on the taxels to the codes of the frame.
+pub const SENSOR: Family = Family { name: "sensor", title: "Sensor: from pressure to codes", effects: sensor::EFFECTS };
+/// Effects on clocks, electronics, bus and host.
+pub const LINK: Family =
+    Family { name: "link", title: "Link: clocks, electronics, bus and host", effects: link::EFFECTS };
+
+/// All families, in the order in which their effects act within a stage: interference comes before the converter.
+const FAMILIES: [Family; 4] = [LINK, SENSOR, CONTACT, DRIVE];
+
+#[derive(Clone, Debug)]
+pub struct NamedEffect {
+    pub effect: &'static Description,
+    pub values: Values,
+}
+
+/// Returns every effect, in the order in which they act within a stage.
+pub fn all() -> impl Iterator<Item = &'static Description> {
+    FAMILIES.iter().flat_map(|family| family.effects)
+}
+
+pub fn family_of(effect: &Description) -> &'static str {
+    let family = FAMILIES.iter().find(|family| family.effects.iter().any(|known| known.name == effect.name));
+    family.map_or("", |family| family.name)
+}
+
+/// Builds the effects of a scene for a finger, each with its name.
+pub fn build(named: &[NamedEffect], seed: u64, finger: usize) -> impl Iterator<Item = (&'static str, Part)> {
+    named.iter().map(move |NamedEffect { effect, values }| {
+        (effect.name, (effect.build)(&Build::new(values, stream(seed, effect.name, finger))))
+    })
 }
 
 #[cfg(test)]

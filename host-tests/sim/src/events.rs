@@ -81,13 +81,11 @@ pub struct Event {
     /// Start of the event, from the scene's start.
     pub at_s: f64,
     pub until_s: f64,
-    /// Values as the scene gives them.
     pub values: Values,
     defect: bool,
     what: What,
 }
 
-/// Action of an event.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum What {
     Move { by_mm: f64 },
@@ -152,7 +150,6 @@ impl Event {
     }
 }
 
-/// State of the world after its events.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Happened {
     /// Place of a fixed object, along the motion of the first finger.

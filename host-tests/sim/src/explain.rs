@@ -1,10 +1,10 @@
 //! Descriptions of a scene, of all keys, and the reference page.
 
+use crate::effects::{self, CONTACT, DRIVE, Description, LINK, SENSOR};
 use crate::events::{EVENT, KINDS, own_keys};
 use crate::metrics;
-use crate::registry::{self, CONTACT, DRIVE, Description, LINK, SENSOR};
 use crate::scene::tables::{EXPECT, Key, ROOT, SCRIPT, TABLES};
-use crate::scene::{Scene, library, read};
+use crate::scene::{self, Scene, read};
 use std::fmt::Write as _;
 
 /// Describes the effects of a scene, with the equations and the state of each.
@@ -24,7 +24,7 @@ pub fn scene(scene: &Scene) -> String {
     }
     for named in &scene.effects {
         let Description { name, about, equations, state, reference, .. } = named.effect;
-        let _ = writeln!(text, "\n{name} ({})\n  {about}", registry::family_of(named.effect));
+        let _ = writeln!(text, "\n{name} ({})\n  {about}", effects::family_of(named.effect));
         equations.iter().for_each(|line| text += &format!("    {line}\n"));
         let _ = writeln!(text, "  state: {state}\n  source: {reference}");
         for (name, value) in named.values.iter() {
@@ -36,11 +36,11 @@ pub fn scene(scene: &Scene) -> String {
 
 /// Lists the scenes of the library, each with its description.
 pub fn list() -> Result<String, Box<dyn std::error::Error + Send + Sync>> {
-    let names = library::names()?;
+    let names = scene::library_names()?;
     let width = names.iter().map(String::len).max().unwrap_or(0);
     let mut text = String::new();
     for name in names {
-        let (path, scene) = library::text(&name)?;
+        let (path, scene) = scene::library_text(&name)?;
         let about = read(&path.to_string_lossy(), &scene, &metrics::names())?.about;
         let _ = writeln!(text, "{name:width$}  {about}");
     }
@@ -56,7 +56,7 @@ pub fn keys() -> String {
     for kind in &KINDS {
         keys_of(&mut text, &kind.title(), kind.about, own_keys(kind));
     }
-    for effect in registry::all() {
+    for effect in effects::all() {
         keys_of(&mut text, &format!("[effects.{}]", effect.name), effect.about, effect.keys);
     }
     text
@@ -131,9 +131,7 @@ pub fn page() -> String {
 
 /// Adds the scenes of the library; none without the sources.
 fn library_of(page: &mut String) {
-    page.push_str(
-        "\n## The library\n\nComments in each file of `host-tests/sim/scenes` explain it.\n\n",
-    );
+    page.push_str("\n## The library\n\nComments in each file of `host-tests/sim/scenes` explain it.\n\n");
     for line in list().unwrap_or_default().lines() {
         if let Some((name, about)) = line.split_once(' ') {
             let _ = writeln!(page, "- `{name}`: {}", about.trim());

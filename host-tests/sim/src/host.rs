@@ -229,16 +229,13 @@ impl Grip {
     }
 
     pub fn goal_n(&self, script_n: f64) -> f64 {
-        if script_n > 0.0 { self.grip_n(script_n) - self.centring_n(script_n) } else { 0.0 }
+        // Centres the object by at most half of the force of the script.
+        let centring_n = (self.centre_n_per_mm * self.on_mm).clamp(-0.5 * script_n, 0.5 * script_n);
+        if script_n > 0.0 { self.grip_n(script_n) - centring_n } else { 0.0 }
     }
 
     fn grip_n(&self, script_n: f64) -> f64 {
         script_n.max(self.asked_n)
-    }
-
-    /// Returns the correction that centres the object: at most half of the force of the script.
-    fn centring_n(&self, script_n: f64) -> f64 {
-        (self.centre_n_per_mm * self.on_mm).clamp(-0.5 * script_n, 0.5 * script_n)
     }
 
     /// Judges a reading. Returns true if the goal rises now.

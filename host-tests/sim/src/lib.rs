@@ -3,7 +3,7 @@
 //! A scene is a text file (TOML) with the finger, the object, the requested forces and the effects. An effect that the
 //! scene does not name has no state, is never called, and costs nothing.
 //!
-//! The steps of a run: [`scene`] reads the file; [`registry`] builds the named effects; the world moves the finger and
+//! The steps of a run: [`scene`] reads the file; [`effects`] builds the named effects; the world moves the finger and
 //! fills the frames; the core's `Pipeline::step` answers each frame with a duty; watchers ([`watch`]) see the run step
 //! by step: metrics, ledger, recording, report.
 //!
@@ -11,8 +11,6 @@
 
 #![expect(missing_docs, reason = "a name that tells quantity and unit has no comment that repeats it")]
 
-pub mod agreement;
-pub mod bridge;
 #[cfg(feature = "files")]
 pub mod cli;
 pub mod cores;
@@ -25,7 +23,6 @@ pub mod host;
 pub mod mechanics;
 pub mod metrics;
 pub mod native;
-pub mod optimal;
 #[cfg(feature = "files")]
 mod part;
 pub mod plant;
@@ -33,7 +30,6 @@ pub mod plant;
 pub mod population;
 #[cfg(feature = "files")]
 pub mod recording;
-pub mod registry;
 #[cfg(feature = "files")]
 pub mod report;
 pub mod run;

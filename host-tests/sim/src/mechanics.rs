@@ -1,14 +1,21 @@
-//! Mechanics of the fingers and of what they touch.
+//! Mechanics of a finger (bridge, winding, shaft, gear, tip) and of what it touches.
 //!
 //! Everything that stores energy returns its mean slope over a step (a discrete gradient), so the energy balance of the
 //! step holds to rounding at any length: only friction and the winding remove energy, and none is created.
 
 pub mod contact;
-pub(crate) mod finger;
-mod normal;
 pub mod pressures;
 pub mod rotor;
-mod shape;
+
+use crate::effects::contact::Named;
+use crate::effects::drive::{self, Circuit, Friction};
+use crate::mechanics::contact::Contact;
+use crate::mechanics::rotor::{Acts, Rotor, Shaft, resistive};
+use crate::metrics;
+use crate::setup::Setup;
+use core::f64::consts::TAU;
+use fingertip::pipeline::{self, Status};
+use serde::{Deserialize, Serialize};
 
 /// exp(-x) for x of 0 or more, from the four operations alone, so that every machine gives the same bits.
 ///
@@ -25,4 +32,285 @@ pub fn decay(x: f64) -> f64 {
         power *= power;
     }
     power
+}
+
+/// Bridge of the motor, as the world sees it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub enum Bridge {
+    /// Both half bridges open.
+    #[default]
+    Coast,
+    /// PWM in slow decay.
+    Driven {
+        /// Share of the supply, -1 to 1; positive presses. 0 brakes.
+        duty: f64,
+    },
+}
+
+impl Bridge {
+    /// State of the bridge that a control step requests.
+    pub fn of(status: &Status) -> Self {
+        match status.bridge() {
+            pipeline::Bridge::Asleep | pipeline::Bridge::Open => Self::Coast,
+            pipeline::Bridge::Brakes => Self::Driven { duty: 0.0 },
+            pipeline::Bridge::Driven(duty) => Self::Driven { duty: metrics::duty(duty) },
+        }
+    }
+}
+
+/// Most iterations of the solution of a step, and the share of the speed at which they end.
+const ROUNDS: usize = 40;
+const TOLERANCE: f64 = 1e-15;
+
+/// Finger with the effects on its drive.
+pub struct Finger<D> {
+    pub contact: Contact,
+    pub drive: D,
+    setup: Setup,
+    rotor: Rotor,
+    mm_per_rad: f64,
+    now: Motion,
+    friction: Friction,
+    slipped_counts: i32,
+    fallen_v: Option<f64>,
+}
+
+/// State of the motion. A finger of the same setup continues from it to the bit.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct Motion {
+    /// Shaft before and after the last step.
+    before: Shaft,
+    shaft: Shaft,
+    rad_per_s2: f64,
+    winding_a: f64,
+    tip_mm: f64,
+    bridge: Bridge,
+    circuit: Circuit,
+    dt_s: f64,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct End {
+    shaft: Shaft,
+    /// Travel of the pressing flank.
+    pub flank_mm: f64,
+    winding_a: f64,
+    square_a2_s: f64,
+}
+
+impl<D: drive::Stages> Finger<D> {
+    /// Creates a finger at rest at travel 0, with the bridge open.
+    pub fn new(setup: &Setup, mut drive: D, contact: Named) -> Self {
+        let mm_per_rad = setup.transmission.drum_radius_mm / setup.transmission.ratio;
+        let rotor = Rotor {
+            inertia_kg_m2: setup.motor.inertia_kg_m2 + drive.inertia_kg_m2(mm_per_rad * 1e-3),
+            torque_nm_per_a: setup.motor.torque_nm_per_a,
+            rounds: ROUNDS,
+            tolerance: TOLERANCE,
+        };
+        let contact = Contact::new(setup, contact);
+        let now = Motion {
+            before: Shaft::default(),
+            shaft: Shaft::default(),
+            rad_per_s2: 0.0,
+            winding_a: 0.0,
+            tip_mm: 0.0,
+            bridge: Bridge::Coast,
+            circuit: Circuit::of(setup, 0.0),
+            dt_s: 0.0,
+        };
+        Self {
+            contact,
+            drive,
+            setup: setup.clone(),
+            rotor,
+            mm_per_rad,
+            now,
+            friction: Friction::default(),
+            slipped_counts: 0,
+            fallen_v: None,
+        }
+    }
+
+    pub fn setup(&self) -> &Setup {
+        &self.setup
+    }
+
+    /// Effective mass of the finger at the tip.
+    pub fn mass_kg(&self) -> f64 {
+        self.rotor.inertia_kg_m2 / (self.mm_per_rad * 1e-3) / (self.mm_per_rad * 1e-3)
+    }
+
+    pub fn inertia_kg_m2(&self) -> f64 {
+        self.rotor.inertia_kg_m2
+    }
+
+    /// Sets what holds during the next step.
+    pub fn prepare(&mut self, dt_s: f64, bridge: Bridge) {
+        self.now.before = self.now.shaft;
+        self.now.dt_s = dt_s;
+        self.now.bridge = bridge;
+        let duty = match bridge {
+            Bridge::Coast => 0.0,
+            Bridge::Driven { duty } => duty.clamp(-1.0, 1.0),
+        };
+        self.now.circuit = Circuit::of(&self.setup, duty);
+        self.now.circuit.source_v = self.fallen_v.unwrap_or(self.now.circuit.source_v);
+        self.friction = Friction::default();
+        if !self.drive.none() {
+            self.drive.circuit(&mut self.now.circuit);
+            let middle = self.now.shaft.speed_rad_per_s + 0.5 * dt_s * self.now.rad_per_s2;
+            self.drive.friction(middle, &mut self.friction);
+        }
+        self.rotor.torque_nm_per_a = self.now.circuit.torque_nm_per_a;
+    }
+
+    /// Returns the end of the prepared step against a load: its mean between two places of the pressing flank.
+    pub fn solve(&mut self, load_n: impl Fn(&Contact, f64, f64) -> f64) -> End {
+        let mut acting = Acts {
+            alone: self.drive.none(),
+            drive: &mut self.drive,
+            circuit: &self.now.circuit,
+            open: self.now.bridge == Bridge::Coast,
+            friction: &self.friction,
+            mm_per_rad: self.mm_per_rad,
+            load_n: |from_mm, to_mm| load_n(&self.contact, from_mm, to_mm),
+            torque_nm_per_a: self.rotor.torque_nm_per_a,
+            winding_a: self.now.winding_a,
+            square_a2_s: 0.0,
+        };
+        let shaft = self.rotor.advance(self.now.shaft, self.now.dt_s, &mut acting);
+        let flank_mm = shaft.angle_rad * self.mm_per_rad;
+        End { shaft, flank_mm, winding_a: acting.winding_a, square_a2_s: acting.square_a2_s }
+    }
+
+    /// Moves to the end of the step, where the surface of the object is at this travel.
+    pub fn finish(&mut self, end: &End, surface_mm: f64) {
+        self.now.shaft = end.shaft;
+        self.now.winding_a = end.winding_a;
+        if self.now.dt_s > 0.0 {
+            self.now.rad_per_s2 = (self.now.shaft.speed_rad_per_s - self.now.before.speed_rad_per_s) / self.now.dt_s;
+        }
+        if !self.drive.none() {
+            self.stop_at_ends();
+        }
+        self.now.tip_mm = self.flank_mm();
+        if !self.drive.none() {
+            self.drive.heated(self.now.dt_s, &self.now.circuit, end.square_a2_s);
+            self.now.tip_mm = self.drive.tip_mm(self.now.tip_mm, surface_mm);
+        }
+    }
+
+    fn stop_at_ends(&mut self) {
+        let Some([rear_mm, front_mm]) = self.drive.end_stops_mm() else { return };
+        let held_mm = self.flank_mm().clamp(rear_mm, front_mm);
+        if held_mm != self.flank_mm() {
+            self.now.shaft = Shaft { angle_rad: held_mm / self.mm_per_rad, speed_rad_per_s: 0.0 };
+        }
+    }
+
+    pub fn motion(&self) -> Motion {
+        self.now
+    }
+
+    pub fn resume(&mut self, motion: &Motion) {
+        self.now = *motion;
+    }
+
+    /// Puts the finger at rest at a travel.
+    pub fn place(&mut self, travel_mm: f64) {
+        self.now.shaft = Shaft { angle_rad: travel_mm / self.mm_per_rad, speed_rad_per_s: 0.0 };
+        (self.now.before, self.now.rad_per_s2, self.now.winding_a, self.now.tip_mm) =
+            (self.now.shaft, 0.0, 0.0, travel_mm);
+    }
+
+    /// Puts the surface of the object where the tip meets it at this travel.
+    pub fn place_object(&mut self, distance_mm: f64) {
+        self.setup.wall.distance_mm = distance_mm;
+    }
+
+    /// Sets the counts by which the encoder has slipped, and the voltage to which the supply has dropped.
+    pub fn happen(&mut self, slipped_counts: i32, fallen_v: Option<f64>) {
+        (self.slipped_counts, self.fallen_v) = (slipped_counts, fallen_v);
+    }
+
+    /// Force at the tip that dry friction and the gear hold without the motor, N.
+    pub fn friction_n(&self) -> f64 {
+        let Friction { holding_nm, load_share, .. } = self.friction;
+        if load_share < 1.0 { holding_nm / (self.mm_per_rad * 1e-3 * (1.0 - load_share)) } else { f64::INFINITY }
+    }
+
+    pub fn launch(&mut self, mm_per_s: f64) {
+        self.now.shaft.speed_rad_per_s = mm_per_s / self.mm_per_rad;
+    }
+
+    /// Travel of the pressing flank of the gear; that of the tip while it presses.
+    pub fn flank_mm(&self) -> f64 {
+        self.now.shaft.angle_rad * self.mm_per_rad
+    }
+
+    /// Travel of the pressing flank at a time within the last step.
+    pub fn flank_within_mm(&self, since_s: f64) -> f64 {
+        if since_s >= self.now.dt_s {
+            return self.flank_mm();
+        }
+        let (v0, v1) = (self.now.before.speed_rad_per_s, self.now.shaft.speed_rad_per_s);
+        let angle = self.now.before.angle_rad + since_s * (v0 + 0.5 * (v1 - v0) * since_s / self.now.dt_s);
+        angle * self.mm_per_rad
+    }
+
+    fn angle_ahead_rad(&self, ahead_s: f64) -> f64 {
+        self.now.shaft.angle_rad + ahead_s * (self.now.shaft.speed_rad_per_s + 0.5 * self.now.rad_per_s2 * ahead_s)
+    }
+
+    /// Travel of the pressing flank at a time after the last step, at constant acceleration.
+    pub fn flank_ahead_mm(&self, ahead_s: f64) -> f64 {
+        self.angle_ahead_rad(ahead_s) * self.mm_per_rad
+    }
+
+    /// Count of the encoder at a time after the last step, at constant acceleration.
+    pub fn count_ahead(&mut self, ahead_s: f64) -> i32 {
+        let turns = self.angle_ahead_rad(ahead_s) / TAU;
+        let count = (turns * self.setup.motor.encoder_counts_per_turn).floor() as i32;
+        let count = count + self.slipped_counts;
+        if self.drive.none() { count } else { self.drive.count(count) }
+    }
+
+    pub fn tip_mm(&self) -> f64 {
+        self.now.tip_mm
+    }
+
+    pub fn shaft(&self) -> Shaft {
+        self.now.shaft
+    }
+
+    /// Speed of the tip while the gear drives it.
+    pub fn speed_mm_per_s(&self) -> f64 {
+        self.now.shaft.speed_rad_per_s * self.mm_per_rad
+    }
+
+    pub fn current_a(&self) -> f64 {
+        if self.now.circuit.henry > 0.0 {
+            return self.now.winding_a;
+        }
+        let source = resistive(&self.now.circuit, self.now.bridge == Bridge::Coast);
+        self.rotor.current_a(&source, self.now.shaft.speed_rad_per_s)
+    }
+
+    pub fn supply_v(&self) -> f64 {
+        self.now.circuit.source_v - self.now.circuit.source_ohm * self.now.circuit.duty * self.current_a()
+    }
+
+    /// Share of the supply at the motor in the last step.
+    pub fn duty(&self) -> f64 {
+        self.now.circuit.duty
+    }
+
+    /// Kinetic energy, and energy of the effects on the drive, mJ.
+    pub fn energy_mj(&self) -> f64 {
+        let speed = self.now.shaft.speed_rad_per_s;
+        let winding_j = 0.5 * self.now.circuit.henry * self.now.winding_a * self.now.winding_a;
+        let turning_j = 0.5 * self.rotor.inertia_kg_m2 * speed * speed;
+        1e3 * (turning_j + winding_j + self.drive.potential_j(self.now.shaft.angle_rad))
+    }
 }

@@ -5,14 +5,11 @@
 
 mod conduct;
 mod finger;
-mod response;
 
 pub use crate::metrics::conduct::Hold;
-pub use crate::metrics::finger::{Finger, duty, newtons};
-pub use crate::metrics::response::AtGoal;
+pub use crate::metrics::finger::{AtGoal, Finger, duty, newtons};
 
-use crate::metrics::finger::DROPPED_MM;
-use crate::metrics::response::Response;
+use crate::metrics::finger::{DROPPED_MM, Response};
 use crate::scene::Bound;
 use crate::watch::{Controller, Step, Watch};
 use Worst::{FirstFault, Largest, Least, Sum};
@@ -51,12 +48,10 @@ pub fn names() -> Vec<&'static str> {
     METRICS.iter().map(|metric| metric.name).chain(OF_FINGERS.iter().map(String::as_str)).collect()
 }
 
-/// Measures a run, step by step.
 #[derive(Clone, Debug, Default)]
 pub struct Meter(Vec<Finger>);
 
 impl Meter {
-    /// Returns the results after the run.
     pub fn measured(&self) -> Measured {
         let scene = METRICS.iter().map(|metric| (metric.name.to_owned(), self.scene(metric)));
         let several = if self.0.len() > 1 { &self.0[..] } else { &[] };
@@ -98,7 +93,6 @@ impl Meter {
         known.map_or(Vec::new(), |(_, values)| fingers.iter().flat_map(values).collect())
     }
 
-    /// Returns the forces that were held.
     pub fn holds(&self) -> Vec<Hold> {
         self.0.iter().flat_map(|finger| finger.conduct.ended().holds).collect()
     }
@@ -145,7 +139,6 @@ impl Measured {
     }
 }
 
-/// Comparison of a result with its bound.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verdict {
     pub bound: Bound,
@@ -260,7 +253,6 @@ pub const METRICS: &[Metric] = &[
 /// Name of a metric that has a value for each goal, and these values.
 type ByGoal = (&'static str, fn(&Finger) -> Vec<AtGoal>);
 
-/// Metrics that have a value for each goal.
 pub const BY_GOAL: [ByGoal; 4] = [
     ("over_force_mn", |f| f.conduct.over_force_mn.clone()),
     ("over_force_defective_mn", |f| f.conduct.over_force_defective_mn.clone()),

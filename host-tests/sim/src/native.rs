@@ -8,13 +8,12 @@ pub mod bench;
 pub mod calibrated;
 pub mod served;
 
-use crate::bridge::Bridge;
 use crate::effects::link::{self, Stages as _};
 use crate::effects::sensor::{Readout, Stages as _};
-use crate::effects::{Named, Parts, Set};
+use crate::effects::{self, Family, Named, Parts, Set};
 use crate::host::{Host, Reading};
+use crate::mechanics::Bridge;
 use crate::mechanics::contact::Place;
-use crate::registry::{self, Family};
 use crate::run::{RunError, by_effect};
 use crate::scene::Scene;
 use crate::setup::Setup;
@@ -31,7 +30,6 @@ use fingertip::units::{Celsius, Duty};
 use std::time::{Duration, Instant};
 use twox_hash::xxhash3_128::Hasher;
 
-/// Reason why a scene does not run.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SimError {
     #[error("[controller] {0}")]
@@ -125,8 +123,8 @@ struct StageTimes {
 const TIMED: u64 = 64;
 /// Stages of a frame, and the families of the effects whose time is not counted with each: it has its own row.
 const STAGES: [(&str, &[Family]); 4] = [
-    ("motion", &[registry::CONTACT, registry::DRIVE]),
-    ("readout", &[registry::SENSOR]),
+    ("motion", &[effects::CONTACT, effects::DRIVE]),
+    ("readout", &[effects::SENSOR]),
     ("control step", &[]),
     ("truth and metrics", &[]),
 ];
@@ -210,7 +208,6 @@ impl<E: Set> Board<E> {
         })
     }
 
-    /// Tares and runs.
     fn whole(mut self, scene: &Scene, started: Instant, watch: &mut dyn Watch) -> Result<Summary, SimError> {
         self.tare(watch);
         let set_up_s = started.elapsed().as_secs_f64();
@@ -379,10 +376,8 @@ impl<E: Set> Board<E> {
 
 // Virtual time is exact: in whole 21sts of a femtosecond a tick of the timer (168 MHz) has 125 million.
 
-/// Units in a second.
 const UNITS: i128 = 21_000_000_000_000_000;
 
-/// Instant of virtual time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Clock(i128);
 
@@ -466,7 +461,6 @@ impl Digest {
         Status { chip: None, ..*status }.words(duty, |word| self.0.write(&word.to_le_bytes()));
     }
 
-    /// Returns the digest in hexadecimal.
     pub fn hex(&self) -> String {
         format!("{:032x}", self.0.finish_128())
     }

@@ -5,14 +5,11 @@
 
 pub use crate::setup::Setup;
 
-use crate::bridge::Bridge;
 use crate::effects::drive::{self, Circuit, Friction};
-use crate::effects::sensor::effects::Settling;
-use crate::effects::sensor::{self, Readout};
+use crate::effects::sensor::{self, Readout, Settling};
 use crate::effects::{Parts, Set, contact};
-use crate::mechanics::decay;
-use crate::mechanics::finger::{Finger, Motion};
 use crate::mechanics::rotor::Shaft;
+use crate::mechanics::{Bridge, Finger, Motion, decay};
 use crate::scene::Scene;
 use crate::setup::Array;
 use crate::world::{Surroundings, World};

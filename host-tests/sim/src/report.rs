@@ -1,6 +1,5 @@
 //! Run as one page of HTML without other files or a network, light and dark, for a screen and a phone.
 
-mod data;
 mod plots;
 mod trace;
 
@@ -8,12 +7,14 @@ pub use crate::report::plots::around;
 pub use crate::report::trace::{Instant, Kept, Trace, Track, Tracks};
 
 use crate::metrics::{METRICS, Metric, Verdict, shown};
-use crate::report::data::BEGIN;
-use crate::report::plots::Plot;
+use crate::report::plots::{Line, Plot, Style};
 use crate::run::{Outcome, RunError, Without, asked, difference, differences, ledger_rows};
 use crate::scene::Scene;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use output::plot::PlotError;
+use serde_json::{Map, Value, json};
+use std::fs;
+use std::path::Path;
 
 #[derive(Clone, Copy)]
 pub struct Report<'a> {
@@ -37,7 +38,6 @@ const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 
 const LIBRARY: &str = include_str!("report/uplot/uPlot.iife.min.js");
 const LIBRARY_STYLE: &str = include_str!("report/uplot/uPlot.min.css");
 const LICENSE: &str = include_str!("report/uplot/LICENSE");
-/// Scripts of the page, in order.
 const SCRIPTS: [&str; 5] = [
     include_str!("report/script/view.js"),
     include_str!("report/script/plots.js"),
@@ -94,9 +94,9 @@ pub fn page(report: &Report) -> Result<String, RunError> {
                     }
                     section id="scene" { h2 { "The scene" } pre tabindex="0" { code { (scene.text) } } }
                 }
-                (PreEscaped(BEGIN)) (PreEscaped(data::embedded(&data::data(report)))) (PreEscaped("</script>"))
+                (PreEscaped(BEGIN)) (PreEscaped(embedded(&data(report)))) (PreEscaped("</script>"))
                 @if let Some(over) = over {
-                    script type="application/json" id="over" { (PreEscaped(data::embedded(&over.0))) }
+                    script type="application/json" id="over" { (PreEscaped(embedded(&over.0))) }
                 }
                 script { (PreEscaped(format!("/*\n{LICENSE}*/\n{LIBRARY}"))) }
                 script { (PreEscaped(format!("(() => {{\n'use strict';\n{}}})();\n", SCRIPTS.concat()))) }
@@ -251,7 +251,6 @@ fn table_of(report: &Report, metrics: &[&Metric]) -> Markup {
     }
 }
 
-/// Lists the cost of each effect.
 fn ledger(report: &Report) -> Markup {
     html! {
         div.scroll tabindex="0" { table {
@@ -269,7 +268,6 @@ fn ledger(report: &Report) -> Markup {
     }
 }
 
-/// Lists the changes by each effect.
 fn ablation(report: &Report) -> Markup {
     html! {
         p.note { "What each effect adds to a metric: the run as it is, less a run without the effect." }
@@ -296,10 +294,8 @@ const GROUPS: [(&str, &[&str]); 6] = [
     ("Slip and object", &["slip", "object_"]),
     ("Motor and energy", &["duty", "rest_duty", "energy", "current", "winding"]),
 ];
-/// Title for the other metrics.
 const REST: &str = "More";
 
-/// Metrics under a title.
 struct Group {
     pub title: &'static str,
     pub metrics: Vec<&'static Metric>,
@@ -328,6 +324,98 @@ fn title_of(metric: &str) -> &'static str {
 /// Name of a metric without its finger.
 fn short(metric: &str) -> &str {
     metric.split_once('.').map_or(metric, |(_, name)| name)
+}
+
+/// Version of the format of the data. Another version is refused.
+pub const FORMAT: u64 = 1;
+/// Text before the data in a page.
+pub const BEGIN: &str = "<script type=\"application/json\" id=\"run\">";
+const END: &str = "</script>";
+
+pub fn data(report: &Report) -> Value {
+    let metrics: Map<String, Value> =
+        report.outcome.measured.0.iter().map(|(name, value)| (name.clone(), json!(value))).collect();
+    json!({
+        "format": FORMAT,
+        "scene": report.scene.name,
+        "seed": report.scene.seed,
+        "board": report.board,
+        "digest": report.outcome.summary.digest,
+        "metrics": metrics,
+        "fingers": report.trace.fingers.iter().map(finger_data).collect::<Vec<_>>(),
+    })
+}
+
+fn finger_data(tracks: &Tracks) -> Value {
+    json!({
+        "times_s": tracks.time.means().into_iter().map(rounded).collect::<Vec<_>>(),
+        "plots": plots::all(tracks).iter().map(plot_data).collect::<Vec<_>>(),
+        "strip": tracks.strip(),
+        "maps": maps_data(&tracks.instants),
+    })
+}
+
+fn plot_data(Plot { title, unit, about, range, lines }: &Plot) -> Value {
+    let mut data = json!({ "title": title, "unit": unit, "about": about });
+    if range.is_some() {
+        data["range"] = json!(range);
+    }
+    data["lines"] = lines.iter().map(line_data).collect();
+    data
+}
+
+fn line_data(Line { label, style, kept }: &Line) -> Value {
+    let of = |value: fn(&Kept) -> f64| -> Value {
+        kept.iter().map(|kept| json!(kept.as_ref().map(value).map(rounded))).collect()
+    };
+    let mut drawn = json!({ "label": label, "style": style, "mean": of(|kept| kept.mean) });
+    if *style == Style::Main && kept.iter().flatten().any(|kept| kept.low < kept.high) {
+        (drawn["low"], drawn["high"]) = (of(|kept| kept.low), of(|kept| kept.high));
+    }
+    drawn
+}
+
+/// Pressure maps in tenths of kPa, and codes, both row after row from row 0.
+fn maps_data(instants: &[Instant]) -> Value {
+    let tenths = |kpa: &f64| (10.0 * kpa).round() as i64;
+    let true_dpa = instants.iter().map(|at| at.true_kpa.iter().flatten().map(tenths).collect::<Vec<_>>());
+    json!({
+        "times_s": instants.iter().map(|instant| rounded(instant.time_s)).collect::<Vec<_>>(),
+        "true_dpa": true_dpa.collect::<Vec<_>>(),
+        "codes": instants.iter().map(|at| at.codes.as_flattened()).collect::<Vec<_>>(),
+    })
+}
+
+/// Rounds to six significant digits, as a plot shows no more.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.5e}").parse().unwrap_or(value)
+}
+
+/// Data for a page. Nothing in them can end the element, whatever the name of the scene.
+pub fn embedded(data: &Value) -> String {
+    // JSON has this letter only within strings.
+    data.to_string().replace('<', "\\u003c")
+}
+
+impl Over {
+    /// Reads the run of another report.
+    pub fn read(path: &Path) -> Result<Self, RunError> {
+        let page = fs::read_to_string(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+        Self::of(&page).map_err(|why| format!("{}: {why}", path.display()).into())
+    }
+
+    /// Reads the run from the text of a report.
+    pub fn of(page: &str) -> Result<Self, String> {
+        let again = "write it again with `--out`";
+        let (_, rest) = page.split_once(BEGIN).ok_or(format!("this is no report with a run in it; {again}"))?;
+        let (data, _) = rest.split_once(END).ok_or(format!("the report is cut off; {again}"))?;
+        let data: Value =
+            serde_json::from_str(data).map_err(|error| format!("the report is damaged: {error}; {again}"))?;
+        match data["format"].as_u64() {
+            Some(FORMAT) => Ok(Self(data)),
+            _ => Err(format!("its data are of format {}, not {FORMAT}; {again}", data["format"])),
+        }
+    }
 }
 
 #[cfg(test)]

@@ -19,9 +19,7 @@ pub struct Outcome {
     pub measured: Measured,
     /// Comparison of the results with the bounds.
     pub verdicts: Vec<Verdict>,
-    /// Forces that were held.
     pub holds: Vec<Hold>,
-    /// Times, costs and digest.
     pub summary: Summary,
 }
 
@@ -34,7 +32,6 @@ pub fn run(scene: &Scene, board: Run, watchers: &mut [&mut dyn Watch]) -> Result
 }
 
 impl Outcome {
-    /// True if every bound is held.
     pub fn passed(&self) -> bool {
         self.verdicts.iter().all(|verdict| verdict.held)
     }
@@ -117,7 +114,6 @@ pub fn asked(min: Option<f64>, max: Option<f64>) -> String {
     }
 }
 
-/// Meter and other watchers.
 struct All<'a, 'b> {
     meter: &'a mut Meter,
     others: &'a mut [&'b mut dyn Watch],

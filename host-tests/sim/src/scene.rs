@@ -1,19 +1,21 @@
-//! Scene, read and checked, with the setup of its finger and the parameters of its controller.
+//! Scene, read and checked, with the setup of its finger and the parameters of its controller; the library of scenes;
+//! changes to the text of a scene.
 
-pub mod library;
 pub(crate) mod reader;
 pub mod tables;
-pub mod text;
 
 pub use crate::scene::reader::{SceneError, SceneErrors, read};
 
+use crate::effects::{Description, NamedEffect};
 use crate::events::Event;
-use crate::registry::Named;
-use crate::scene::tables::Values;
+use crate::scene::reader::did_you_mean;
+use crate::scene::tables::{Value, Values};
 use crate::setup::{Array, Setup};
 use fingertip::params::Params;
+use std::path::{Path, PathBuf};
+use std::{fs, io};
+use toml_edit::{DocumentMut, Item, Table, Value as TomlValue};
 
-/// Scene, read and checked.
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// The file's name without its ending.
@@ -22,7 +24,6 @@ pub struct Scene {
     /// Values that the command line replaced, as `TABLE.KEY=VALUE`. `text` has them too.
     pub set: Vec<String>,
     pub about: String,
-    /// Seed of all random numbers.
     pub seed: u64,
     /// Virtual time from the moment at which the finger is tared and its torque enabled.
     pub duration_s: f64,
@@ -32,13 +33,12 @@ pub struct Scene {
     pub script: Vec<Goal>,
     /// Events, in order of time.
     pub events: Vec<Event>,
-    /// Effects of the scene, in the order of the registry.
-    pub effects: Vec<Named>,
+    /// Effects of the scene, in the order of [`crate::effects::all`].
+    pub effects: Vec<NamedEffect>,
     pub bounds: Vec<Bound>,
 }
 
 impl Scene {
-    /// Returns the values of a table.
     pub fn table(&self, name: &str) -> &Values {
         let found = self.tables.iter().find(|(known, _)| *known == name);
         &found.unwrap_or_else(|| panic!("no table [{name}] is described")).1
@@ -138,4 +138,127 @@ pub struct Bound {
 
 fn whole(value: f64) -> i32 {
     (value + 0.5).floor() as i32
+}
+
+/// Folder of the scenes of the project.
+pub fn library_folder() -> PathBuf {
+    Path::new(env!("FINGERTIP_ROOT")).join("host-tests/sim/scenes")
+}
+
+/// Names of the scenes of the library, sorted.
+pub fn library_names() -> io::Result<Vec<String>> {
+    names_in(&library_folder())
+}
+
+/// Names of the TOML files of a folder, sorted.
+fn names_in(folder: &Path) -> io::Result<Vec<String>> {
+    let mut names = Vec::new();
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
+        if path.extension().is_some_and(|extension| extension == "toml") {
+            names.extend(path.file_stem().map(|stem| stem.to_string_lossy().into_owned()));
+        }
+    }
+    names.sort();
+    Ok(names)
+}
+
+/// Returns path and text of a scene, by its path or its name in the library.
+pub fn library_text(scene: &str) -> Result<(PathBuf, String), String> {
+    find(&library_folder(), "scene", scene)
+}
+
+/// Returns path and text of a file, by its path or its name in a folder. Errors call the file `what`.
+pub fn find(folder: &Path, what: &str, name: &str) -> Result<(PathBuf, String), String> {
+    let named = folder.join(name).with_extension("toml");
+    let path = if Path::new(name).is_file() || !named.is_file() { PathBuf::from(name) } else { named };
+    let text = fs::read_to_string(&path).map_err(|error| unknown(folder, what, name, &error))?;
+    Ok((path, text))
+}
+
+/// Explains that there is no such file, and lists those of the folder.
+pub fn unknown(folder: &Path, what: &str, name: &str, error: &io::Error) -> String {
+    let names = names_in(folder).unwrap_or_default();
+    let meant = did_you_mean(name, names.iter().map(String::as_str));
+    format!("no {what} {name}: {error}{meant}\n  those that come with the project: {}", names.join(", "))
+}
+
+/// Sets `table.key` (`effects.noise.rms_codes`, `script.0.goal_n`, `seed`) of a text to a value in TOML. Comments
+/// remain. The reader checks the value later.
+pub fn set(text: &str, path: &str, value: &str) -> Result<String, String> {
+    let mut document: DocumentMut = text.parse().map_err(|error: toml_edit::TomlError| error.message().to_owned())?;
+    let mut value: TomlValue = value.parse().map_err(|_| format!("{path}={value}: `{value}` is not a TOML value"))?;
+    let mut names: Vec<&str> = path.split('.').collect();
+    let key = names.pop().filter(|key| !key.is_empty()).ok_or_else(|| format!("`{path}` names no key"))?;
+    let mut table: &mut dyn toml_edit::TableLike = document.as_table_mut();
+    for (place, name) in names.iter().enumerate().filter(|(_, name)| name.parse::<usize>().is_err()) {
+        let item = table.entry(name).or_insert_with(|| {
+            let mut table = Table::new();
+            table.set_implicit(*name == "effects");
+            Item::Table(table)
+        });
+        let index = names.get(place + 1).and_then(|next| next.parse::<usize>().ok());
+        table = match (item, index) {
+            (Item::ArrayOfTables(tables), Some(index)) => {
+                let count = tables.len();
+                tables
+                    .get_mut(index)
+                    .ok_or_else(|| format!("`{path}`: there are {count} [[{name}]], numbered from 0"))?
+            }
+            (item, None) => item.as_table_like_mut().ok_or_else(|| format!("`{path}`: `{name}` is no table"))?,
+            _ => return Err(format!("`{path}`: `{name}` is no list of tables")),
+        };
+    }
+    match table.get_mut(key).and_then(Item::as_value_mut) {
+        Some(present) => {
+            *value.decor_mut() = present.decor().clone();
+            *present = value;
+        }
+        None => {
+            table.insert(key, Item::Value(value));
+        }
+    }
+    Ok(document.to_string())
+}
+
+/// Writes the scene as a text with every key and without comments, which reads as the same scene.
+pub fn write(scene: &Scene) -> String {
+    let (about, duration_s) = (Value::Text(scene.about.clone()), Value::Number(scene.duration_s));
+    let mut text = format!("about = {about}\nduration_s = {duration_s}\nseed = {}\n", scene.seed);
+    for (name, values) in &scene.tables {
+        section(&mut text, &format!("[{name}]"), values);
+    }
+    for goal in &scene.script {
+        let [at_s, goal_n] = [goal.at_s, goal.goal_n].map(Value::Number);
+        text += &format!("\n[[script]]\nat_s = {at_s}\ngoal_n = {goal_n}\n");
+    }
+    for event in &scene.events {
+        section(&mut text, "[[event]]", &event.values);
+    }
+    for named in &scene.effects {
+        section(&mut text, &format!("[effects.{}]", named.effect.name), &named.values);
+    }
+    for bound in &scene.bounds {
+        text += &format!("\n[[expect]]\nmetric = {}\n", Value::Text(bound.metric.clone()));
+        for (name, side) in [("min", bound.min), ("max", bound.max), ("max_per_goal_n", bound.max_per_goal_n)] {
+            text += &side.map_or(String::new(), |side| format!("{name} = {}\n", Value::Number(side)));
+        }
+    }
+    text
+}
+
+fn section(text: &mut String, head: &str, values: &Values) {
+    *text += &format!("\n{head}\n");
+    for (name, value) in values.iter() {
+        *text += &format!("{name} = {value}\n");
+    }
+}
+
+/// Writes the table of an effect with the values at which it changes nothing. Other keys have their defaults.
+pub fn zero(effect: &Description) -> String {
+    let mut text = format!("[effects.{}]\n", effect.name);
+    for (name, value) in effect.zero {
+        text += &format!("{name} = {}\n", Value::Number(*value));
+    }
+    text
 }

@@ -1,25 +1,27 @@
 //! Runs of a scene over values of its keys, over seeds, on all cores and on several machines.
 //!
-//! Runs are numbered by point, and within a point by seed. A shard takes each n-th run. Merged shards give the same
-//! files, byte for byte, as a whole sweep.
+//! Runs are numbered by point, and within a point by seed. A shard takes each n-th run and writes only
+//! `runs-1-of-4.csv`; each row names its sweep and the number of runs. Merged shards give the same files, byte for byte,
+//! as a whole sweep: `runs.csv` with a row for each run, `summary.csv`, and a plot for each bounded metric.
 
-pub mod files;
 mod summary;
 
-pub(crate) use files::complete;
-pub use files::{Shard, merge};
 pub use summary::Table;
 
-use crate::effects::draws;
+use crate::effects::{self, NamedEffect, draws};
 use crate::metrics::METRICS;
-use crate::registry::{self, Named};
+use crate::part::{self, cannot_write, make_folder};
 use crate::run::{Run, RunError, run};
 use crate::scene::Scene;
 use crate::{cli, cores};
-use files::Rows;
+use csv::{Reader, ReaderBuilder};
 use indicatif::{ProgressBar, ProgressStyle};
+use output::kept::Lock;
 use output::say;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use std::{fmt, fs};
 
 #[derive(Clone, Debug)]
 pub struct Plan {
@@ -49,7 +51,7 @@ pub fn sweep(plan: &Plan, board: Run) -> Result<(Table, PathBuf), RunError> {
     let points = points(plan)?;
     let first = &points.first().ok_or("there is nothing to run")?.1;
     if seeds > 1 && !points.iter().any(|(_, scene)| is_random(scene)) {
-        let drawing: Vec<&str> = registry::all().filter(|effect| draws(effect)).map(|effect| effect.name).collect();
+        let drawing: Vec<&str> = effects::all().filter(|effect| draws(effect)).map(|effect| effect.name).collect();
         return Err(format!(
             "nothing in {} is random: all {seeds} seeds would give the same run. Leave --seeds out, or name an effect that draws: {}",
             first.name,
@@ -57,7 +59,7 @@ pub fn sweep(plan: &Plan, board: Run) -> Result<(Table, PathBuf), RunError> {
         )
         .into());
     }
-    let head = files::head(plan, first, all);
+    let head = head(plan, first, all);
     let out = plan.out.clone().unwrap_or_else(|| Path::new(FOLDER).join(&head.id));
     let mut rows = Rows::open(plan, &out, head)?;
     say::aside(match rows.count() {
@@ -161,11 +163,266 @@ impl std::str::FromStr for Vary {
 
 /// True if another seed may give another run.
 fn is_random(scene: &Scene) -> bool {
-    scene.effects.iter().any(|Named { effect, values }| {
+    scene.effects.iter().any(|NamedEffect { effect, values }| {
         let idle = |keys: &[(&str, f64)]| keys.iter().all(|(key, zero)| values.number(key) == *zero);
         let zero = if effect.name == "tangential" { &[("spread_percent", 0.0)] } else { effect.zero };
         draws(effect) && (zero.is_empty() || !idle(zero))
     })
+}
+
+/// Columns before the varied keys.
+pub(super) const ID: &str = "sweep";
+pub(super) const RUN: &str = "run";
+pub(super) const RUNS: &str = "of_runs";
+/// Columns after the varied keys; then come the metrics and their bounds.
+pub(super) const SEED: &str = "seed";
+pub(super) const PASSED: &str = "passed";
+pub(super) const DIGEST: &str = "digest";
+pub(super) const EXPECT: &str = "expect ";
+
+/// Columns, and the values at the beginning and the end of every row.
+pub(super) struct Head {
+    columns: Vec<String>,
+    /// Digest of the sweep, and the name of its folder without another one.
+    pub id: String,
+    runs: usize,
+    expected: Vec<String>,
+}
+
+fn head(plan: &Plan, scene: &Scene, runs: usize) -> Head {
+    let mut columns: Vec<String> = [ID, RUN, RUNS].map(String::from).into();
+    columns.extend(plan.vary.iter().map(|vary| vary.key.clone()));
+    columns.extend([SEED, PASSED, DIGEST].map(String::from));
+    columns.extend(METRICS.iter().map(|metric| metric.name.to_owned()));
+    columns.extend(scene.bounds.iter().map(|bound| format!("{EXPECT}{}", bound.metric)));
+    let side = |side: Option<f64>| side.map_or(String::new(), |side| side.to_string());
+    let expected = scene.bounds.iter().map(|bound| format!("{}..{}", side(bound.min), side(bound.max))).collect();
+    let said = format!("{} {:?} {}\n{}", env!("CARGO_PKG_VERSION"), plan.vary, plan.seeds, scene.text);
+    Head { columns, id: format!("{}-{}", scene.name, part::check(&said)), runs, expected }
+}
+
+/// Rows so far, also on disk, so that a sweep that is stopped can continue.
+pub(super) struct Rows {
+    head: Head,
+    rows: BTreeMap<usize, Vec<String>>,
+    part: part::Part,
+}
+
+impl Rows {
+    /// Resumes from the rows of an earlier try of the same sweep.
+    pub fn open(plan: &Plan, out: &Path, head: Head) -> Result<Self, RunError> {
+        let file = out.join(runs_name(plan));
+        let name = format!("the sweep {} of {} runs", head.id, head.runs);
+        let (part, lines) = part::Part::open(&file, &name)?;
+        refuse_others(&file, &head.id)?;
+        let (mut rows, width) = (BTreeMap::new(), head.columns.len());
+        for line in lines {
+            let mut reader = ReaderBuilder::new().has_headers(false).from_reader(line.as_bytes());
+            let row: Vec<String> = reader.deserialize().next().ok_or("an empty row")??;
+            let number = row.get(1).and_then(|number| number.parse().ok());
+            // Every line is complete, so another form means another version.
+            let number = number.filter(|number| row.len() == width && (1..=head.runs).contains(number));
+            let number =
+                number.ok_or_else(|| format!("{}.part has a row of another form: remove it", file.display()))?;
+            rows.insert(number, row);
+        }
+        Ok(Self { rows, part, head })
+    }
+
+    /// True if a run is done. Numbers count from 1.
+    pub fn has(&self, number: usize) -> bool {
+        self.rows.contains_key(&number)
+    }
+
+    pub fn count(&self) -> usize {
+        self.rows.len()
+    }
+
+    pub fn add(&mut self, number: usize, values: Vec<String>) -> Result<(), RunError> {
+        let Head { id, runs, expected, .. } = &self.head;
+        let first = [id.clone(), number.to_string(), runs.to_string()];
+        let row: Vec<String> = first.into_iter().chain(values).chain(expected.iter().cloned()).collect();
+        let line = summary::csv([&row])?;
+        self.part.add(String::from_utf8(line)?.trim_end())?;
+        self.rows.insert(number, row);
+        Ok(())
+    }
+
+    /// Writes the files and then removes the rows so far.
+    pub fn finish(self, plan: &Plan, out: &Path) -> Result<Table, RunError> {
+        let table = Table { head: self.head.columns, rows: self.rows.into_values().collect() };
+        self.part.write(table.csv()?)?;
+        if plan.shard.is_whole() {
+            table.write_rest(out, self.part.lock())?;
+        }
+        self.part.done()?;
+        Ok(table)
+    }
+}
+
+fn runs_name(plan: &Plan) -> String {
+    let Shard { number, of } = plan.shard;
+    if plan.shard.is_whole() { "runs.csv".into() } else { format!("runs-{number}-of-{of}.csv") }
+}
+
+/// Refuses to replace the runs of another sweep.
+fn refuse_others(file: &Path, id: &str) -> Result<(), RunError> {
+    let Ok(bytes) = fs::read(file) else { return Ok(()) };
+    let mut reader = ReaderBuilder::new().flexible(true).from_reader(&bytes[..]);
+    let first = reader.records().next().and_then(Result::ok);
+    match first.as_ref().and_then(|row| row.get(0)) {
+        Some(found) if found == id => Ok(()),
+        found => {
+            let whose = found.map_or("something else".into(), |found| format!("the sweep {found}"));
+            Err(format!("{} holds {whose}, not {id}: move it away, or name another folder with --out", file.display())
+                .into())
+        }
+    }
+}
+
+pub fn merge(files: &[PathBuf], out: &Path) -> Result<Table, RunError> {
+    let table = table(files)?;
+    make_folder(out)?;
+    let file = out.join("runs.csv");
+    let lock = Lock::take(&file).map_err(|error| cannot_write(&file, &error))?;
+    refuse_others(&file, &table.rows[0][0])?;
+    lock.write(table.csv()?).map_err(|error| cannot_write(&file, &error))?;
+    table.write_rest(out, &lock)?;
+    Ok(table)
+}
+
+/// Share of the runs: each n-th one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    /// Number of the share, from 1.
+    pub number: usize,
+    pub of: usize,
+}
+
+impl Shard {
+    pub const WHOLE: Self = Self { number: 1, of: 1 };
+
+    /// True if a run, counted from 0, is in the share.
+    pub const fn has(self, run: usize) -> bool {
+        run % self.of == self.number - 1
+    }
+
+    pub const fn is_whole(self) -> bool {
+        self.of == 1
+    }
+}
+
+/// Returns the rows of merged shards, which must have every number from 1 to `all`.
+pub(crate) fn complete<T>(rows: BTreeMap<usize, T>, all: usize, thing: &str) -> Result<Vec<T>, String> {
+    if let Some(first) = (1..=all).find(|number| !rows.contains_key(number)) {
+        let missing = all - rows.len();
+        return Err(format!("{missing} of {all} {thing}s are missing, {thing} {first} the first: is a shard missing?"));
+    }
+    Ok(rows.into_values().collect())
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.number, self.of)
+    }
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    /// Parses `i/n`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("`{text}`: needs I/N, I from 1 to N");
+        let (number, of) = text.split_once('/').ok_or_else(wrong)?;
+        let shard = Self { number: number.parse().map_err(|_| wrong())?, of: of.parse().map_err(|_| wrong())? };
+        if (1..=shard.of).contains(&shard.number) { Ok(shard) } else { Err(wrong()) }
+    }
+}
+
+/// Largest number in a file. Metrics and keys are far smaller, and sums and differences of such numbers are finite.
+const LARGEST: f64 = 1e15;
+
+/// Reads all runs of a sweep from the files of its shards.
+pub fn table(files: &[PathBuf]) -> Result<Table, RunError> {
+    let mut known: Option<Table> = None;
+    let mut rows = BTreeMap::new();
+    let mut sweep: Option<(String, usize)> = None;
+    for file in files {
+        let name = file.display();
+        let bytes = fs::read(file).map_err(|error| format!("cannot read {name}: {error}"))?;
+        if !bytes.ends_with(b"\n") {
+            return Err(format!("{name} is cut off in its last line: copy it again").into());
+        }
+        let mut reader = Reader::from_reader(&bytes[..]);
+        let head = words(reader.headers().map_err(|error| format!("{name}: {error}"))?);
+        check_head(&head).map_err(|why| format!("{name} is no shard of a sweep: {why}"))?;
+        let table = known.get_or_insert_with(|| Table { head: head.clone(), rows: Vec::new() });
+        if table.head != head {
+            return Err(format!("{name} is no shard of the same sweep: its columns are others").into());
+        }
+        for row in reader.records() {
+            let row = words(&row.map_err(|error| format!("{name}: {error}"))?);
+            let (number, runs) = check_row(table, &row).map_err(|why| format!("{name}: {why}"))?;
+            let (id, all) = sweep.get_or_insert_with(|| (row[0].clone(), runs));
+            if *id != row[0] || *all != runs {
+                return Err(format!("{name} is of the sweep {} of {runs} runs and not of {id} of {all}", row[0]).into());
+            }
+            if rows.insert(number, row).is_some() {
+                return Err(format!("run {number} is there twice: in {name} again").into());
+            }
+        }
+    }
+    let ((_, all), Table { head, .. }) = sweep.zip(known).ok_or("there are no runs in these files")?;
+    Ok(Table { head, rows: complete(rows, all, "run")? })
+}
+
+fn check_head(head: &[String]) -> Result<(), String> {
+    let seed =
+        head.iter().position(|column| column == SEED).filter(|_| head.starts_with(&[ID, RUN, RUNS].map(String::from)));
+    let seed = seed.filter(|seed| head[*seed..].starts_with(&[SEED, PASSED, DIGEST].map(String::from)));
+    let seed = seed.ok_or_else(|| {
+        format!("its first line has to begin with {ID},{RUN},{RUNS} and to have {SEED},{PASSED},{DIGEST}")
+    })?;
+    let expected = head.iter().position(|name| name.starts_with(EXPECT)).unwrap_or(head.len());
+    if expected < seed || head[expected..].iter().any(|name| !name.starts_with(EXPECT)) {
+        return Err(format!("its columns `{EXPECT}...` have to be the last"));
+    }
+    if head.iter().collect::<BTreeSet<_>>().len() < head.len() {
+        return Err("two of its columns have the same name".into());
+    }
+    Ok(())
+}
+
+/// Returns the number of the run and the count of runs of a row, if every value fits its column.
+fn check_row(table: &Table, row: &[String]) -> Result<(usize, usize), String> {
+    let wrong = |column: usize, what: &str| {
+        format!("run {}: `{}` under {} is no {what}", row[1], row[column], table.head[column])
+    };
+    let count = |column: usize| row[column].parse::<usize>().ok().filter(|count| *count > 0);
+    let number = count(1).ok_or_else(|| wrong(1, "run's number"))?;
+    let runs = count(2).filter(|runs| number <= *runs).ok_or_else(|| wrong(2, "count of runs"))?;
+    let numeric = |text: &str| text.parse::<f64>().is_ok_and(|value| value.abs() <= LARGEST);
+    let any = |text: &str| text.is_empty() || numeric(text);
+    if let Some(column) = table.varied().find(|column| !numeric(&row[*column])) {
+        return Err(wrong(column, "number"));
+    }
+    let seed = table.varied().end;
+    row[seed].parse::<u64>().map_err(|_| wrong(seed, "seed"))?;
+    if !["0", "1"].contains(&row[seed + 1].as_str()) {
+        return Err(wrong(seed + 1, "verdict (0 or 1)"));
+    }
+    if let Some(column) = table.metrics().find(|column| !any(&row[*column])) {
+        return Err(wrong(column, "number, and not empty"));
+    }
+    let sides = |text: &str| text.split_once("..").is_some_and(|(min, max)| any(min) && any(max));
+    match (table.metrics().end..row.len()).find(|column| !sides(&row[*column])) {
+        Some(column) => Err(wrong(column, "range LEAST..LARGEST")),
+        None => Ok((number, runs)),
+    }
+}
+
+fn words(row: &csv::StringRecord) -> Vec<String> {
+    row.iter().map(str::to_owned).collect()
 }
 
 #[cfg(test)]

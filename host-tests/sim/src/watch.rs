@@ -1,11 +1,13 @@
-//! Values that a run shows to its watchers, one control step at a time.
+//! Values that a run shows to its watchers, one control step at a time; and the watcher that compares two boards.
 
+use crate::scene::Scene;
 use fingertip::command::Command;
 use fingertip::frame::Sense;
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{COLUMNS, Frame, ROWS};
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// Settings of a controller when a run begins. With all [`Step`]s they are sufficient for a replay.
 #[derive(Clone, Debug)]
@@ -37,7 +39,6 @@ pub struct Step<'a> {
     pub command: &'a Command,
     /// Output of the core, with the duty.
     pub status: &'a Status,
-    /// True state of the simulated world.
     pub truth: &'a Truth,
 }
 
@@ -93,7 +94,6 @@ pub trait Watch {
         false
     }
 
-    /// Receives a control step.
     fn step(&mut self, step: &Step);
 }
 
@@ -117,4 +117,140 @@ pub struct Summary {
     pub stages: Vec<Cost>,
     /// XXH3 of 128 bits over every frame, sense, command, duty and status of the run, in order.
     pub digest: String,
+}
+
+/// Largest shift in time between the two boards.
+pub const SHIFT_S: f64 = 0.5e-3;
+/// Largest force beyond the tube: the force of [`BEYOND_MM`] at 2 N, where the tip has 2.5 N/mm.
+pub const BEYOND_N: f64 = 0.0125;
+/// Largest travel beyond the tube.
+pub const BEYOND_MM: f64 = 0.005;
+/// Effects that draw a number for each sample. They draw others on the other board.
+const NOISE: [&str; 2] = ["noise", "burst"];
+
+#[derive(Clone, Copy, Debug)]
+struct Point {
+    time_s: f64,
+    values: [f64; 2],
+}
+
+/// A run's trajectory, finger by finger.
+#[derive(Clone, Debug, Default)]
+pub struct Path(Vec<Vec<Point>>);
+
+impl Watch for Path {
+    fn step(&mut self, step: &Step) {
+        if self.0.len() <= step.finger {
+            self.0.resize_with(step.finger + 1, Vec::new);
+        }
+        self.0[step.finger].push(point(step));
+    }
+}
+
+impl Path {
+    /// Returns the difference of a step on another board, N and mm; none at times outside of the path.
+    pub fn difference(&self, step: &Step) -> Option<[f64; 2]> {
+        let points = self.0.get(step.finger)?;
+        let after = points.partition_point(|point| point.time_s < step.time_s);
+        let (to, from) = (points.get(after)?, points.get(after.checked_sub(1)?)?);
+        let share = (step.time_s - from.time_s) / (to.time_s - from.time_s);
+        let here = point(step).values;
+        Some(core::array::from_fn(|n| here[n] - from.values[n] - share * (to.values[n] - from.values[n])))
+    }
+
+    /// Returns the distance of a step from the range of the path within the shift.
+    fn beyond(&self, step: &Step) -> Option<[f64; 2]> {
+        let points = self.0.get(step.finger)?;
+        let first = points.partition_point(|point| point.time_s < step.time_s - SHIFT_S).saturating_sub(1);
+        let near = points[first..].iter().take_while(|point| point.time_s <= step.time_s + 2.0 * SHIFT_S);
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for point in near {
+            for n in 0..2 {
+                (low[n], high[n]) = (low[n].min(point.values[n]), high[n].max(point.values[n]));
+            }
+        }
+        let here = point(step).values;
+        Some(core::array::from_fn(|n| (low[n] - here[n]).max(here[n] - high[n]).max(0.0)))
+    }
+}
+
+fn point(step: &Step) -> Point {
+    Point { time_s: step.time_s, values: [step.truth.force_n, step.truth.travel_mm] }
+}
+
+/// Largest value and its time.
+type Largest = (f64, f64);
+
+/// Comparison of two boards in a scene by their trajectories: watches the second one.
+///
+/// Both begin with the script. They cannot be alike to the bit: the emulated board takes a goal up to two frames earlier or
+/// later, its duty acts some microseconds apart, its PWM counts in steps, and a row is sampled where its conversions
+/// begin. Except for the steps of the PWM these are shifts in time. So the bound is a tube: at each time the second board
+/// lies between the least and the largest value of the first one within [`SHIFT_S`], or beyond them by at most [`BEYOND_N`]
+/// and [`BEYOND_MM`]. The loop rests within two counts of the encoder, so two boards may rest four counts, 4.4 um, apart.
+#[derive(Clone, Debug)]
+pub struct Agreement {
+    first: Path,
+    noisy: bool,
+    steps: u64,
+    difference: [Largest; 2],
+    beyond: [Largest; 2],
+}
+
+impl Agreement {
+    /// Creates the watcher from the path of the first board.
+    pub fn new(scene: &Scene, first: Path) -> Self {
+        let noisy = scene.effects.iter().any(|named| NOISE.contains(&named.effect.name));
+        Self { first, noisy, steps: 0, difference: [(0.0, 0.0); 2], beyond: [(0.0, 0.0); 2] }
+    }
+
+    /// True if the second board stayed in the tube. A scene with noise is not judged.
+    pub fn held(&self) -> bool {
+        let [(force_n, _), (travel_mm, _)] = self.beyond;
+        self.noisy || self.steps > 0 && force_n <= BEYOND_N && travel_mm <= BEYOND_MM
+    }
+
+    /// Largest difference of the force, N, and of the travel, mm.
+    pub fn differences(&self) -> [f64; 2] {
+        self.difference.map(|(largest, _)| largest)
+    }
+
+    /// Largest distance of the second board from the tube, N and mm.
+    pub fn beyond(&self) -> [f64; 2] {
+        self.beyond.map(|(largest, _)| largest)
+    }
+}
+
+impl Watch for Agreement {
+    fn step(&mut self, step: &Step) {
+        if step.time_s < 0.0 {
+            return;
+        }
+        let (Some(difference), Some(beyond)) = (self.first.difference(step), self.first.beyond(step)) else { return };
+        self.steps += 1;
+        for (largest, value) in [(&mut self.difference, difference), (&mut self.beyond, beyond)] {
+            for (largest, value) in largest.iter_mut().zip(value) {
+                if value.abs() > largest.0 {
+                    *largest = (value.abs(), step.time_s);
+                }
+            }
+        }
+    }
+}
+
+impl fmt::Display for Agreement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [(force_n, force_s), (travel_mm, travel_s)] = self.difference;
+        let [(beyond_n, _), (beyond_mm, _)] = self.beyond;
+        writeln!(f, "Both boards, {} steps: they differ by {force_n:.4} N at most (at {force_s:.4} s)", self.steps)?;
+        writeln!(f, "  and by {travel_mm:.4} mm (at {travel_s:.4} s);")?;
+        let shift_ms = SHIFT_S * 1e3;
+        writeln!(f, "  beyond a shift of {shift_ms} ms by {beyond_n:.4} N ({BEYOND_N} allowed) and {beyond_mm:.4} mm")?;
+        let verdict = match (self.noisy, self.held()) {
+            (true, _) => "a scene with noise is not judged",
+            (false, true) => "held",
+            (false, false) => "BROKEN",
+        };
+        write!(f, "  ({BEYOND_MM} allowed): {verdict}")
+    }
 }

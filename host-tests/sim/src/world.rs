@@ -1,12 +1,10 @@
 //! World of a scene: fingers and their object, moved by steps, with weight, floor, shaking and the lifting hand.
 
-use crate::bridge::Bridge;
-use crate::effects::Set;
-use crate::effects::contact;
 use crate::effects::drive::Stages as _;
+use crate::effects::{Set, contact};
 use crate::events::{Event, Happened};
 use crate::mechanics::contact::{Contact, Place};
-use crate::mechanics::finger::Finger;
+use crate::mechanics::{Bridge, Finger};
 use crate::native::SimError;
 use crate::scene::Scene;
 use crate::setup::{Setup, Tip};
@@ -27,7 +25,6 @@ const GONE_MM: f64 = 1e3;
 /// Speed at which an object is put back from where the tip stood in its way, mm/s.
 const PUT_BACK_MM_PER_S: f64 = 20.0;
 
-/// Fingers and their object.
 pub struct World<E: Set> {
     fingers: Vec<Finger<E::Drive>>,
     around: Surroundings,
@@ -88,7 +85,6 @@ impl<E: Set> World<E> {
         &self.fingers
     }
 
-    /// Fingers, to place or launch them.
     pub fn fingers_mut(&mut self) -> &mut [Finger<E::Drive>] {
         &mut self.fingers
     }
@@ -346,7 +342,6 @@ impl<E: Set> World<E> {
     }
 }
 
-/// Standard gravity, mm/s^2.
 const GRAVITY_MM_PER_S2: f64 = 9806.65;
 
 /// Place and speed of an object, along the motion of the first finger and upwards.
@@ -354,7 +349,6 @@ const GRAVITY_MM_PER_S2: f64 = 9806.65;
 pub struct Body {
     /// Place from the start, mm.
     pub place_mm: [f64; 2],
-    /// Speed, mm/s.
     pub speed_mm_per_s: [f64; 2],
     /// Distance by which events have moved the object's surface away from every finger, mm.
     pub away_mm: f64,
@@ -369,11 +363,9 @@ pub struct Surroundings {
     pub shake_g: f64,
     /// Start and end of the shaking.
     pub shake_s: [f64; 2],
-    /// Height to which the hand lifts.
     pub lift_mm: f64,
     /// Start and end of the lift.
     pub lift_s: [f64; 2],
-    /// Events, in order of time.
     pub events: Vec<Event>,
 }
 

@@ -8,9 +8,9 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use host_tests::program::{Progress, ended};
-use host_tests::prove::random::reference_tip;
-use host_tests::prove::tally::Tally;
-use host_tests::prove::{beyond, exhaustive, random, reference, tally};
+use host_tests::prove::random::{self, reference_tip};
+use host_tests::prove::tally::{self, Tally};
+use host_tests::prove::{exact, reference};
 
 /// Proves the contact model's error bounds over whole input ranges.
 #[derive(Parser)]
@@ -35,14 +35,14 @@ fn main() -> ExitCode {
     let reach = |bits: i32| bits as u64 / share + 1;
 
     report.section("Every input of the reference tip, a = 10 mm and Y = 250 kPa, judged by integers", |progress| {
-        let mut all = exhaustive::depths(&tip, 1..reach(tip.depth_max().to_bits()), progress).to_vec();
-        all.extend(exhaustive::forces(&tip, 0..reach(tip.force_max().to_bits()), progress));
-        all.extend(exhaustive::radii(&tip, 0..reach(tip.contact_radius(tip.depth_max()).to_bits()), progress));
-        all.extend(exhaustive::peaks(&tip, 0..reach(tip.peak_pressure(tip.depth_max()).to_bits()), progress));
+        let mut all = exact::depths(&tip, 1..reach(tip.depth_max().to_bits()), progress).to_vec();
+        all.extend(exact::forces(&tip, 0..reach(tip.force_max().to_bits()), progress));
+        all.extend(exact::radii(&tip, 0..reach(tip.contact_radius(tip.depth_max()).to_bits()), progress));
+        all.extend(exact::peaks(&tip, 0..reach(tip.peak_pressure(tip.depth_max()).to_bits()), progress));
         all
     });
     report.section("A grid of the reference tip, pressures by integers", |progress| {
-        let mut all = exhaustive::pressures(&tip, 4_000 / share, 2_500, progress).to_vec();
+        let mut all = exact::pressures(&tip, 4_000 / share, 2_500, progress).to_vec();
         all.extend(random::touching_angles(&tip, 1_000_000 / share, progress));
         all
     });
@@ -54,15 +54,15 @@ fn main() -> ExitCode {
     });
     report.section("The rest of the model at random points", |progress| {
         let points = 0..200_000 / share;
-        let mut all = beyond::geometry(points.clone(), progress).to_vec();
-        all.extend(beyond::tilt(points.clone(), progress));
-        all.extend(beyond::friction(points, progress));
-        all.extend(beyond::relaxation(0..1_000_000 / share / 1_000, progress));
+        let mut all = reference::geometry(points.clone(), progress).to_vec();
+        all.extend(reference::tilt(points.clone(), progress));
+        all.extend(reference::friction(points, progress));
+        all.extend(reference::relaxation(0..1_000_000 / share / 1_000, progress));
         all
     });
     println!("the relaxation filter over and over, terms of 1 to {} periods", paper::PERIODS_MAX / share as u32);
     for (name, pattern) in [("constant extreme", [i32::MAX; 2]), ("alternating extremes", [i32::MAX, 0])] {
-        let beyond::LongRun { steps, low, high } = beyond::long_run(&pattern, paper::PERIODS_MAX / share as u32);
+        let reference::LongRun { steps, low, high } = reference::long_run(&pattern, paper::PERIODS_MAX / share as u32);
         println!("  {name}: repeats itself from step {steps} on, between {low} and {high} N");
     }
     match reference::check() {
@@ -86,13 +86,13 @@ struct Report {
 
 impl Report {
     /// Judges functions for the tables of `docs/model.md`.
-    fn section(&mut self, title: &str, judge: impl FnOnce(exhaustive::Progress<'_>) -> Vec<Tally>) {
+    fn section(&mut self, title: &str, judge: impl FnOnce(exact::Progress<'_>) -> Vec<Tally>) {
         let tallies = self.judged(title, judge);
         self.sections.push((title.to_owned(), tallies));
     }
 
     /// Judges functions and prints how they did.
-    fn judged(&mut self, title: &str, judge: impl FnOnce(exhaustive::Progress<'_>) -> Vec<Tally>) -> Vec<Tally> {
+    fn judged(&mut self, title: &str, judge: impl FnOnce(exact::Progress<'_>) -> Vec<Tally>) -> Vec<Tally> {
         println!("{title}");
         let progress = Progress::begin();
         let tallies = judge(&|done, of| progress.show(format_args!("  {done} of {of}   ")));

@@ -9,10 +9,10 @@
 use host_tests::page::renew;
 use host_tests::program::ended;
 use host_tests::study::inputs::Inputs;
-use host_tests::study::kernels::KERNELS;
-use host_tests::study::page::Studied;
+use host_tests::study::kernels::{self, KERNELS};
+use host_tests::study::output;
+use host_tests::study::page::{self, Studied};
 use host_tests::study::whole_loop::{self, WholeLoop};
-use host_tests::study::{front, kernels, output, page};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -66,7 +66,7 @@ fn report(runs: [&str; 2], whole: &str, flags: &[&str]) -> Result<(), String> {
     }
     files.push((whole_loop::PICTURE.to_owned(), whole.draw(&studied)?));
     for (kernel, points) in studied.iter().filter(|(kernel, _)| kernel.has_error()) {
-        let picture = front::draw(kernel, points).map_err(|error| error.to_string())?;
+        let picture = page::draw(kernel, points).map_err(|error| error.to_string())?;
         files.push((format!("docs/pictures/study-{}.svg", kernel.name), picture));
     }
     verdicts(&studied);
@@ -79,8 +79,8 @@ fn report(runs: [&str; 2], whole: &str, flags: &[&str]) -> Result<(), String> {
 
 fn verdicts(studied: &[Studied]) {
     for (kernel, points) in studied.iter().filter(|(kernel, _)| kernel.has_error()) {
-        let (count, errors, cycles) = front::span(points);
-        let beaten = front::beaten_by(points);
+        let (count, errors, cycles) = page::span(points);
+        let beaten = page::beaten_by(points);
         let firmware = points.iter().zip(beaten).filter(|(point, _)| point.firmware);
         for (point, by) in firmware {
             let place = page::verdict(point, by.map(|by| &points[by]));
@@ -98,7 +98,7 @@ fn verdicts(studied: &[Studied]) {
 /// The frame's front must give a choice: four points, 10 times in error, 3 times in cycles.
 fn frame_front(studied: &[Studied]) -> Result<(), String> {
     let frame = studied.iter().find(|(kernel, _)| kernel.name == "frame").ok_or("no frame was studied")?;
-    let (count, errors, cycles) = front::span(&frame.1);
+    let (count, errors, cycles) = page::span(&frame.1);
     let verdict = format!("{count} points, {} times in error, {cycles:.1} times in cycles", page::figure(errors));
     if count < 4 || errors < 10.0 || cycles < 3.0 {
         return Err(format!("the front from frame to contact is too small: {verdict}"));

@@ -1,7 +1,7 @@
 //! Boundaries and random points of the whole domain, judged in arbitrary precision and by integers.
 
 use super::exact;
-use super::exhaustive::Progress;
+use super::exact::Progress;
 use super::reference::{Reference, error_ulp, real};
 use super::tally::{Judged, Tally, parallel};
 use fastrand::Rng;

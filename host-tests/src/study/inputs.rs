@@ -2,10 +2,9 @@
 //!
 //! From integers and the four operations alone, so that every machine makes the same.
 
-use crate::finger::config;
 use crate::fit_cases::Scene;
 use crate::fit_statistics::{FRAMES, GOOD, Series};
-use crate::stimulus;
+use crate::stimulus::{self, config};
 use bringup::script::{Bench, RECORDS};
 use fastrand::Rng;
 use fingertip::shipped::{COLUMNS, Frame, Pipeline, ROWS, TactileImage};

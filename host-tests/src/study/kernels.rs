@@ -1,8 +1,8 @@
 //! Kernels of the study: each with its error, and the reason for the firmware's variant.
 
-use super::front::Point;
 use super::inputs::{Inputs, Pair, Seen};
 use super::output::Ran;
+use super::page::Point;
 use super::scan;
 use crate::figures::tip;
 use crate::prove::reference::{Real, Reference, real};

@@ -1,7 +1,7 @@
 //! Cost of the simulation's own accuracy: the plant's integrator and step.
 
 use super::page::figure;
-use sim::bridge::Bridge;
+use sim::mechanics::Bridge;
 use sim::plant::{Plant, Setup};
 use std::fmt::Write as _;
 use std::time::Instant;

@@ -1,6 +1,6 @@
 //! The whole loop: what cycles, frame rate and bits buy in the true force of a population of fingers.
 
-use super::front::Point;
+use super::page::Point;
 use super::page::{Studied, figure};
 use fingertip::params::Params;
 use fingertip::shipped::{CLOCKS, Config, SLOTS};

@@ -8,8 +8,7 @@ use fingertip::link::table::indirect::BLOCK;
 use fingertip::link::table::{Access, READ_MAX, Register};
 use fingertip::shipped::{Gains, REGISTERS, address};
 use fingertip::store::Record;
-use host_tests::control_table::{COMMAND, markdown, step};
-use host_tests::model_file::{items, text};
+use host_tests::control_table::{COMMAND, items, markdown, step, text};
 
 #[test]
 fn registers_stand_in_order_and_apart() {

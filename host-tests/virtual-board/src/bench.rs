@@ -1,20 +1,19 @@
 //! The bench beside the emulator: steps the world, watches the bridge, the bus and the log.
 
-use crate::board::FingerBoard;
-use crate::clock::ExternalClock;
+use crate::board::{FingerBoard, Surroundings};
+use crate::faults::ExternalClock;
 use crate::flash::Programmer;
 use crate::front_end::Shared;
 use crate::image::Firmware;
 use crate::log::Log;
-use crate::measure::{BridgeEdge, Latency, Record, Trace};
+use crate::report::{BridgeEdge, Latency, Record, Trace};
 use crate::scene::host::Host as SceneHost;
-use crate::surroundings::Surroundings;
 use crate::wire::TimedByte;
 use rigless::emulator::{Access, AccessKind, Host};
 use rigless::session::Session;
 use rigless::soc::stm32f427::generated::{DAC, GPIOC, TIM1, USART2};
 use rigless::time::VirtualNanos;
-use sim::bridge::Bridge;
+use sim::mechanics::Bridge;
 
 /// The plant's step, and the least of a scene's world.
 pub const STEP_NS: u64 = 10_000;

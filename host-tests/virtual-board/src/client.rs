@@ -7,7 +7,7 @@
 //! then two minutes of a board that hangs. A packet that the board leaves unanswered in virtual time is answered at
 //! once, by a device that does not exist.
 
-use crate::error::Error;
+use crate::Error;
 use crate::rig::{Rig, Stand};
 use crate::wire::TimedByte;
 use dynamixel2::Bus;

@@ -8,11 +8,10 @@
 //! a request for one is reported as a gap.
 
 use crate::front_end::{Shared, Slot};
-use crate::inside;
-use crate::scan_timer::COMPARE_1;
-use crate::sequence::{self, CONVERSION_CYCLES, Injected};
+use crate::timers::COMPARE_1;
+use fingertip::chip::Factory;
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
-use rigless::soc::stm32f427::generated::adc1::{Register, cr1, cr2, sr};
+use rigless::soc::stm32f427::generated::adc1::{Register, cr1, cr2, jsqr, sqr1, sr};
 use rigless::soc::stm32f427::generated::{ADC2, ADC3};
 use rigless::soc::stm32f427::peripherals::adc::DMA_REQUEST;
 use rigless::soc::{Layout, Width};
@@ -97,13 +96,13 @@ impl Converter {
             self.status = sr::OVR.set(self.status, 1);
             return;
         }
-        let length = sequence::length(registers);
+        let length = length(registers);
         if self.rank >= length {
             self.rank = 0;
         }
         let ranks = if by_dma { length - self.rank } else { 1 };
         let cycles: u64 = (self.rank..self.rank + ranks)
-            .map(|rank| sequence::sampling_cycles(registers, sequence::input(registers, rank)) + CONVERSION_CYCLES)
+            .map(|rank| sampling_cycles(registers, input(registers, rank)) + CONVERSION_CYCLES)
             .sum();
         let begun_ns = slot.map_or(context.now().0, |slot| slot.begun_ns);
         let done = VirtualNanos(self.after(begun_ns, cycles));
@@ -114,15 +113,15 @@ impl Converter {
 
     fn finish(&mut self, running: Running, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         let mut cycles = 0;
-        let mut samples = [(0, 0); sequence::RANKS];
+        let mut samples = [(0, 0); RANKS];
         for (place, sample) in samples.iter_mut().enumerate().take(running.ranks) {
-            let input = sequence::input(registers, self.rank + place);
-            cycles += sequence::sampling_cycles(registers, input);
+            let input = input(registers, self.rank + place);
+            cycles += sampling_cycles(registers, input);
             *sample = (input, self.after(running.begun_ns, cycles));
             cycles += CONVERSION_CYCLES;
         }
         self.rank += running.ranks;
-        let complete = self.rank >= sequence::length(registers);
+        let complete = self.rank >= length(registers);
         let control = registers.get(Register::Cr2);
         let by_dma = cr2::DMA.is_set(control);
         let mut front_end = self.front_end.lock();
@@ -158,9 +157,9 @@ impl Converter {
         let front_end = self.front_end.lock();
         let mut cycles = 0;
         let mut words = Vec::new();
-        for input in sequence::injected_inputs(registers) {
-            let sampling = sequence::sampling_cycles(registers, input);
-            if input >= inside::REFERENCE_INPUT && sampling * 1_000_000_000 < inside::SAMPLING_NS * self.clock_hz {
+        for input in injected_inputs(registers) {
+            let sampling = sampling_cycles(registers, input);
+            if input >= REFERENCE_INPUT && sampling * 1_000_000_000 < SAMPLING_NS * self.clock_hz {
                 context.tell("SMPR1", "reference and sensor are sampled for less than 10 us");
             }
             cycles += sampling;
@@ -300,4 +299,114 @@ impl Device for Converter {
         self.front_end.lock().waiting[self.nth].clear();
         *self = Self::new(self.nth, self.front_end.clone(), self.clock_hz);
     }
+}
+
+// A converter's sequences as its registers describe them: the inputs in their order, and for how long each is sampled.
+//
+// The injected group follows each regular sequence automatically. It is no separate event: its words appear in their
+// registers when the core reads them after the last conversion.
+
+/// Cycles of a 12-bit conversion after sampling, RM0090 13.7.
+pub const CONVERSION_CYCLES: u64 = 12;
+/// The most that a sequence has.
+pub const RANKS: usize = 16;
+
+/// `SMPx`, 13.13.4, in converter cycles.
+const SAMPLING_CYCLES: [u64; 8] = [3, 15, 28, 56, 84, 112, 144, 480];
+
+/// Conversions of a regular sequence.
+pub fn length(registers: &RegisterFile) -> usize {
+    if cr1::SCAN.is_set(registers.get(Register::Cr1)) {
+        sqr1::L.get(registers.get(Register::Sqr1)) as usize + 1
+    } else {
+        1
+    }
+}
+
+/// The input that a rank converts.
+pub fn input(registers: &RegisterFile, rank: usize) -> usize {
+    // Six ranks of five bits in a register, the last register first.
+    let register = [Register::Sqr3, Register::Sqr2, Register::Sqr1][rank / 6 % 3];
+    (registers.get(register) >> (5 * (rank % 6)) & 0b1_1111) as usize
+}
+
+/// Converter cycles for which an input is sampled.
+pub fn sampling_cycles(registers: &RegisterFile, input: usize) -> u64 {
+    let (register, place) = if input < 10 { (Register::Smpr2, input) } else { (Register::Smpr1, input - 10) };
+    SAMPLING_CYCLES[(registers.get(register) >> (3 * place) & 0b111) as usize]
+}
+
+/// Data registers of the injected group.
+const DATA: [Register; 4] = [Register::Jdr1, Register::Jdr2, Register::Jdr3, Register::Jdr4];
+
+/// Inputs of the injected group in their order. A group of fewer than four uses the last places (RM0390, ADC_JSQR).
+pub fn injected_inputs(registers: &RegisterFile) -> Vec<usize> {
+    let sequence = registers.get(Register::Jsqr);
+    let places = [jsqr::JSQ1, jsqr::JSQ2, jsqr::JSQ3, jsqr::JSQ4];
+    places[3 - jsqr::JL.get(sequence) as usize..].iter().map(|place| place.get(sequence) as usize).collect()
+}
+
+/// Words of a group under way.
+#[derive(Clone, Debug, Default)]
+pub struct Injected {
+    words: Vec<u16>,
+    done_ns: u64,
+}
+
+impl Injected {
+    /// These words, done at an instant.
+    pub fn new(words: Vec<u16>, done_ns: u64) -> Self {
+        Self { words, done_ns }
+    }
+
+    /// Returns true while conversions run.
+    pub fn runs(&self, now_ns: u64) -> bool {
+        now_ns < self.done_ns
+    }
+
+    /// Updates the completed conversions, and their flag in a status.
+    pub fn show(&mut self, now_ns: u64, status: u64, registers: &mut RegisterFile) -> u64 {
+        if self.runs(now_ns) || self.words.is_empty() {
+            return status;
+        }
+        for (register, word) in DATA.into_iter().zip(self.words.drain(..)) {
+            registers.set(register, word.into());
+        }
+        sr::JEOC.set(status, 1)
+    }
+}
+
+// Internal inputs of the first converter, and the factory's readings of both.
+
+/// The converter that they are inputs of, and which ones.
+pub const CONVERTER: usize = 0;
+pub const REFERENCE_INPUT: usize = 17;
+pub const SENSOR_INPUT: usize = 18;
+/// Minimum sampling time of both inputs, ns (DS10693).
+pub const SAMPLING_NS: u64 = 10_000;
+/// Address of the factory's codes: of the reference, and of the temperature sensor at 30 and 110 degrees Celsius.
+pub const FACTORY_AT: u64 = 0x1fff_7a2a;
+/// Default ambient temperature of the board, degrees Celsius.
+pub const ROOM_C: f64 = 25.0;
+
+/// Typical values of the data sheet (DS10693), V.
+const REFERENCE_V: f64 = 1.21;
+const SENSOR_V: f64 = 0.76;
+const SENSOR_V_PER_K: f64 = 0.0025;
+const FACTORY_V: f64 = 3.3;
+const CODES: f64 = 4096.0;
+
+/// Voltage at an internal input of a converter for a chip temperature, V; `None` for any other input.
+pub fn volts(converter: usize, input: usize, chip_c: f64) -> Option<f64> {
+    match (converter, input) {
+        (CONVERTER, REFERENCE_INPUT) => Some(REFERENCE_V),
+        (CONVERTER, SENSOR_INPUT) => Some(SENSOR_V + SENSOR_V_PER_K * (chip_c - 25.0)),
+        _ => None,
+    }
+}
+
+/// The factory's codes.
+pub fn factory() -> Factory {
+    let code = |input, chip_c| (volts(CONVERTER, input, chip_c).unwrap_or(0.0) / FACTORY_V * CODES) as u16;
+    Factory { reference: code(REFERENCE_INPUT, 30.0), sensor: [30.0, 110.0].map(|chip_c| code(SENSOR_INPUT, chip_c)) }
 }

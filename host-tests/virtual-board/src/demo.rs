@@ -3,16 +3,21 @@
 //! The host sees the board only over its bus; the figures are of the simulated world's true force. A second run of the
 //! same scene must leave the same trace.
 
-pub mod figures;
-pub mod screen;
-
+use crate::client::Client;
+use crate::front_end::ScanCounts;
 use crate::image::Flashable;
+use crate::scene::host::ID;
 use crate::scene::{Boards, simulate};
 use crate::{Error, Rig};
-use figures::{Counts, Figures};
-use screen::Screen;
-use sim::demo::{self, Run, Trace};
-use sim::watch::{Step, Watch};
+use fingertip::pipeline::Status;
+use fingertip::shipped::address;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use output::{heatmap, say};
+use serde::Serialize;
+use sim::demo::{self, Check, Forces, Run, Taxels, Trace, what};
+use sim::scene::Scene;
+use sim::watch::{Step, Summary, Watch};
+use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -86,4 +91,222 @@ impl Watch for Seen {
         self.trace.step(step);
         self.screen.step(step);
     }
+}
+
+/// Longest wait for an answer, ns.
+const WAIT_NS: u64 = 20_000_000;
+/// Pause of the line after the last request, ms.
+const QUIET_MS: u64 = 2;
+
+/// Counts of the board at an instant.
+#[derive(Clone, Copy, Debug)]
+pub struct Counts {
+    at_ns: u64,
+    scans: ScanCounts,
+    instructions: u64,
+    duties: u64,
+}
+
+impl Counts {
+    /// Now.
+    ///
+    /// # Errors
+    /// The emulator stopped.
+    pub fn of(rig: &mut Rig) -> Result<Self, Error> {
+        let (at_ns, duties) = (rig.now_ns(), rig.latency()?.frames);
+        Ok(Self { at_ns, scans: rig.scan_counts()?, instructions: rig.instructions()?, duties })
+    }
+}
+
+/// All figures; the keys end with the unit.
+#[derive(Clone, Debug, Serialize)]
+pub struct Figures {
+    /// SHA-256 of the image in flash.
+    pub image_sha256: String,
+    /// Size of the image in flash, bytes.
+    pub image_bytes: usize,
+    /// Virtual time with torque enabled.
+    pub virtual_time_s: f64,
+    /// Time that the run took on this machine.
+    pub wall_time_s: f64,
+    /// Frames in that virtual time.
+    pub frames: u64,
+    /// Their rate.
+    pub frame_rate_hz: f64,
+    /// Frames that the control missed.
+    pub missed_frames: u32,
+    /// Latency from a frame's last conversion to its duty.
+    pub latency_us: Range,
+    /// Longest latency that the board itself measured.
+    pub loop_time_max_us: u16,
+    /// Instructions of the whole firmware for a frame: interrupts, executor, step, bus, log. Sleep counts none.
+    pub instructions_a_frame: f64,
+    /// Figures of the true force.
+    #[serde(flatten)]
+    pub forces: Forces,
+    /// Digest of every duty and every byte on the bus, with their times.
+    pub trace_sha256: String,
+    /// The same digest of the second run; `None` without a second run.
+    pub repeated_trace_sha256: Option<String>,
+    /// Every figure that has a bound.
+    pub checks: Vec<Check>,
+}
+
+/// The least and the largest.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Range {
+    /// The least.
+    pub least: f64,
+    /// The largest.
+    pub largest: f64,
+}
+
+impl Figures {
+    /// Computes the figures of a run between two instants, each against its bound.
+    ///
+    /// # Errors
+    /// The run did not follow the script (no touch, or a force that was not reached), or the board does not answer.
+    pub fn of(
+        run: &Run,
+        [from, to]: [&Counts; 2],
+        rig: &mut Rig,
+        flash: &Flashable,
+        summary: Summary,
+        repeated_trace_sha256: Option<String>,
+    ) -> Result<Self, Error> {
+        let forces = Forces::of(run)?;
+        let frames = to.scans.frames - from.scans.frames;
+        let latency = rig.latency()?;
+        // The last request of the scene's host is answered after this time.
+        rig.run_ms(QUIET_MS)?;
+        rig.take_received()?;
+        let answer = rig.client(WAIT_NS, |bus: &mut Client| bus.read_u16(ID, address::LOOP_TIME_MAX_US))?;
+        let loop_time = answer.map_err(|why| Error::Client(std::io::Error::other(format!("loop time: {why}"))))?;
+        let mut figures = Self {
+            image_sha256: flash.sha256(),
+            image_bytes: flash.bytes.len(),
+            virtual_time_s: summary.virtual_s,
+            wall_time_s: 0.0,
+            frames,
+            frame_rate_hz: frames as f64 / ((to.at_ns - from.at_ns) as f64 * 1e-9),
+            missed_frames: run.missed_frames,
+            latency_us: Range { least: latency.min_ns as f64 * 1e-3, largest: latency.max_ns as f64 * 1e-3 },
+            loop_time_max_us: loop_time.data,
+            instructions_a_frame: (to.instructions - from.instructions) as f64 / frames as f64,
+            forces,
+            trace_sha256: summary.digest,
+            repeated_trace_sha256,
+            checks: Vec::new(),
+        };
+        // The last frame may be under way at either instant.
+        let unanswered = (frames + from.duties).abs_diff(to.duties).saturating_sub(2);
+        let unknown_gaps = rig.gaps()?.iter().filter(|gap| gap.reason().is_none()).count();
+        figures.checks = figures.checked(unanswered, unknown_gaps);
+        Ok(figures)
+    }
+
+    /// Holds each figure against its bound.
+    fn checked(&self, unanswered: u64, unknown_gaps: usize) -> Vec<Check> {
+        let at_most = |most: f64| [None, Some(most)];
+        let within = |least: f64, most: f64| [Some(least), Some(most)];
+        let mut checks = vec![
+            Check::new("frame rate", Some(self.frame_rate_hz), "Hz", within(5_000.0, 10_500.0)),
+            Check::new("missed frames", Some(f64::from(self.missed_frames)), "", at_most(0.0)),
+            Check::new("frames without a new duty", Some(unanswered as f64), "", at_most(0.0)),
+            Check::new("last conversion to new duty", Some(self.latency_us.largest), "us", within(1.0, 60.0)),
+            Check::new("instructions a frame, all told", Some(self.instructions_a_frame), "", within(2_000.0, 8_000.0)),
+            Check::new("emulator gaps not on the allow-list", Some(unknown_gaps as f64), "", at_most(0.0)),
+        ];
+        checks.extend(self.forces.checks());
+        if let Some(repeated) = &self.repeated_trace_sha256 {
+            let differ = Some(f64::from(u8::from(*repeated != self.trace_sha256)));
+            checks.push(Check::new("traces that differ when repeated", differ, "", at_most(0.0)));
+        }
+        checks
+    }
+}
+
+/// The brightest colour: a little above the peak at 5 N.
+const FULL_KPA: f64 = 70.0;
+
+/// The array is drawn this often, in the scene's time.
+const DRAWN_MS: u64 = 50;
+
+/// Display of the run: a progress bar on a terminal, plain lines otherwise.
+pub struct Screen {
+    scene: Scene,
+    array: Taxels,
+    /// Number of goals reported.
+    told: usize,
+    drawn_ms: u64,
+    /// Progress bar; `None` without a terminal.
+    bar: Option<ProgressBar>,
+}
+
+impl Screen {
+    /// A screen for a run of this scene.
+    pub fn new(scene: &Scene) -> Self {
+        let bar = std::io::stdout().is_terminal().then(|| {
+            let length_ms = (scene.duration_s * 1e3) as u64;
+            let bar = ProgressBar::with_draw_target(Some(length_ms), ProgressDrawTarget::stdout());
+            let style = ProgressStyle::with_template("{msg}\n{bar:60} {pos} of {len} ms, virtual");
+            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+            bar
+        });
+        Self { scene: scene.clone(), array: Taxels::of(scene), told: 0, drawn_ms: 0, bar }
+    }
+
+    /// Reports the reason of a wait.
+    pub fn waiting(&self, for_what: &str) {
+        self.say(format!("waiting for {for_what}"));
+    }
+
+    fn say(&self, line: String) {
+        match &self.bar {
+            Some(bar) => bar.println(line),
+            None => say::line(line),
+        }
+    }
+
+    /// Leaves the terminal as it was.
+    pub fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+impl Watch for Screen {
+    fn step(&mut self, step: &Step) {
+        while let Some(event) = self.scene.script.get(self.told).filter(|event| event.at_s <= step.time_s) {
+            self.say(format!("{:7.3} s  goal: {}", event.at_s, what(event.goal_n)));
+            self.told += 1;
+        }
+        let now_ms = (step.time_s.max(0.0) * 1e3) as u64;
+        let Some(bar) = self.bar.as_ref().filter(|_| now_ms >= self.drawn_ms + DRAWN_MS) else { return };
+        self.drawn_ms = now_ms;
+        bar.set_position(now_ms);
+        bar.set_message(picture(&self.scene, &self.array, step, self.told));
+    }
+}
+
+/// Heat map with the figures next to it.
+fn picture(scene: &Scene, array: &Taxels, step: &Step, told: usize) -> String {
+    let Status { mode, contact, .. } = step.status;
+    let goal_n = told.checked_sub(1).map_or(0.0, |last| scene.script[last].goal_n);
+    let number = |fixed: f64, unit: &str| format!("{fixed:6.3} {unit}");
+    let beside = [
+        String::new(),
+        format!("mode         {}", format!("{mode:?}").to_lowercase()),
+        format!("goal         {}", number(goal_n, "N")),
+        format!("force        {}", number(contact.force.0.to_num(), "N")),
+        format!("indentation  {}", number(contact.indentation.0.to_num(), "mm")),
+        format!("radius       {}", number(contact.radius.0.to_num(), "mm")),
+        format!("centre       {:6.3}, {:.3} mm", contact.centre_x.0, contact.centre_y.0),
+        String::new(),
+        heatmap::legend(FULL_KPA),
+    ];
+    let lines = heatmap::lines(&array.kilopascals(step.frame), FULL_KPA);
+    let both = lines.iter().zip(beside.iter().map(String::as_str).chain(std::iter::repeat("")));
+    both.map(|(cells, text)| format!("  {cells}   {text}\n")).collect()
 }

@@ -1,8 +1,8 @@
 //! The converters' inputs: rows in, column voltages out.
 
-use crate::inside;
-use crate::measure::PinEdge;
-use crate::surroundings::Surroundings;
+use crate::board::Surroundings;
+use crate::converter;
+use crate::report::PinEdge;
 use fingertip::shipped::COLUMNS;
 use sim::mechanics::decay;
 use sim::plant::Plant;
@@ -257,7 +257,7 @@ impl FrontEnd {
 
     /// Word of an input that is no column: the supply, or an internal input if those are on.
     pub fn word(&self, converter: usize, input: usize, inside_on: bool, at_ns: u64) -> u16 {
-        let inside = inside::volts(converter, input, self.world.chip_c(at_ns)).filter(|_| inside_on);
+        let inside = converter::volts(converter, input, self.world.chip_c(at_ns)).filter(|_| inside_on);
         let supply = (input == SUPPLY_INPUT).then(|| self.world.supply_v() / SUPPLY_RATIO);
         self.code(inside.or(supply).unwrap_or(0.0))
     }

@@ -1,6 +1,6 @@
 //! The flash image: its bytes, its symbols, its log table.
 
-use crate::error::Error;
+use crate::Error;
 use crate::rig::Rig;
 use object::elf::{FileHeader32, PT_LOAD};
 use object::read::elf::{ElfFile, ProgramHeader};

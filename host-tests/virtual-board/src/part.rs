@@ -2,20 +2,18 @@
 //!
 //! - TIM8's update request reaches DMA2 stream 1 channel 7 (RM0390 table 29), and its compare 1 the converters.
 //! - The window watchdog, see `WindowWatchdog`.
-//! - The core may read a received byte before the DMA fetches it, see `bus_port.rs`.
-//! - TIM1 counts what moves the phase of the PWM, see [`crate::pwm_timer`].
+//! - The core may read a received byte before the DMA fetches it, see [`crate::wire`].
+//! - TIM1 counts what moves the phase of the PWM, see [`crate::timers`].
 //! - A divider of the PLL that the manual forbids is reported as a gap, see `clock`.
 //! - The converters take external triggers and read the fingertip's array; DMA2 takes their words a sequence at a time.
 
-use crate::bus_port::BusPort;
 use crate::converter::Converter;
 use crate::flash;
 use crate::front_end::Shared;
-use crate::pwm_timer::PwmTimer;
-use crate::scan_timer::ScanTimer;
 use crate::streams::Streams;
+use crate::timers::{PwmTimer, ScanTimer};
 use crate::window_watchdog::WindowWatchdog;
-use crate::wire::Wire;
+use crate::wire::{BusPort, Wire};
 use rigless::device::{Device, ErasedDevice, Level, RegisterFile, ResetCause};
 use rigless::mcu::Mcu;
 use rigless::soc::stm32f427::Stm32f427;

@@ -4,14 +4,12 @@
 //! at a halt, between two instructions; nothing runs without an order. The same calls give the same run.
 
 use crate::bench::{Bench, STEP_NS};
-use crate::board::FingerBoard;
-use crate::error::Error;
+use crate::board::{FingerBoard, Surroundings};
 use crate::flash::SECTOR;
 use crate::front_end::{ScanCounts, Shared};
 use crate::image::Firmware;
-use crate::inside;
 use crate::scene::finger::Finger;
-use crate::surroundings::Surroundings;
+use crate::{Error, converter};
 use fingertip::chip::Factory;
 use fingertip::params::Params;
 use fingertip::shipped::Record;
@@ -47,7 +45,7 @@ impl Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { presets: Vec::new(), brown_out_bits: 0, factory: inside::factory() }
+        Self { presets: Vec::new(), brown_out_bits: 0, factory: converter::factory() }
     }
 }
 
@@ -59,7 +57,7 @@ fn images(image: &Firmware, options: &Options) -> Result<Vec<Image>, Error> {
     let mut images = vec![read(image.path(), image.elf().to_vec(), None)?];
     let Factory { reference, sensor: [cold, hot] } = options.factory;
     let factory = [reference, cold, hot].map(u16::to_le_bytes).concat();
-    images.push(read(Path::new("factory"), factory, Some(inside::FACTORY_AT))?);
+    images.push(read(Path::new("factory"), factory, Some(converter::FACTORY_AT))?);
     for (address, bytes) in &options.presets {
         images.push(read(Path::new("preset"), bytes.clone(), Some(*address))?);
     }
@@ -100,7 +98,7 @@ impl Rig {
         let bench = Bench::new(front_end, &image);
         let (orders, ordered) = mpsc::channel();
         let (reaching, reached) = mpsc::channel();
-        let hall = Hall::new(bench, ordered, reaching);
+        let hall = Hall { until_ns: bench.next_ns, bench, orders: ordered, reached: reaching };
         let thread = std::thread::Builder::new()
             .name("board".into())
             .spawn(move || emulator::run(session, &Start::new(&images), hall).map(drop).map_err(failure))?;
@@ -140,11 +138,10 @@ impl Rig {
     }
 
     /// Executes a job at the present halt, between two instructions.
-    pub fn with<T, F>(&mut self, job: F) -> Result<T, Error>
-    where
-        T: Send + 'static,
-        F: FnOnce(&mut Stand<'_>) -> T + Send + 'static,
-    {
+    pub fn with<T: Send + 'static>(
+        &mut self,
+        job: impl FnOnce(&mut Stand<'_>) -> T + Send + 'static,
+    ) -> Result<T, Error> {
         let asked = self.ask(job)?;
         self.answer(&asked)
     }
@@ -153,11 +150,7 @@ impl Rig {
     ///
     /// # Errors
     /// The emulator stopped, or the board runs in a scene.
-    pub fn world<T, F>(&mut self, job: F) -> Result<T, Error>
-    where
-        T: Send + 'static,
-        F: FnOnce(&mut Plant) -> T + Send + 'static,
-    {
+    pub fn world<T: Send + 'static>(&mut self, job: impl FnOnce(&mut Plant) -> T + Send + 'static) -> Result<T, Error> {
         self.with(|stand| match &mut stand.bench.front_end.lock().world {
             Surroundings::Plant(world) => Ok(job(world)),
             Surroundings::Scene(_) => Err(Error::OtherWorld),
@@ -168,11 +161,10 @@ impl Rig {
     ///
     /// # Errors
     /// The emulator stopped, or there is no scene around the board.
-    pub fn finger<T, F>(&mut self, job: F) -> Result<T, Error>
-    where
-        T: Send + 'static,
-        F: FnOnce(&mut Finger) -> T + Send + 'static,
-    {
+    pub fn finger<T: Send + 'static>(
+        &mut self,
+        job: impl FnOnce(&mut Finger) -> T + Send + 'static,
+    ) -> Result<T, Error> {
         self.with(|stand| match &mut stand.bench.front_end.lock().world {
             Surroundings::Scene(finger) => Ok(job(finger)),
             Surroundings::Plant(_) => Err(Error::OtherWorld),
@@ -190,19 +182,15 @@ impl Rig {
     }
 
     /// Does something where the run will then stand, and does not wait.
-    pub fn post<F>(&mut self, job: F) -> Result<(), Error>
-    where
-        F: FnOnce(&mut Stand<'_>) + Send + 'static,
-    {
+    pub fn post(&mut self, job: impl FnOnce(&mut Stand<'_>) + Send + 'static) -> Result<(), Error> {
         self.order(Order::Do(Box::new(job)))
     }
 
     /// Queues a job for the next halt and does not wait; [`Rig::answer`] waits for its result.
-    pub fn ask<T, F>(&mut self, job: F) -> Result<mpsc::Receiver<T>, Error>
-    where
-        T: Send + 'static,
-        F: FnOnce(&mut Stand<'_>) -> T + Send + 'static,
-    {
+    pub fn ask<T: Send + 'static>(
+        &mut self,
+        job: impl FnOnce(&mut Stand<'_>) -> T + Send + 'static,
+    ) -> Result<mpsc::Receiver<T>, Error> {
         let (answer, answered) = mpsc::channel();
         self.post(move |stand| {
             // An error means that nobody waits for the answer any more.
@@ -274,11 +262,6 @@ struct Hall {
 }
 
 impl Hall {
-    fn new(bench: Bench, orders: mpsc::Receiver<Order>, reached: mpsc::Sender<u64>) -> Self {
-        let until_ns = bench.next_ns;
-        Self { bench, orders, reached, until_ns }
-    }
-
     /// Executes orders until one continues the run; returns false after the last order.
     fn halt(&mut self, session: &mut Session<FingerBoard>, stop: Stop, host: &mut dyn Host) -> bool {
         let Self { bench, orders, reached, until_ns } = self;

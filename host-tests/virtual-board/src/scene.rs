@@ -9,19 +9,17 @@
 //! A run is slow because of the halts of the emulated core, and of the code that must be translated after each halt. So
 //! the world advances when something depends on it, and otherwise in steps of
 //! [`finger::Finger::grid_ns`]; the scan's slots are simulated together ([`crate::front_end::Scan`]), the bridge's
-//! timer sleeps ([`crate::pwm_timer`]), and the host acts only where the core is stopped anyway.
+//! timer sleeps ([`crate::timers`]), and the host acts only where the core is stopped anyway.
 //!
 //! The world is frozen until a millisecond before the scene's start: the boards boot and are tared in it.
 //!
 //! A scene with two fingers has two boards in one world, each on a separate bus.
 
-pub mod bus;
 pub mod finger;
 pub mod host;
-mod joint;
 
 use crate::bench::Bench;
-use crate::surroundings::Surroundings;
+use crate::board::Surroundings;
 use crate::{Error, Options, Rig, flash};
 use finger::{Clock, Finger};
 use fingertip::contact::FitLevel;
@@ -244,6 +242,6 @@ fn frame_offset(rig: &mut Rig) -> Result<u32, Error> {
 
 fn write_u8(rig: &mut Rig, doing: &str, register: u16, value: u8) -> Result<(), Error> {
     let at_ms = rig.now_ns() as f64 * 1e-6;
-    let written = rig.client(WAIT_NS, move |line| line.write_u8(bus::ID, register, value).map(drop))?;
+    let written = rig.client(WAIT_NS, move |line| line.write_u8(host::ID, register, value).map(drop))?;
     written.map_err(|why| Error::Host { at_ms, why: format!("{doing}: {why}") })
 }

@@ -1,6 +1,7 @@
 //! The emulated board as a finger that is served: no faster than real time, and often slower.
 
 use crate::{Error, Rig};
+use fingertip::params::Params;
 use fingertip::shipped::address;
 use serve::Finger;
 
@@ -33,7 +34,8 @@ impl Board {
             bus.sync_read_u32(&[ID], address::PRESENT_FORCE_MN)?;
             bus.reg_write_u8(ID, address::STATUS_RETURN_LEVEL, 2)?;
             bus.action(ID)?;
-            bus.write_u32(ID, address::PARAMS, bus_default())?;
+            // The first parameter keeps its default.
+            bus.write_u32(ID, address::PARAMS, Params::DEFAULT.tip_radius_um as u32)?;
             // Refused, as it is not tared: that takes its way too.
             let _ = bus.write_u8(ID, address::MEASURE, 3);
             bus.write_u8(ID, address::TARE, 1)
@@ -56,11 +58,6 @@ impl Board {
         rig.client(WAIT_NS, |bus| bus.ping(ID))?.map_err(silent)?;
         Ok(Self(rig))
     }
-}
-
-/// Value that may be written to the first parameter: its default.
-fn bus_default() -> u32 {
-    fingertip::params::Params::DEFAULT.tip_radius_um as u32
 }
 
 fn silent(why: impl std::fmt::Display) -> Error {

@@ -1,17 +1,21 @@
 //! The flash image on the emulated board: it boots, scans, and repeats; the trace pins show what `docs/board.md` says.
+//! The image of `cargo xtask bringup`: what the board can show passes, and all else is told.
 
 use crate::bus::read;
 use crate::common::{
     Check, PING, WAIT_NS, away, force_n, image, read_u8, read_u16, read_u32, register, run_checks, running,
     write_and_run_ms, write_goal, write_param, write_u8, write_u32,
 };
+use bringup::judge::{Board, Verdict};
 use fingertip::params::Params;
 use fingertip::shipped::{Config, TAXELS, address};
 use fingertip::state::Limits;
 use sim::plant::Plant;
+use std::collections::HashMap;
+use std::path::PathBuf;
 use std::time::Duration;
-use virtual_board::measure::PinEdge;
-use virtual_board::{Fault, Options, Rig};
+use virtual_board::report::PinEdge;
+use virtual_board::{Fault, Options, Rig, bringup as emulated};
 
 #[test]
 fn the_image_boots_scans_and_tells_how_the_board_is() {
@@ -233,4 +237,42 @@ fn two_runs_have_one_trace_also_on_a_slow_machine() {
         (slow.trace_hash().expect("it runs"), slow.now_ns()),
         (quick.trace_hash().expect("it runs"), quick.now_ns())
     );
+}
+
+// `FINGERTIP_BRINGUP` names the image; `cargo xtask test` builds it and sets it.
+
+/// Figures of the emulated board that show nothing of a real one.
+const NOT_SHOWN: [&str; 10] = [
+    "hse_mhz",
+    "lsi_khz",
+    "flash_word_us",
+    "flash_erase_ms",
+    "noise_prefetch_codes",
+    "noise_by_prefetch_codes",
+    "loop_answer_us",
+    "step_cycles",
+    "step_most_cycles",
+    "finger_most_cycles",
+];
+
+#[test]
+fn what_the_emulated_board_can_show_passes() {
+    let image: PathBuf = std::env::var_os("FINGERTIP_BRINGUP")
+        .expect("FINGERTIP_BRINGUP must name the image: run `cargo xtask test`, which builds it and sets it")
+        .into();
+    let told = &mut |said: &str| println!("{said}");
+    let options = Options::default();
+    let (judgement, mut rig) = emulated::run(&image, &options, 200, &HashMap::new(), told).expect("it reports");
+    println!("{}", judgement.text());
+    assert_eq!((judgement.board, judgement.failed), (Board::Emulated, 0));
+    let unshown = judgement.checks.iter().filter(|check| check.verdict == Verdict::NotShown);
+    assert_eq!(unshown.map(|check| check.name.as_str()).collect::<Vec<_>>(), NOT_SHOWN);
+    assert_eq!(judgement.passed, judgement.checks.len() - NOT_SHOWN.len());
+    // The study's variants that are of one build, each.
+    assert!(judgement.kernels.len() > 100, "{} kernels", judgement.kernels.len());
+    assert!(judgement.kernels.iter().all(|kernel| kernel.median_cycles > 0.0 && kernel.verdict == Verdict::NotShown));
+    // One on the host's word, then a watchdog each and the stack's foot.
+    let resets = rig.resets().expect("it runs");
+    let causes: Vec<_> = resets.iter().map(|reset| reset.cause.as_str()).collect();
+    assert_eq!(causes, ["software", "WWDG", "IWDG", "software"]);
 }

@@ -3,21 +3,16 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-mod board_faults;
-mod bringup;
 mod bus;
-mod capture;
 mod clients;
 mod common;
-mod corrected;
-mod fast_bus;
-mod fit_level;
+mod faults;
 mod image;
-mod injected_faults;
 mod measured;
 mod parameters;
 mod scenes;
 mod temperature;
+mod time_budget;
 
 /// A file that is not in the list above would never be compiled.
 #[test]

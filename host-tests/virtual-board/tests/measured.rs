@@ -1,12 +1,16 @@
 //! Jog, strokes and a press over the bus, on the flash image: each completes, and its record is read and parsed by the
 //! host's solver.
 
-use crate::capture::fetch;
-use crate::common::{away, let_go, read_u8, read_u16, read_u32, running, write_and_run_ms, write_goal, write_param};
+use crate::common::{
+    away, let_go, on_bus, read_u8, read_u16, read_u32, reboot, refused, restart, running, write_and_run_ms, write_goal,
+    write_param, write_u8, write_u16,
+};
+use fingertip::capture::Ended;
 use fingertip::measure::{MeasureState, Task};
 use fingertip::params::Params;
-use fingertip::shipped::address;
+use fingertip::shipped::{CAPTURE_BYTES, CLOCKS, COLUMNS, ROWS, address};
 use fingertip::state::Mode;
+use replay::{Replayed, replay};
 use solve::record;
 use virtual_board::{Options, Rig};
 
@@ -72,4 +76,171 @@ pub fn a_press_completes_and_the_modulus_is_solved(rig: &mut Rig) {
     assert_eq!(read_u8(rig, address::PRESENT_MODE), Mode::Force as u8);
     let_go(rig);
     rig.check_gaps().expect("no unknown gap");
+}
+
+// A capture over the bus, on the flash image: it replays to the bit on this machine, also with calibrated gains; and
+// what becomes of one that is asked for out of turn, interrupted, or read while it is under way.
+
+const NONE: u8 = 0;
+const ARMED: u8 = 1;
+const RECORDING: u8 = 2;
+const DONE: u8 = 3;
+/// Errors of a status packet.
+const RESULT: u8 = 1;
+const ACCESS: u8 = 7;
+/// Virtual time that an answer may take while frames are kept: the loop then leaves little of the core to the bus.
+const WAIT_NS: u64 = 20_000_000;
+/// Bytes of a read.
+const WINDOW: u16 = 248;
+
+#[test]
+fn captures_replay_and_a_press_is_solved() {
+    let mut rig = running(&away(0.4), &Options::confirmed());
+    out_of_turn_and_interrupted(&mut rig);
+    a_press_replays_to_the_bit_also_with_calibrated_gains(&mut rig);
+    restart(&mut rig);
+    a_press_completes_and_the_modulus_is_solved(&mut rig);
+}
+
+/// Arms, tares, and presses with half a newton from then on.
+fn press(rig: &mut Rig) {
+    write_and_run_ms(rig, address::CAPTURE, 1, 1);
+    assert_eq!(read_u8(rig, address::CAPTURE_STATE), ARMED);
+    write_u8(rig, address::TARE, 1);
+    write_u8(rig, address::TORQUE_ENABLE, 1);
+    write_goal(rig, 500);
+    rig.run_ms(1).expect("it runs");
+}
+
+fn until_done(rig: &mut Rig) {
+    for _ in 0..100 {
+        rig.run_ms(5).expect("it runs");
+        let state = rig.client(WAIT_NS, |bus| bus.read_u8(1, address::CAPTURE_STATE).map(|reply| reply.data));
+        if state.expect("the client runs").expect("the image answers") == DONE {
+            return;
+        }
+    }
+    panic!("state {}, {} frames", read_u8(rig, address::CAPTURE_STATE), read_u32(rig, address::CAPTURE_FRAMES));
+}
+
+fn window(rig: &mut Rig, offset: u32) -> Vec<u8> {
+    on_bus(rig, move |bus| {
+        bus.write_u32(1, address::CAPTURE_OFFSET, offset)?;
+        bus.read(1, address::CAPTURE_DATA, WINDOW).map(|reply| reply.data.to_vec())
+    })
+}
+
+pub fn fetch(rig: &mut Rig) -> Vec<u8> {
+    let length = read_u32(rig, address::CAPTURE_BYTES);
+    let mut bytes = Vec::new();
+    while bytes.len() < length as usize {
+        let offset = bytes.len() as u32;
+        bytes.extend(window(rig, offset));
+    }
+    assert!(bytes[length as usize..].iter().all(|byte| *byte == 0), "zeros behind the end");
+    bytes.truncate(length as usize);
+    bytes
+}
+
+/// Replays what was read, which must be as the image answered.
+fn same(rig: &mut Rig, bytes: &[u8]) -> (Replayed<ROWS, COLUMNS>, Vec<Mode>) {
+    let mut modes = Vec::new();
+    let replayed = replay::<ROWS, COLUMNS>(bytes, &CLOCKS, |_, status| {
+        if modes.last() != Some(&status.mode) {
+            modes.push(status.mode);
+        }
+    });
+    let replayed = replayed.expect("a capture");
+    assert_eq!(replayed.difference, None);
+    assert_eq!(replayed.head.frames, read_u32(rig, address::CAPTURE_FRAMES));
+    assert_eq!(replayed.head.ended as u8, read_u8(rig, address::CAPTURE_ENDED));
+    (replayed, modes)
+}
+
+fn a_press_replays_to_the_bit_also_with_calibrated_gains(rig: &mut Rig) {
+    let count = read_u8(rig, address::CAPTURE_COUNT);
+    // What the finger did before is no part of it.
+    write_and_run_ms(rig, address::TARE, 1, 20);
+    write_u8(rig, address::TORQUE_ENABLE, 1);
+    write_goal(rig, 1_000);
+    rig.run_ms(60).expect("it runs");
+    let_go(rig);
+    rig.run_ms(300).expect("it runs");
+    let missed = read_u32(rig, address::MISSED_FRAMES);
+    let before_us = read_u16(rig, address::LOOP_TIME_MAX_US);
+    press(rig);
+    assert_eq!((read_u8(rig, address::CAPTURE_STATE), read_u32(rig, address::CAPTURE_BYTES)), (RECORDING, 0));
+    // Read while it is under way: nothing, and no harm.
+    assert_eq!(window(rig, 0), [0; WINDOW as usize]);
+    assert_eq!(refused(rig, address::CAPTURE, &[1]), ACCESS, "with torque on");
+    until_done(rig);
+    // Keeping frames costs none.
+    assert_eq!((read_u8(rig, address::FAULT), read_u32(rig, address::MISSED_FRAMES)), (0, missed));
+    let bytes = fetch(rig);
+    let (replayed, modes) = same(rig, &bytes);
+    assert_eq!((replayed.head.ended, replayed.head.missed_frames), (Ended::Full, missed));
+    assert_eq!(modes, [Mode::Tare, Mode::Off, Mode::Approach, Mode::Force]);
+    let per_frame = bytes.len() as f64 / f64::from(replayed.head.frames);
+    println!("{} frames in {} bytes, {per_frame:.1} a frame", replayed.head.frames, bytes.len());
+    assert!(bytes.len() <= CAPTURE_BYTES && replayed.head.frames > 600);
+    let longest_us = read_u16(rig, address::LOOP_TIME_MAX_US);
+    println!("the longest loop time: {before_us} us before, {longest_us} us with the capture");
+
+    // The same with gains that are not 1.
+    let_go(rig);
+    let taxels = [(44, 20_480_u16), (35, 12_288), (0, 8_192), (99, 32_767)];
+    for (taxel, gain) in taxels {
+        write_u16(rig, address::GAINS + 2 * taxel, gain);
+    }
+    rig.run_ms(5).expect("it runs");
+    press(rig);
+    until_done(rig);
+    let again = fetch(rig);
+    let (replayed, modes) = same(rig, &again);
+    assert_eq!(modes.last(), Some(&Mode::Force));
+    assert_eq!(taxels.map(|(taxel, _)| replayed.head.gains.get(taxel.into())), taxels.map(|(_, gain)| gain));
+    assert_eq!(read_u8(rig, address::CAPTURE_COUNT), count + 2);
+}
+
+fn out_of_turn_and_interrupted(rig: &mut Rig) {
+    // Armed twice is armed; called off is off.
+    write_and_run_ms(rig, address::CAPTURE, 1, 1);
+    write_and_run_ms(rig, address::CAPTURE, 1, 1);
+    assert_eq!(read_u8(rig, address::CAPTURE_STATE), ARMED);
+    write_and_run_ms(rig, address::CAPTURE, 0, 1);
+    assert_eq!(read_u8(rig, address::CAPTURE_STATE), NONE);
+
+    // Parameters between arming and the tare: those of the tare count.
+    write_and_run_ms(rig, address::CAPTURE, 1, 1);
+    write_param(rig, "modulus_pa", 260_000);
+    assert_eq!(read_u8(rig, address::CAPTURE_STATE), ARMED);
+    write_and_run_ms(rig, address::TARE, 1, 8);
+    assert_eq!(read_u8(rig, address::CAPTURE_STATE), RECORDING);
+    assert_eq!(refused(rig, address::CAPTURE, &[1]), RESULT, "frames are being kept");
+    write_and_run_ms(rig, address::CAPTURE, 0, 1);
+    let bytes = fetch(rig);
+    let (replayed, _) = same(rig, &bytes);
+    assert_eq!((replayed.head.ended, replayed.head.params.modulus_pa), (Ended::Asked, 260_000));
+    assert!((60..160).contains(&replayed.head.frames), "{} frames", replayed.head.frames);
+
+    // Parameters in the middle end it; what is there replays with those before.
+    write_and_run_ms(rig, address::CAPTURE, 1, 1);
+    write_and_run_ms(rig, address::TARE, 1, 20);
+    write_param(rig, "modulus_pa", 250_000);
+    let bytes = fetch(rig);
+    let (replayed, modes) = same(rig, &bytes);
+    assert_eq!((replayed.head.ended, replayed.head.params.modulus_pa), (Ended::Configured, 260_000));
+    assert_eq!(modes, [Mode::Tare, Mode::Off]);
+
+    // A reset in the middle leaves nothing.
+    write_and_run_ms(rig, address::CAPTURE, 1, 1);
+    write_and_run_ms(rig, address::TARE, 1, 5);
+    reboot(rig, 30);
+    assert_eq!((read_u8(rig, address::CAPTURE_STATE), read_u8(rig, address::CAPTURE_COUNT)), (NONE, 0));
+    assert_eq!((read_u32(rig, address::CAPTURE_BYTES), window(rig, 0)), (0, vec![0; WINDOW.into()]));
+    write_and_run_ms(rig, address::CAPTURE, 1, 1);
+    write_u8(rig, address::TARE, 1);
+    until_done(rig);
+    let bytes = fetch(rig);
+    same(rig, &bytes);
 }

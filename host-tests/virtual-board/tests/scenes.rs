@@ -1,10 +1,9 @@
 //! Scenes with the flash image: it does what the native board does, and what is made of a run holds.
 
 use crate::common::{image, scratch};
-use sim::agreement::{Agreement, BEYOND_MM, BEYOND_N, Path};
-use sim::demo::figures::{draw, missed, table};
-use sim::scene::{Scene, library, read};
-use sim::watch::{Controller, Step, Summary, Watch};
+use sim::demo::{draw, missed, table};
+use sim::scene::{self, Scene, read};
+use sim::watch::{Agreement, BEYOND_MM, BEYOND_N, Controller, Path, Step, Summary, Watch};
 use sim::{cores, metrics};
 use virtual_board::demo::{self, Plan};
 use virtual_board::scene::simulate;
@@ -168,7 +167,7 @@ fn broken(name: &str) -> Vec<String> {
 
 #[test]
 fn every_scene_of_the_library_holds_its_bounds_on_the_image() {
-    let mut names = library::names().expect("the library is there");
+    let mut names = scene::library_names().expect("the library is there");
     assert!(names.len() >= 14, "{names:?}");
     // The longest begins first: it takes as long as all others together.
     names.sort_by_key(|name| name != "hot_hour");

@@ -11,7 +11,7 @@ use sim::run::run;
 use virtual_board::flash::SECTOR;
 use virtual_board::scene::finger::{Clock, Finger};
 use virtual_board::scene::simulate;
-use virtual_board::{Error, Options, Rig, inside};
+use virtual_board::{Error, Options, Rig, converter};
 
 const GAIN_PPM_PER_K: i32 = 3_600;
 const ZERO_PA_PER_K: i32 = 10;
@@ -67,7 +67,7 @@ fn true_c(rig: &mut Rig) -> f64 {
 
 #[test]
 fn the_board_measures_its_temperature_and_the_force_s_drift() {
-    let mut rig = warming(inside::factory());
+    let mut rig = warming(converter::factory());
     assert!(matches!(rig.world(|world| world.force_n()), Err(Error::OtherWorld)));
     codes_that_stay_away_are_no_temperature_and_the_finger_holds_on(&mut rig);
     the_means_go_on_where_the_scan_starts_again(&mut rig);
@@ -125,7 +125,7 @@ fn the_bus_tells_the_chip_s_temperature_and_the_drift(rig: &mut Rig) {
 
 #[test]
 fn without_the_factory_s_codes_there_is_no_temperature_and_no_term() {
-    let sound = inside::factory();
+    let sound = converter::factory();
     let cases = [
         (Factory { reference: 0xffff, sensor: [0xffff; 2] }, 0),
         (Factory { sensor: [sound.sensor[0]; 2], ..sound }, 3_300),

@@ -4,8 +4,7 @@ use clap::Parser;
 use output::say;
 use sim::cli::verdict;
 use sim::native;
-use sim::population::budget::Budget;
-use sim::population::whole_loop;
+use sim::population::budget::{self, Budget};
 use std::process::ExitCode;
 
 /// Says how much of the force's error each of the sensor's weaknesses makes at 0.5, 1, 2 and 5 N.
@@ -23,7 +22,7 @@ struct Args {
 fn main() -> ExitCode {
     let Args { fingers, whole_loop: whole } = Args::parse();
     let answer = match whole {
-        true => whole_loop::lines(fingers as usize),
+        true => budget::whole_loop(fingers as usize),
         false => Budget::of(fingers as usize, &native::board, &native::calibrated::board).map(|budget| budget.page()),
     };
     verdict(answer.map(|text| {

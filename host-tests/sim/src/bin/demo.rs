@@ -4,8 +4,7 @@
 
 use clap::Parser;
 use output::say;
-use sim::demo::figures::{draw, missed, table};
-use sim::demo::{self, DemoError, Forces, Trace};
+use sim::demo::{self, DemoError, Forces, Trace, draw, missed, table};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 

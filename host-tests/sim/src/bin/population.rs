@@ -3,9 +3,8 @@
 use clap::Parser;
 use output::say;
 use sim::cli::verdict;
-use sim::native;
-use sim::native::calibrated;
-use sim::population::cli::{self, Args, Board};
+use sim::native::{self, calibrated};
+use sim::population::{self, Args, Board};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -18,8 +17,8 @@ fn main() -> ExitCode {
                 true
             }))
         }
-        Board::Native => cli::answer(&args, &native::board),
-        Board::Calibrated => cli::answer(&args, &native::calibrated::board),
+        Board::Native => population::answer(&args, &native::board),
+        Board::Calibrated => population::answer(&args, &native::calibrated::board),
         Board::Virtual => {
             say::aside(
                 "this program is the native board: `cargo xtask population --board virtual` runs the flash image",

@@ -6,9 +6,8 @@
 //! plane without friction: d = x, F = pi Y d^2. All forces of a step are the mean slope of one energy, so a step
 //! creates no energy.
 
-use crate::effects::{Build, Metered, Part, normal_within_3};
+use crate::effects::{Build, Description, Metered, Part, normal_within_3};
 use crate::mechanics::decay;
-use crate::registry::Description;
 use crate::scene::tables::Key;
 use crate::watch::{Cost, Truth};
 
@@ -17,7 +16,6 @@ use crate::watch::{Cost, Truth};
 /// radius of the tip.
 type Height = dyn Fn(f64, f64, f64) -> f64 + Send;
 
-/// Surface of the object.
 pub struct Surface {
     /// True if the height is 0 within reach of a tip, so that the closed forms of the plane hold.
     plain: bool,
@@ -53,7 +51,6 @@ pub struct Grip {
     pub slipping: f64,
     /// Speed of an object that the scene moves.
     pub drift_mm_per_s: f64,
-    /// Start of that motion.
     pub drift_from_s: f64,
 }
 
@@ -236,10 +233,7 @@ pub const EFFECTS: &[Description] = &[
         reference: "two springs in series; a soft ball 0.1 to 2 mm/N",
         keys: &[Key::number("yield_mm_per_n", "Compliance; 0 is rigid.", 0.0, 1000.0, 0.5)],
         zero: &[("yield_mm_per_n", 0.0)],
-        build: |build: &Build| {
-            let mm_per_n = build.number("yield_mm_per_n");
-            Part::Series(Box::new(mm_per_n))
-        },
+        build: |build: &Build| Part::Series(Box::new(build.number("yield_mm_per_n"))),
     },
     Description {
         name: "breakable_object",
@@ -279,16 +273,16 @@ pub const EFFECTS: &[Description] = &[
         ],
         zero: &[("drift_mm_per_s", 0.0)],
         build: |build: &Build| {
-            let values = build.values;
-            let spread = values.number("spread_percent") / 100.0;
+            let number = |name| build.number(name);
+            let spread = number("spread_percent") / 100.0;
             let drawn = 1.0 + spread * normal_within_3(&mut build.rng());
             let grip = Grip {
-                n_per_mm: values.number("n_per_mm"),
-                n_s_per_mm: values.number("damping_n_s_per_mm"),
-                still: drawn * values.number("still"),
-                slipping: drawn * values.number("slipping").min(values.number("still")),
-                drift_mm_per_s: values.number("drift_mm_per_s"),
-                drift_from_s: values.number("drift_from_s"),
+                n_per_mm: number("n_per_mm"),
+                n_s_per_mm: number("damping_n_s_per_mm"),
+                still: drawn * number("still"),
+                slipping: drawn * number("slipping").min(number("still")),
+                drift_mm_per_s: number("drift_mm_per_s"),
+                drift_from_s: number("drift_from_s"),
             };
             Part::Tangent(Box::new(grip))
         },
@@ -304,17 +298,13 @@ pub const EFFECTS: &[Description] = &[
         reference: "Newton; g = 9.80665 m/s^2",
         keys: &[Key::number("mass_g", "Mass; 0 is a fixed object.", 0.0, 10000.0, 20.0)],
         zero: &[("mass_g", 0.0)],
-        build: |build: &Build| {
-            let kg = build.number("mass_g") * 1e-3;
-            Part::Body(Box::new(kg))
-        },
+        build: |build: &Build| Part::Body(Box::new(build.number("mass_g") * 1e-3)),
     },
 ];
 
 /// Largest radius of a tip (`[tip]`, `radius_mm`).
 const LARGEST_TIP_MM: f64 = 16.0;
 
-/// Relaxation of the tip.
 pub struct Relaxation {
     share: f64,
     tau_s: f64,

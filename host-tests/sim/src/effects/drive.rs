@@ -6,9 +6,8 @@
 //! gear follow. The count of the encoder is computed where it is read. Without effects the drive has a rotor without
 //! friction, a winding that is a resistance, an ideal source, and a rigid transmission.
 
-use crate::effects::{Build, Metered, Part};
+use crate::effects::{Build, Description, Metered, Part};
 use crate::mechanics::decay;
-use crate::registry::Description;
 use crate::scene::tables::Key;
 use crate::setup::Setup;
 use crate::watch::{Cost, Truth};
@@ -463,7 +462,6 @@ impl Cogging {
         self.torque_nm * libm::sin(0.5 * self.teeth * (from_rad + to_rad)) * spread
     }
 
-    /// Largest slope of the torque.
     fn steepest_nm_per_rad(&self) -> f64 {
         self.torque_nm * self.teeth
     }

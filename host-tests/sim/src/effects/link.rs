@@ -1,7 +1,6 @@
 //! Effects on the clock of the controller, interference, and packets of the host.
 
-use crate::effects::{Build, Metered, Part, normal, waiting_s};
-use crate::registry::Description;
+use crate::effects::{Build, Description, Metered, Part, normal, waiting_s};
 use crate::scene::tables::{Key, Kind};
 use crate::watch::Cost;
 use fingertip::link::packet::{CRC_START, HEADER, instruction, update_crc};
@@ -50,10 +49,7 @@ pub const EFFECTS: &[Description] = &[
         reference: "STM32F446 data sheet: internal oscillator +-1 % at 25 C; crystals some 50 ppm",
         keys: &[Key::number("fast_ppm", "Deviation of the clock; negative is slow.", -50_000.0, 50_000.0, 50.0)],
         zero: &[("fast_ppm", 0.0)],
-        build: |build: &Build| {
-            let second_s = 1.0 / (1.0 + build.number("fast_ppm") * 1e-6);
-            Part::Clock(Box::new(second_s))
-        },
+        build: |build: &Build| Part::Clock(Box::new(1.0 / (1.0 + build.number("fast_ppm") * 1e-6))),
     },
     Description {
         name: "burst",

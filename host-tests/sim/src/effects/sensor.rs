@@ -4,16 +4,14 @@
 //! row), volts (at the column amplifiers), codes (before the converter rounds down). Without effects the readout is
 //! ideal: equal taxels, a perfect row switch, a perfect virtual ground, settled at once, 12 bits.
 
-pub(crate) mod effects;
-
-pub use effects::EFFECTS;
-
-use super::{Metered, Part};
+use crate::effects::{Build, Description, Metered, Part, normal_within_3, normals};
 use crate::events::ArrayEvents;
+use crate::mechanics::decay;
 use crate::scene::Scene;
+use crate::scene::tables::{Key, Kind};
 use crate::setup::Array;
 use crate::watch::Cost;
-use fingertip::shipped::{COLUMNS, ROWS};
+use fingertip::shipped::{COLUMNS, ROWS, SLOTS};
 
 /// A number for each column.
 pub type Row = [f64; COLUMNS];
@@ -173,4 +171,429 @@ impl Readout {
             *volts += siemens * self.volts_per_siemens;
         }
     }
+}
+
+/// Effects of this family, in the order in which they act within a stage.
+pub const EFFECTS: &[Description] = &[
+    Description {
+        name: "hysteresis",
+        about: "Hysteresis: the reading is low while pressing and high on release, by a share of the pressure.",
+        equations: &[
+            "a play whose width grows with the pressure: y = clamp(y, p (1 - h/2), p (1 + h/2)), h = width_percent / 100",
+            "a cycle 0, P, 0 encloses P^2 w (1 - w) / (1 + w), w = h/2",
+        ],
+        state: "y of each taxel (100 numbers)",
+        reference: "Interlink FSR 400 integration guide: hysteresis +10 %; the play operator: Brokate and Sprekels, Hysteresis and \
+                Phase Transitions, 1996, section 2.1",
+        keys: &[Key::number("width_percent", "Width of the loop, of the pressure.", 0.0, 100.0, 10.0)],
+        zero: &[("width_percent", 0.0)],
+        build: |build: &Build| {
+            let half = build.number("width_percent") / 200.0;
+            let mut held_kpa = [Row::default(); ROWS];
+            Part::Pressure(Box::new(move |row: usize, _: f64, kpa: &mut Row| {
+                for (held, kpa) in held_kpa[row].iter_mut().zip(kpa) {
+                    // Not clamp(): it panics at a negative pressure, which swaps the bounds.
+                    *held = held.max(*kpa * (1.0 - half)).min(*kpa * (1.0 + half));
+                    *kpa = *held;
+                }
+            }))
+        },
+    },
+    Description {
+        name: "creep",
+        about: "Creep: under a constant pressure the reading grows by a share of it in each decade of time.",
+        equations: &[
+            "p' = p + c sum of x_k, dx_k/dt = (p - x_k) / tau_k, tau_k = 1 ms, 10 ms, ... 10^5 s; c = rate_percent_per_decade / 100",
+            "each step exact for a constant p: x_k += (p - x_k) (1 - exp(-dt / tau_k))",
+            "after a step of p: c p for each decade, within 0.1 % from 1 ms to 1000 s, within 1 % to 3 hours; inside a decade the slope ripples by 11 %",
+        ],
+        state: "9 numbers per taxel",
+        reference: "Interlink FSR 400 integration guide: drift under 5 % per decade of time; a Prony series with a term per decade",
+        keys: &[Key::number("rate_percent_per_decade", "Growth of the reading.", 0.0, 50.0, 5.0)],
+        zero: &[("rate_percent_per_decade", 0.0)],
+        build: |build: &Build| {
+            let share = build.number("rate_percent_per_decade") / 100.0;
+            let (mut since, mut crept_kpa) = (Since::default(), [[[0.0; COLUMNS]; TERMS]; ROWS]);
+            Part::Pressure(Box::new(move |row: usize, time_s: f64, kpa: &mut Row| {
+                let step_s = since.step_s(row, time_s);
+                let mut sum = [0.0; COLUMNS];
+                for (crept, tau_s) in crept_kpa[row].iter_mut().zip(TAUS_S) {
+                    let taken = gone(step_s / tau_s);
+                    for ((crept, kpa), sum) in crept.iter_mut().zip(&*kpa).zip(&mut sum) {
+                        *crept += taken * (*kpa - *crept);
+                        *sum += *crept;
+                    }
+                }
+                for (kpa, sum) in kpa.iter_mut().zip(sum) {
+                    *kpa += share * sum;
+                }
+            }))
+        },
+    },
+    Description {
+        name: "gain_spread",
+        about: "Different gains of the taxels.",
+        equations: &[
+            "p' = p max(0, 1 + s g), s = rms_percent / 100, g of each taxel normal, drawn once, within 3 deviations",
+        ],
+        state: "none; 100 gains drawn at the start",
+        reference: "Interlink FSR 400 integration guide: part to part +-6 %; Tekscan sensors differ by 5 to 32 %",
+        keys: &[Key::number("rms_percent", "Deviation of the taxels' gains.", 0.0, 50.0, 6.0)],
+        zero: &[("rms_percent", 0.0)],
+        build: |build: &Build| {
+            let mut rng = build.rng();
+            let share = build.number("rms_percent") / 100.0;
+            let gains: [Row; ROWS] =
+                [(); ROWS].map(|()| Row::default().map(|_| (1.0 + share * normal_within_3(&mut rng)).max(0.0)));
+            Part::Pressure(Box::new(move |row: usize, _: f64, kpa: &mut Row| {
+                kpa.iter_mut().zip(gains[row]).for_each(|(kpa, gain)| *kpa *= gain);
+            }))
+        },
+    },
+    Description {
+        name: "temperature_drift",
+        about: "Warming of the array from time 0 on, with drift of gain and zero.",
+        equations: &[
+            "T = warming_k (1 - exp(-t / time_constant_s)), t from the start, 0 before it",
+            "the microcontroller shows 25 + chip_share * warming_k (1 - exp(-t / chip_time_constant_s))",
+            "p' = p (1 + a T) + b T, a = gain_percent_per_k / 100, b = zero_kpa_per_k",
+        ],
+        state: "none: T is a function of time",
+        reference: "Tekscan FlexiForce A201 data sheet: 0.36 %/K; the zero's drift is an assumption",
+        keys: &[
+            Key::number("warming_k", "Final temperature above that at the start.", -60.0, 100.0, 20.0),
+            Key::number("time_constant_s", "Time to 63 % of that.", 0.001, 1e6, 600.0),
+            Key::number("gain_percent_per_k", "Change of the gain.", -1.0, 1.0, 0.36),
+            Key::number("zero_kpa_per_k", "Change of the reading without pressure.", -1.0, 1.0, 0.01),
+            Key::number("chip_share", "Share of the warming that the chip shows.", -2.0, 4.0, 1.0),
+            Key::number(
+                "chip_time_constant_s",
+                "Time constant of the microcontroller; 0 is that of the array.",
+                0.0,
+                1e6,
+                0.0,
+            ),
+        ],
+        zero: &[("warming_k", 0.0)],
+        build: |build: &Build| {
+            let number = |name| build.number(name);
+            Part::Pressure(Box::new(TemperatureDrift {
+                warming_k: number("warming_k"),
+                time_constant_s: number("time_constant_s"),
+                gain_per_k: number("gain_percent_per_k") / 100.0,
+                zero_kpa_per_k: number("zero_kpa_per_k"),
+                chip_k: number("warming_k") * number("chip_share"),
+                chip_time_constant_s: match number("chip_time_constant_s") {
+                    0.0 => number("time_constant_s"),
+                    own => own,
+                },
+            }))
+        },
+    },
+    Description {
+        name: "broken_taxels",
+        about: "Taxels that are dead, stuck or shorted from a time on.",
+        equations: &["dead: G = 0", "shorted: G = 0.1 S (10 Ohm)", "stuck: G stays as at the first sample after at_s"],
+        state: "conductance of each stuck taxel",
+        reference: "docs/runs.md, Readout: defects of the array",
+        keys: &[
+            Key { name: "dead", about: "Open circuits, by row and column.", kind: TAXELS },
+            Key { name: "shorted", about: "Short circuits, by row and column.", kind: TAXELS },
+            Key { name: "stuck", about: "Taxels that no longer change, by row and column.", kind: TAXELS },
+            Key::number("at_s", "Time of the defect; -10 is before the tare.", -10.0, 1e6, -10.0),
+        ],
+        zero: &[],
+        build: |build: &Build| {
+            let mut taxels = [[Taxel::Sound; COLUMNS]; ROWS];
+            let shorted = Taxel::Fixed(Array::default().short_siemens);
+            for (name, taxel) in [("stuck", Taxel::Stuck), ("shorted", shorted), ("dead", Taxel::Fixed(0.0))] {
+                for [row, column] in build.values.pairs(name) {
+                    taxels[*row as usize][*column as usize] = taxel;
+                }
+            }
+            let at_s = build.number("at_s");
+            Part::Conductance(Box::new(move |row, time_s, siemens| {
+                if time_s < at_s {
+                    return;
+                }
+                for (taxel, siemens) in taxels[row].iter_mut().zip(siemens) {
+                    match *taxel {
+                        Taxel::Sound => {}
+                        Taxel::Stuck => *taxel = Taxel::Fixed(*siemens),
+                        Taxel::Fixed(fixed) => *siemens = fixed,
+                    }
+                }
+            }))
+        },
+    },
+    Description {
+        name: "ghosting",
+        about: "Ghosting: a resistance between the virtual ground and all undriven rows and unread columns.",
+        equations: &[
+            "the whole network of 100 taxels, the driven row i at 1 V, every line tied to ground by h = 1 / hold_ohm",
+            "rows eliminated: A = diag(h + sum over k of G_kc) - sum over k != i of G_k G_k^T / (h + sum over c of G_kc), b = G_i",
+            "the short-circuit current of the read column is the conductance seen: (A^-1 b)_j / (A^-1)_jj",
+            "hold_ohm = 0: G_ij; floating lines and equal taxels: G M N / (M + N - 1), a resistance of 0.19 R for 10 x 10",
+        ],
+        state: "none; other rows have the values of their last sample, at most a frame ago",
+        reference: "D'Alessio, Measurement errors in the scanning of piezoresistive sensors arrays, Sensors and Actuators A 72 (1999)",
+        keys: &[Key::number("hold_ohm", "Resistance to the virtual ground; 0 is perfect.", 0.0, 1e12, 1000.0)],
+        zero: &[("hold_ohm", 0.0)],
+        build: |build: &Build| {
+            let hold_ohm = build.number("hold_ohm");
+            Part::Network(Box::new(move |row, array, seen| {
+                if hold_ohm > 0.0 {
+                    *seen = short_circuit(row, array, 1.0 / hold_ohm);
+                }
+            }))
+        },
+    },
+    Description {
+        name: "row_sag",
+        about: "Voltage loss in the switch and trace of the driven row. The controller corrects for it by default.",
+        equations: &["G' = G / (1 + R_on S), S = the row's sum of G: a loss of R_on S / (1 + R_on S)"],
+        state: "none",
+        reference: "docs/board.md: 30 Ohm; R_min 1 kOhm in all ten columns loses 41 % at 70 Ohm and 4.8 % at 5 Ohm",
+        keys: &[Key::number("switch_ohm", "Resistance of switch and trace, R_on.", 0.0, 300.0, 30.0)],
+        zero: &[("switch_ohm", 0.0)],
+        build: |build: &Build| {
+            let switch_ohm = build.number("switch_ohm");
+            Part::Network(Box::new(move |_, _, seen| {
+                let left = 1.0 + switch_ohm * seen.iter().sum::<f64>();
+                seen.iter_mut().for_each(|siemens| *siemens /= left);
+            }))
+        },
+    },
+    Description {
+        name: "settling",
+        about: "Settling: a sample still contains a part of the slot before.",
+        equations: &[
+            "dv/dt = (V - v) / tau_us, V the final voltage of the slot",
+            "sampled at after_us after the edge of the slot: v = V + (v_edge - V) exp(-after_us / tau_us), exact",
+        ],
+        state: "voltage of each column at the last edge, and its final voltage (20 numbers)",
+        reference: "docs/runs.md, Readout: 0.2 us; half a bit of 12 takes 9.0 tau",
+        keys: &[
+            Key::number("tau_us", "Time constant.", 0.0, 100.0, 0.2),
+            Key::number("after_us", "Time from the edge to the sample.", 0.1, 1000.0, 2.4),
+        ],
+        zero: &[("tau_us", 0.0)],
+        build: |build: &Build| {
+            let [tau_s, after_s] = ["tau_us", "after_us"].map(|key| build.number(key) * 1e-6);
+            let mut settling = Settling::new(tau_s, after_s);
+            Part::Volts(Box::new(move |_, time_s, volts| settling.sample(time_s, volts)))
+        },
+    },
+    Description {
+        name: "saturation",
+        about: "Saturation: the column amplifiers cannot reach the reference of the converter.",
+        equations: &["v' = min(v, V_ref - headroom_mv)"],
+        state: "none",
+        reference: "output swing to the rail in data sheets of amplifiers, 5 to 200 mV",
+        keys: &[Key::number(
+            "headroom_mv",
+            "Distance of their upper rail from the reference of 3.3 V.",
+            0.0,
+            3000.0,
+            50.0,
+        )],
+        zero: &[("headroom_mv", 0.0)],
+        build: |build: &Build| {
+            let rail_v = Array::default().reference_v - build.number("headroom_mv") * 1e-3;
+            Part::Volts(Box::new(move |_, _, volts| volts.iter_mut().for_each(|volts| *volts = volts.min(rail_v))))
+        },
+    },
+    Description {
+        name: "noise",
+        about: "White noise on every conversion.",
+        equations: &["code' = code + rms_codes g, g normal, drawn for each conversion"],
+        state: "random numbers (8 bytes)",
+        reference: "ST application note AN4073, averaging against converter noise: a few codes",
+        keys: &[Key::number("rms_codes", "Deviation, 12-bit codes.", 0.0, 500.0, 1.5)],
+        zero: &[("rms_codes", 0.0)],
+        build: |build: &Build| {
+            let rms_codes = build.number("rms_codes");
+            let mut rng = build.rng();
+            Part::Codes(Box::new(move |_, _, codes| {
+                let noise: Row = normals(&mut rng);
+                codes.iter_mut().zip(noise).for_each(|(code, noise)| *code += rms_codes * noise);
+            }))
+        },
+    },
+    Description {
+        name: "offset",
+        about: "Different zero levels of taxels and of columns without a driven row. The tare removes them.",
+        equations: &["code' = code + rms_codes g, g of each taxel normal, drawn once, within 3 deviations"],
+        state: "none; 110 levels drawn at the start",
+        reference: "docs/board.md: the preload's spread and the amplifiers' offsets",
+        keys: &[Key::number("rms_codes", "Deviation of the levels, 12-bit codes.", 0.0, 200.0, 5.0)],
+        zero: &[("rms_codes", 0.0)],
+        build: |build: &Build| {
+            let mut rng = build.rng();
+            let rms_codes = build.number("rms_codes");
+            let offsets = [(); SLOTS].map(|()| Row::default().map(|_| rms_codes * normal_within_3(&mut rng)));
+            Part::Codes(Box::new(move |slot, _, codes| {
+                codes.iter_mut().zip(offsets[slot]).for_each(|(code, offset)| *code += offset);
+            }))
+        },
+    },
+    Description {
+        name: "converter",
+        about: "A converter with fewer bits than 12 and with an integral non-linearity.",
+        equations: &[
+            "bow: c = code + inl_codes 4 x (1 - x), x = code / 4096 within 0 to 1",
+            "code' = floor(c / q) q, q = 2^(12 - bits)",
+        ],
+        state: "none",
+        reference: "Tekscan I-Scan, the paper's kind of sensor: 8 bits; STM32F446 data sheet: INL 2 to 3 codes of 12 bits",
+        keys: &[
+            Key::whole("bits", "Resolution.", 1, 12, 8),
+            Key::number("inl_codes", "Largest deviation from the line, in the middle, 12-bit codes.", -50.0, 50.0, 0.0),
+        ],
+        zero: &[("bits", 12.0), ("inl_codes", 0.0)],
+        build: |build: &Build| {
+            let step = f64::from(1 << (12 - build.values.whole("bits")));
+            let inl_codes = build.number("inl_codes");
+            Part::Codes(Box::new(move |_, _, codes| {
+                for code in codes {
+                    let x = (*code / Array::CODES).clamp(0.0, 1.0);
+                    *code = ((*code + inl_codes * 4.0 * x * (1.0 - x)) / step).floor() * step;
+                }
+            }))
+        },
+    },
+];
+
+/// Conductances seen from the columns, where all rows but the driven one float.
+///
+/// With the floating rows eliminated the columns form a network A = D - sum g g' / line, symmetric and positive definite.
+/// Column j alone at the virtual ground sees (A^-1 g)_j / (A^-1)_jj, g the driven row. By A = L L' (Cholesky) and M =
+/// L^-1, A^-1 = M' M.
+fn short_circuit(driven: usize, array: &[Row; ROWS], hold: f64) -> Row {
+    let mut a = [[0.0; COLUMNS]; COLUMNS];
+    for (row, siemens) in array.iter().enumerate() {
+        let per_line = if row == driven { 0.0 } else { 1.0 / (hold + siemens.iter().sum::<f64>()) };
+        for (c, g) in siemens.iter().enumerate() {
+            let share = g * per_line;
+            a[c].iter_mut().zip(&siemens[..=c]).for_each(|(a, other)| *a -= share * other);
+            a[c][c] += g;
+        }
+    }
+    // L replaces the lower half of A and M that of the identity, line by line.
+    let mut m = [[0.0; COLUMNS]; COLUMNS];
+    for i in 0..COLUMNS {
+        a[i][i] += hold;
+        let mut line = [0.0; COLUMNS];
+        line[i] = 1.0;
+        for j in 0..i {
+            let (above, below) = a.split_at_mut(i);
+            let known: f64 = above[j][..j].iter().zip(&below[0][..j]).map(|(a, b)| a * b).sum();
+            let share = (below[0][j] - known) / above[j][j];
+            below[0][j] = share;
+            line.iter_mut().zip(&m[j]).for_each(|(entry, part)| *entry -= share * part);
+        }
+        let length = (a[i][i] - a[i][..i].iter().map(|l| l * l).sum::<f64>()).sqrt();
+        a[i][i] = length;
+        m[i] = line.map(|entry| entry / length);
+    }
+    let (mut open, mut diagonal) = ([0.0; COLUMNS], [0.0; COLUMNS]);
+    for line in &m {
+        let along: f64 = line.iter().zip(&array[driven]).map(|(m, g)| m * g).sum();
+        for (j, m) in line.iter().enumerate() {
+            open[j] += m * along;
+            diagonal[j] += m * m;
+        }
+    }
+    core::array::from_fn(|j| (open[j] / diagonal[j]).max(0.0))
+}
+
+pub struct Settling {
+    tau_s: f64,
+    /// Share of a difference that remains at the sample.
+    left: f64,
+    before: Option<Before>,
+}
+
+impl Settling {
+    /// Columns before the first scan.
+    pub fn new(tau_s: f64, after_s: f64) -> Self {
+        Self { tau_s, left: decay(after_s / tau_s), before: None }
+    }
+    /// Replaces the final voltages by those at the sample.
+    pub fn sample(&mut self, time_s: f64, volts: &mut Row) {
+        let end_v = *volts;
+        let edge_v = match &self.before {
+            None => end_v,
+            Some(Before { time_s: before_s, edge_v, end_v }) => {
+                let left = decay((time_s - before_s) / self.tau_s);
+                core::array::from_fn(|column| end_v[column] + left * (edge_v[column] - end_v[column]))
+            }
+        };
+        for (volts, edge) in volts.iter_mut().zip(edge_v) {
+            *volts += self.left * (edge - *volts);
+        }
+        self.before = Some(Before { time_s, edge_v, end_v });
+    }
+}
+
+struct Before {
+    time_s: f64,
+    edge_v: Row,
+    end_v: Row,
+}
+
+/// Time of the last sample of each row.
+#[derive(Clone, Debug, Default)]
+pub struct Since([Option<f64>; ROWS]);
+
+impl Since {
+    /// Returns the time since the last sample of the row; 0 at the first one.
+    pub fn step_s(&mut self, row: usize, time_s: f64) -> f64 {
+        self.0[row].replace(time_s).map_or(0.0, |before| (time_s - before).max(0.0))
+    }
+}
+
+const TERMS: usize = 9;
+const TAUS_S: [f64; TERMS] = [1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4, 1e5];
+
+/// 1 - exp(-x) without cancellation at small x: a frame is 1e-8 of the slowest term. The series are exact to 4e-14.
+fn gone(x: f64) -> f64 {
+    const SHARES: [f64; 9] =
+        [1.0 / 10.0, 1.0 / 9.0, 1.0 / 8.0, 1.0 / 7.0, 1.0 / 6.0, 1.0 / 5.0, 1.0 / 4.0, 1.0 / 3.0, 1.0 / 2.0];
+    let series = |shares: &[f64]| x * shares.iter().fold(1.0, |sum, share| 1.0 - x * share * sum);
+    match x {
+        ..1e-4 => series(&SHARES[7..]),
+        ..0.125 => series(&SHARES),
+        _ => 1.0 - decay(x),
+    }
+}
+
+struct TemperatureDrift {
+    warming_k: f64,
+    time_constant_s: f64,
+    gain_per_k: f64,
+    zero_kpa_per_k: f64,
+    chip_k: f64,
+    chip_time_constant_s: f64,
+}
+
+impl Pressure for TemperatureDrift {
+    fn chip_c(&self, time_s: f64) -> Option<f64> {
+        Some(25.0 + self.chip_k * gone(time_s.max(0.0) / self.chip_time_constant_s))
+    }
+
+    fn apply(&mut self, _row: usize, time_s: f64, kpa: &mut Row) {
+        let warmer_k = self.warming_k * gone(time_s.max(0.0) / self.time_constant_s);
+        let (gain, zero_kpa) = (1.0 + self.gain_per_k * warmer_k, self.zero_kpa_per_k * warmer_k);
+        kpa.iter_mut().for_each(|kpa| *kpa = *kpa * gain + zero_kpa);
+    }
+}
+
+const TAXELS: Kind = Kind::Pairs { below: ROWS as i64 };
+
+#[derive(Clone, Copy)]
+enum Taxel {
+    Sound,
+    Stuck,
+    Fixed(f64),
 }

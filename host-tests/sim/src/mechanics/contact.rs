@@ -1,10 +1,10 @@
 //! Contact of one finger: normal force, pressures on the taxels, and friction along the surface.
 
 use crate::effects::contact::{Grip, Named};
-use crate::mechanics::normal::{Elastic, Law};
 use crate::mechanics::pressures::{Between, Pressures};
-use crate::mechanics::shape;
-use crate::setup::Setup;
+use crate::mechanics::rotor::mean_square;
+use crate::setup::{Setup, Tip};
+use core::f64::consts::TAU;
 use fingertip::shipped::COLUMNS;
 
 /// Contact of one finger, with its effects.
@@ -32,7 +32,6 @@ pub struct Place {
 }
 
 impl Place {
-    /// No contact.
     pub const NOWHERE: Self = Self { between: Between::NOTHING, share: 1.0 };
 }
 
@@ -51,7 +50,7 @@ impl Contact {
     pub fn new(setup: &Setup, mut effects: Named) -> Self {
         effects.shape_built();
         let (elastic, centres) = if effects.shaped() {
-            shape::tables(&effects, &setup.tip)
+            shaped(&effects, &setup.tip)
         } else {
             (Elastic::Plane { n_per_mm2: setup.tip.force_per_mm2() }, Vec::new())
         };
@@ -159,4 +158,317 @@ impl Along {
         let spring_n = 0.5 * grip.n_per_mm * (self.stretch_mm + next.stretch_mm);
         (-spring_n - damping * (next.stretch_mm - self.stretch_mm), next)
     }
+}
+
+/// Law of the normal force during a step: elastic, less the relaxed force, in series with the object.
+///
+/// With the elastic force F_e, a relaxed force S, the compliance c of the object and the share k of the force that
+/// remains:
+///
+/// ```text
+/// N(d) = max(0, F_e(d) - S)      x = d + c N(d)      F = k N      E = k (integral of N over d + c N^2 / 2)
+/// ```
+///
+/// so F = dE/dx. Below the indentation at which F_e = S the tip does not touch, as its shape has not recovered. The
+/// elastic force is a closed form on a plane and a table on other surfaces.
+///
+/// The fields are F_e, S, c and k.
+#[derive(Clone, Copy, Debug)]
+pub struct Law<'a> {
+    pub elastic: &'a Elastic,
+    pub forgotten_n: f64,
+    /// Indentation at which the elastic force is `forgotten_n`.
+    pub free_mm: f64,
+    pub mm_per_n: f64,
+    pub left: f64,
+}
+
+impl Law<'_> {
+    /// Indentation of the tip at an overlap; negative without contact.
+    #[inline]
+    pub fn depth_mm(&self, x_mm: f64) -> f64 {
+        if self.mm_per_n == 0.0 || x_mm <= 0.0 { x_mm } else { self.yielding_mm(x_mm) }
+    }
+
+    fn yielding_mm(&self, x_mm: f64) -> f64 {
+        if x_mm <= self.free_mm {
+            return x_mm;
+        }
+        match self.elastic {
+            Elastic::Plane { n_per_mm2 } => {
+                let steep = self.mm_per_n * n_per_mm2;
+                let ahead = x_mm + self.mm_per_n * self.forgotten_n;
+                2.0 * ahead / (1.0 + (1.0 + 4.0 * steep * ahead).sqrt())
+            }
+            Elastic::Table(table) => table.yielding_mm(x_mm, self.mm_per_n, self.forgotten_n),
+        }
+    }
+
+    pub fn force_n(&self, x_mm: f64) -> f64 {
+        self.left * self.net_n(self.depth_mm(x_mm))
+    }
+
+    /// Energy at an overlap, mJ.
+    pub fn energy_mj(&self, x_mm: f64) -> f64 {
+        let (d_mm, free_mm) = (self.depth_mm(x_mm), self.free_mm);
+        if d_mm <= free_mm {
+            return 0.0;
+        }
+        let tip = self.elastic.energy_mj(d_mm) - self.elastic.energy_mj(free_mm) - self.forgotten_n * (d_mm - free_mm);
+        let net_n = self.net_n(d_mm);
+        self.left * (tip + 0.5 * self.mm_per_n * net_n * net_n)
+    }
+
+    /// Mean force between two overlaps: the difference in energy over the distance.
+    #[inline]
+    pub fn mean_n(&self, x0: f64, x1: f64) -> f64 {
+        if x0 <= 0.0 && x1 <= 0.0 {
+            return 0.0;
+        }
+        if self.mm_per_n == 0.0 {
+            return self.left * self.tip_mean_n(x0, x1);
+        }
+        let (d0, d1) = (self.depth_mm(x0), self.depth_mm(x1));
+        let (n0, n1) = (self.net_n(d0), self.net_n(d1));
+        let (tip_mm, object_mm) = (d1 - d0, self.mm_per_n * (n1 - n0));
+        let way_mm = tip_mm + object_mm;
+        if way_mm == 0.0 {
+            return self.left * n0;
+        }
+        self.left * (self.tip_mean_n(d0, d1) * tip_mm + 0.5 * (n0 + n1) * object_mm) / way_mm
+    }
+
+    pub fn net_n(&self, d_mm: f64) -> f64 {
+        (self.elastic.force_n(d_mm) - self.forgotten_n).max(0.0)
+    }
+
+    #[inline]
+    fn tip_mean_n(&self, d0: f64, d1: f64) -> f64 {
+        if self.forgotten_n == 0.0 {
+            return self.elastic.mean_n(d0, d1);
+        }
+        let (from, to) = (d0.max(self.free_mm), d1.max(self.free_mm));
+        let share = if d0 == d1 { f64::from(d0 > self.free_mm) } else { (to - from) / (d1 - d0) };
+        (self.elastic.mean_n(from, to) - self.forgotten_n).max(0.0) * share
+    }
+}
+
+/// Elastic force of an indentation. Beyond the table the force continues in a straight line.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Elastic {
+    /// A rigid plane: F = c d^2.
+    Plane {
+        /// c = pi Y, N/mm^2.
+        n_per_mm2: f64,
+    },
+    /// Straight lines between knots; the energy is their integral, so force = dE/dd holds by construction.
+    Table(Table),
+}
+
+/// Knots of a force that rises ever more steeply, from 0 at 0.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Table {
+    /// Knots per square root of the indentation, in which they are evenly spaced.
+    per_root: f64,
+    /// Indentation, mm; rising.
+    d_mm: Vec<f64>,
+    force_n: Vec<f64>,
+    energy_mj: Vec<f64>,
+}
+
+impl Table {
+    /// Creates a table of knots from d = 0 on: at least two, evenly spaced in the root of d, force not falling.
+    pub fn new(d_mm: Vec<f64>, force_n: Vec<f64>) -> Self {
+        let last = d_mm.len() - 1;
+        let mut energy_mj = vec![0.0; d_mm.len()];
+        for knot in 1..d_mm.len() {
+            let mean = 0.5 * (force_n[knot] + force_n[knot - 1]);
+            energy_mj[knot] = energy_mj[knot - 1] + mean * (d_mm[knot] - d_mm[knot - 1]);
+        }
+        Self { per_root: last as f64 / d_mm[last].sqrt(), d_mm, force_n, energy_mj }
+    }
+
+    /// Returns the segment of an indentation, by its lower knot.
+    fn line(&self, d_mm: f64) -> usize {
+        let last = self.d_mm.len() - 2;
+        let mut line = ((d_mm.max(0.0).sqrt() * self.per_root) as usize).min(last);
+        // The root may round to the segment beside it.
+        while line > 0 && self.d_mm[line] > d_mm {
+            line -= 1;
+        }
+        while line < last && self.d_mm[line + 1] <= d_mm {
+            line += 1;
+        }
+        line
+    }
+
+    /// Solves d + c (F(d) - S) = x for d, where d > 0 and F(d) > S. The left side is convex, so each segment's solution
+    /// is at most the one before, and the search ends in the segment that contains its own.
+    fn yielding_mm(&self, x_mm: f64, mm_per_n: f64, forgotten_n: f64) -> f64 {
+        let mut line = self.line(x_mm);
+        loop {
+            let rise = mm_per_n * self.slope(line);
+            let from_mm = self.d_mm[line];
+            let over_mm = (x_mm - from_mm - mm_per_n * (self.force_n[line] - forgotten_n)) / (1.0 + rise);
+            let d_mm = from_mm + over_mm;
+            let next = self.line(d_mm);
+            if next >= line {
+                return d_mm;
+            }
+            line = next;
+        }
+    }
+
+    fn slope(&self, line: usize) -> f64 {
+        (self.force_n[line + 1] - self.force_n[line]) / (self.d_mm[line + 1] - self.d_mm[line])
+    }
+
+    fn on_line(&self, line: usize, d_mm: f64) -> f64 {
+        self.force_n[line] + (d_mm - self.d_mm[line]) * self.slope(line)
+    }
+
+    fn force_n(&self, d_mm: f64) -> f64 {
+        if d_mm <= 0.0 { 0.0 } else { self.on_line(self.line(d_mm), d_mm) }
+    }
+
+    fn energy_mj(&self, d_mm: f64) -> f64 {
+        if d_mm <= 0.0 {
+            return 0.0;
+        }
+        let line = self.line(d_mm);
+        let over = d_mm - self.d_mm[line];
+        self.energy_mj[line] + over * (self.force_n[line] + 0.5 * over * self.slope(line))
+    }
+
+    /// Mean force between two indentations. Within a segment it is the mean of the ends, exact at any distance.
+    fn mean_n(&self, d0: f64, d1: f64) -> f64 {
+        if d0 == d1 {
+            return self.force_n(d0);
+        }
+        let (low, high) = (d0.min(d1), d0.max(d1));
+        let (first, last) = (self.line(low), self.line(high));
+        let part = |line: usize, from: f64, to: f64| {
+            let (from, to) = (from.max(0.0), to.max(0.0));
+            0.5 * (self.on_line(line, from) + self.on_line(line, to)) * (to - from)
+        };
+        if first == last {
+            return part(first, low, high) / (high - low);
+        }
+        let inner = self.energy_mj[last] - self.energy_mj[first + 1];
+        (part(first, low, self.d_mm[first + 1]) + inner + part(last, self.d_mm[last], high)) / (high - low)
+    }
+
+    fn depth_mm(&self, force_n: f64) -> f64 {
+        if force_n <= 0.0 {
+            return 0.0;
+        }
+        let knots = self.force_n.partition_point(|knot_n| *knot_n <= force_n);
+        let line = knots.clamp(1, self.force_n.len() - 1) - 1;
+        self.d_mm[line] + (force_n - self.force_n[line]) / self.slope(line)
+    }
+}
+
+impl Elastic {
+    pub fn force_n(&self, d_mm: f64) -> f64 {
+        match self {
+            Self::Plane { n_per_mm2 } => n_per_mm2 * d_mm.max(0.0) * d_mm.max(0.0),
+            Self::Table(table) => table.force_n(d_mm),
+        }
+    }
+
+    /// Indentation of a force, the inverse of [`Elastic::force_n`]; 0 without a force.
+    pub fn depth_mm(&self, force_n: f64) -> f64 {
+        match self {
+            Self::Plane { n_per_mm2 } => (force_n.max(0.0) / n_per_mm2).sqrt(),
+            Self::Table(table) => table.depth_mm(force_n),
+        }
+    }
+
+    pub fn energy_mj(&self, d_mm: f64) -> f64 {
+        match self {
+            Self::Plane { n_per_mm2 } => n_per_mm2 / 3.0 * d_mm.max(0.0).powi(3),
+            Self::Table(table) => table.energy_mj(d_mm),
+        }
+    }
+
+    /// Mean force between two indentations: the difference in energy over the distance.
+    #[inline]
+    pub fn mean_n(&self, d0: f64, d1: f64) -> f64 {
+        match self {
+            Self::Plane { n_per_mm2 } => mean_square(*n_per_mm2, d0, d1),
+            Self::Table(table) => table.mean_n(d0, d1),
+        }
+    }
+
+    pub fn n_per_mm(&self, d_mm: f64) -> f64 {
+        match self {
+            Self::Plane { n_per_mm2 } => 2.0 * n_per_mm2 * d_mm.max(0.0),
+            Self::Table(table) => table.slope(table.line(d_mm)),
+        }
+    }
+}
+
+/// Samples around the axis, and from the apex to the rim of the tip.
+const AROUND: usize = 64;
+const OUTWARDS: usize = 256;
+/// Knots of the force, evenly spaced in the square root of the indentation.
+const KNOTS: usize = 2048;
+
+/// Force and centre of pressure against indentation on a surface that is not a plane, from its height.
+///
+/// The local compression is `dL = sqrt(a^2 - r^2) - (a - d) + h(x, y)` and the pressure `Y dL / L`, `L = sqrt(a^2 -
+/// r^2)`, so with polar coordinates, as `r dr = -L dL`, the force is `Y` times the integral of `dL` over `L` and the
+/// angle: sample by sample, a ramp that begins at the clearance `a - L - h` of the sample.
+fn shaped(effects: &Named, tip: &Tip) -> (Elastic, Vec<[f64; 3]>) {
+    let mut samples = samples(effects, tip);
+    samples.sort_by(|a, b| a.clearance_mm.total_cmp(&b.clearance_mm));
+    let deepest_mm = Tip::DEEPEST * tip.radius_mm;
+    let (mut d_mm, mut force_n, mut centres) = (Vec::new(), Vec::new(), Vec::new());
+    // Sums over the touching samples of weight and weight times clearance, alone and times the place.
+    let mut sums = [[0.0; 2]; 3];
+    let mut reached = samples.iter().peekable();
+    for knot in 0..=KNOTS {
+        let share = knot as f64 / KNOTS as f64;
+        let depth_mm = share * share * deepest_mm;
+        while let Some(sample) = reached.next_if(|sample| sample.clearance_mm < depth_mm) {
+            for (sum, by) in sums.iter_mut().zip([1.0, sample.x_mm, sample.y_mm]) {
+                sum[0] += sample.weight * by;
+                sum[1] += sample.weight * by * sample.clearance_mm;
+            }
+        }
+        let [force, x, y] = sums.map(|[weight, clearance]| (weight * depth_mm - clearance) * tip.modulus_kpa * 1e-3);
+        let before = force_n.last().copied().unwrap_or(0.0);
+        let force = if knot == 0 { 0.0 } else { f64::max(force, before) };
+        d_mm.push(depth_mm);
+        force_n.push(force);
+        centres.push([depth_mm, if force > 0.0 { x / force } else { 0.0 }, if force > 0.0 { y / force } else { 0.0 }]);
+    }
+    (Elastic::Table(Table::new(d_mm, force_n)), centres)
+}
+
+/// Place on the tip: the indentation at which it touches, and its weight in the integral.
+struct Sample {
+    clearance_mm: f64,
+    weight: f64,
+    x_mm: f64,
+    y_mm: f64,
+}
+
+fn samples(effects: &Named, tip: &Tip) -> Vec<Sample> {
+    let radius_mm = tip.radius_mm;
+    let mut samples = Vec::with_capacity(AROUND * OUTWARDS);
+    for outwards in 0..OUTWARDS {
+        // L = a (1 - t^2): closest at the apex, where shallow contacts are.
+        let t = (outwards as f64 + 0.5) / OUTWARDS as f64;
+        let length_mm = radius_mm * (1.0 - t * t);
+        let weight = 2.0 * radius_mm * t / OUTWARDS as f64 * TAU / AROUND as f64;
+        let r_mm = (radius_mm * radius_mm - length_mm * length_mm).sqrt();
+        for around in 0..AROUND {
+            let angle = TAU * (around as f64 + 0.5) / AROUND as f64;
+            let (x_mm, y_mm) = (r_mm * libm::cos(angle), r_mm * libm::sin(angle));
+            let clearance_mm = radius_mm - length_mm - effects.height_mm(x_mm, y_mm, radius_mm);
+            samples.push(Sample { clearance_mm, weight, x_mm, y_mm });
+        }
+    }
+    samples
 }

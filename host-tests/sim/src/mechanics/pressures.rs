@@ -14,12 +14,10 @@
 //! Force Distribution", ICRA 2003.
 
 use crate::effects::contact::Named;
-use crate::mechanics::shape;
 use crate::setup::{Setup, Tip};
 use core::f64::consts::PI;
 use fingertip::shipped::{COLUMNS, ROWS};
 
-/// Pressures on the taxels of a row.
 type Row = [f64; COLUMNS];
 /// Distance of knots in the square root of the indentation, sqrt(mm): the rim moves 0.07 mm per knot.
 const ROOT: f64 = 1.0 / 64.0;
@@ -38,7 +36,7 @@ pub struct Pressures {
     /// Knots by place of the centre and root of the indentation. The first root mirrors the one after 0.
     knots: Vec<Vec<Knot>>,
     /// Points of a shaped surface by place of the centre, from the first contact there on.
-    points: Vec<Option<shape::Points>>,
+    points: Vec<Option<Points>>,
 }
 
 /// Mean pressures on all taxels as shares of the peak, once they are computed.
@@ -54,7 +52,6 @@ pub struct Between {
 }
 
 impl Between {
-    /// No contact.
     pub const NOTHING: Self = Self { root: 0, weights: [0.0; 4], peak_kpa: 0.0, shift_mm: 0.0 };
 }
 
@@ -146,7 +143,7 @@ impl Pressures {
                 if d_mm == 0.0 {
                     Box::new([[0.0; COLUMNS]; ROWS])
                 } else if effects.shaped() {
-                    let points = points.get_or_insert_with(|| shape::Points::of(effects, tip, cells()));
+                    let points = points.get_or_insert_with(|| Points::of(effects, tip, cells()));
                     by_row(points.means(d_mm).map(|share| share * tip.radius_mm / d_mm))
                 } else {
                     let (flattened, peak_kpa) = (tip.flattened(d_mm), tip.modulus_kpa * d_mm / tip.radius_mm);
@@ -179,6 +176,51 @@ fn weigh(place: f64) -> (usize, [f64; 4]) {
         0.5 * (t3 - t2),
     ];
     (knot as usize, weights)
+}
+
+/// Samples along the side of a taxel.
+const ALONG: usize = 16;
+
+/// Places on the taxels, by the midpoints of their squares: the indentation at which the tip touches there, mm, and 1/L.
+pub struct Points {
+    clearance_mm: Vec<f64>,
+    per_length: Vec<f64>,
+}
+
+impl Points {
+    /// Points of the taxels of these squares.
+    pub fn of(effects: &Named, tip: &Tip, cells: impl Iterator<Item = Cell>) -> Self {
+        let at = |side: [f64; 2], n: usize| side[0] + (side[1] - side[0]) * (n as f64 + 0.5) / ALONG as f64;
+        let (mut clearance_mm, mut per_length) = (Vec::new(), Vec::new());
+        for cell in cells {
+            for (i, j) in (0..ALONG).flat_map(|i| (0..ALONG).map(move |j| (i, j))) {
+                let (x_mm, y_mm) = (at(cell.x_mm, i), at(cell.y_mm, j));
+                let length_mm = (tip.radius_mm * tip.radius_mm - x_mm * x_mm - y_mm * y_mm).max(0.0).sqrt();
+                let reached_mm = length_mm + effects.height_mm(x_mm, y_mm, tip.radius_mm);
+                clearance_mm.push(tip.radius_mm - reached_mm);
+                // At the rim of the tip nothing is left to compress.
+                per_length.push(if length_mm > 0.0 { 1.0 / length_mm } else { 0.0 });
+            }
+        }
+        Self { clearance_mm, per_length }
+    }
+
+    /// Mean pressure on each taxel at an indentation, as shares of Y, in the order of the squares.
+    pub fn means(&self, d_mm: f64) -> impl Iterator<Item = f64> {
+        /// Sums side by side, which the processor adds at once.
+        const LANES: usize = 8;
+        let taxels = self.clearance_mm.chunks_exact(ALONG * ALONG).zip(self.per_length.chunks_exact(ALONG * ALONG));
+        taxels.map(move |(clearance_mm, per_length)| {
+            let mut sums = [0.0; LANES];
+            for (clearances, lengths) in clearance_mm.chunks_exact(LANES).zip(per_length.chunks_exact(LANES)) {
+                for lane in 0..LANES {
+                    let compressed = (d_mm - clearances[lane]).max(0.0) * lengths[lane];
+                    sums[lane] += compressed.min(Tip::DEEPEST);
+                }
+            }
+            sums.iter().sum::<f64>() / (ALONG * ALONG) as f64
+        })
+    }
 }
 
 /// Gauss-Legendre nodes and weights on -1..1, 3 points: 0 and sqrt(3/5); 5/9, 8/9, 5/9.

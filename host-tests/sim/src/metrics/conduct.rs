@@ -1,8 +1,7 @@
 //! Conduct of a finger: what it must never do, and its holds and rests. Only the true state of the finger counts, never
 //! what the controller reports.
 
-use super::finger::{duty, newtons, trimmed};
-use super::response::{AtGoal, note};
+use super::finger::{AtGoal, duty, newtons, note, trimmed};
 use crate::watch::Step;
 use fingertip::params::Params;
 use serde::{Deserialize, Serialize};
@@ -21,7 +20,6 @@ const LAST_S: f64 = 0.2;
 const JUDGED_S: f64 = 0.4;
 const JUDGED_TOUCH_S: f64 = 0.22;
 
-/// True state at a step.
 #[derive(Clone, Copy, Debug)]
 struct Sample {
     time_s: f64,

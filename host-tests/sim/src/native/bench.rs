@@ -2,9 +2,8 @@
 //! scene around it can be exchanged while its controller stays, as a user moves finger and plate between two presses.
 //! The finger of the plant ([`crate::plant`]) can also be broken and moved.
 
-use crate::bridge::Bridge;
 use crate::effects::Set;
-use crate::mechanics::finger::Finger;
+use crate::mechanics::{Bridge, Finger};
 use crate::native::{Begun, Board, SimError, Unit};
 use crate::plant::{Faults, Reference};
 use crate::scene::{Scene, read};

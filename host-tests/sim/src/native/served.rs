@@ -5,8 +5,8 @@
 //! parameters make a new configuration, and saved ones survive a reboot. Not simulated are the time of bytes on the
 //! line, and the time in which the microcontroller starts, saves and answers (loop times read 0).
 
-use crate::bridge::Bridge;
 use crate::effects::Set;
+use crate::mechanics::Bridge;
 use crate::native::{Begun, Board, SimError};
 use crate::scene::Scene;
 use crate::watch::Truth;

@@ -3,10 +3,9 @@
 use crate::events::{EVENT, KINDS, own_keys};
 use crate::population::draw::{self, Draw, Drawn};
 use crate::population::{Counted, Events, Place, Population};
-use crate::scene::library;
 use crate::scene::reader::{SceneError, SceneErrors, did_you_mean, item_span, key_span, not_toml};
 use crate::scene::tables::{EXPECT, Key, Kind, ROOT, SCRIPT, TABLES};
-use crate::{metrics, registry};
+use crate::{effects, metrics, scene};
 use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -15,14 +14,12 @@ use toml_edit::{ArrayOfTables, Document, DocumentMut, InlineTable, Item, Table, 
 /// Place and text of a mistake, and allowed values.
 pub type Wrong = (Range<usize>, String, String);
 
-/// Names of the draws.
 pub const WAYS: [&str; 6] = ["uniform", "log_uniform", "normal", "choice", "is", "by"];
 const EXAMPLES: &str = "{ uniform = [1, 10] }, { log_uniform = [0.3, 3] }, { normal = [0, 0.05] } (mean, deviation), \
     { choice = [256, 512], weights = [1, 2] }, { is = \"1000 * modulus_kpa\" }, { by = \"thing\", ball = 0.05, otherwise = 0 }; \
     with follows = \"magnitude\" or \"1 / magnitude\"";
 
 impl Parts {
-    /// Reads a draw or a constant.
     pub fn draw(&self, value: &Value) -> Result<Draw, Wrong> {
         let number = number(value).map(Drawn::Number);
         match (value.as_inline_table(), number.or_else(|| value.as_str().map(|word| Drawn::Word(word.into())))) {
@@ -153,7 +150,6 @@ fn ends(value: &Value) -> Result<[f64; 2], Wrong> {
     Ok([low, high])
 }
 
-/// Reads a finite number.
 pub fn number(value: &Value) -> Option<f64> {
     value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64)).filter(|number| number.is_finite())
 }
@@ -177,7 +173,7 @@ pub fn folder() -> PathBuf {
 
 /// Loads a population by its path, or by its name in the project. The error is for people.
 pub fn load(name: &str) -> Result<Population, String> {
-    let (path, text) = library::find(&folder(), "population", name)?;
+    let (path, text) = scene::find(&folder(), "population", name)?;
     let file = path.to_string_lossy();
     let over: DocumentMut =
         text.parse().map_err(|error: toml_edit::TomlError| format!("{file}: this is not TOML: {error}"))?;
@@ -186,7 +182,7 @@ pub fn load(name: &str) -> Result<Population, String> {
     let beside = path.with_file_name(base).with_extension("toml");
     let found = if beside.is_file() { beside } else { folder().join(base).with_extension("toml") };
     let told = |why: String| format!("{file} extends {base}: {why}");
-    let unknown = |error| told(library::unknown(&folder(), "population", base, &error));
+    let unknown = |error| told(scene::unknown(&folder(), "population", base, &error));
     let text = fs::read_to_string(&found).map_err(unknown)?;
     let whole: Result<DocumentMut, toml_edit::TomlError> = text.parse();
     if whole.as_ref().is_ok_and(|whole| whole.contains_key("extends")) {
@@ -475,7 +471,6 @@ fn own_text(root: &Table, name: &str) -> Vec<Range<usize>> {
     }
 }
 
-/// Number of events of a finger.
 const COUNT: Key = Key { name: "count", about: "", kind: Kind::Whole { min: 0, max: 100, default: None } };
 
 fn is_table(key: &str) -> bool {
@@ -498,7 +493,7 @@ fn described(path: &str) -> Option<&'static Key> {
         "event" | "events" => EVENT.keys,
         name => match TABLES.iter().chain(&KINDS).find(|table| table.name == name) {
             Some(table) => table.keys,
-            None => registry::all().find(|effect| effect.name == name)?.keys,
+            None => effects::all().find(|effect| effect.name == name)?.keys,
         },
     };
     keys.iter().find(|key| key.name == name)

@@ -34,7 +34,6 @@ pub struct Report {
     pub fingers: Vec<Ran>,
 }
 
-/// Result of a finger.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ran {
     /// Number of the finger, from 1.
@@ -43,7 +42,6 @@ pub struct Ran {
     pub inside: bool,
     pub drawn: Map<String, Value>,
     pub promises: Vec<Promise>,
-    /// Forces that were held.
     pub holds: Vec<Hold>,
     /// All metrics; null if the run has none.
     pub metrics: Map<String, Value>,
@@ -117,7 +115,6 @@ pub(super) fn id(population: &Population, board: &str, seed: u64, of_fingers: us
 }
 
 impl Report {
-    /// Report of these fingers, in order.
     pub fn new(population: &Population, board: &str, seed: u64, of_fingers: usize, fingers: Vec<Ran>) -> Self {
         let id = id(population, board, seed, of_fingers);
         let mut report = Self {
@@ -223,7 +220,6 @@ impl Report {
         fingers
     }
 
-    /// Returns the report for scripts.
     pub fn json(&self) -> Result<String, RunError> {
         Ok(serde_json::to_string_pretty(self)? + "\n")
     }
@@ -234,7 +230,6 @@ impl Report {
     }
 }
 
-/// A promise over all fingers.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
     #[serde(flatten)]

@@ -131,7 +131,6 @@ fn ranges(lines: &mut [Curve]) -> ([f64; 2], [f64; 2]) {
     ([0.0, if end > 0.0 { end } else { 1e-3 }], around(low, high))
 }
 
-/// Range of an axis around values.
 pub fn around(low: f64, high: f64) -> [f64; 2] {
     if low > high {
         return [0.0, 1.0];
@@ -180,10 +179,8 @@ pub fn strip(Strip(rows): &Strip, times: &[f64]) -> Markup {
 }
 
 const MAPS: usize = 10;
-/// Steps of the scale.
 const STEPS: u32 = 20;
 
-/// Maps of a finger.
 pub fn pressures(tracks: &Tracks) -> Markup {
     let all = &tracks.instants;
     let full_kpa = all.iter().flat_map(|at| at.true_kpa.iter().flatten()).copied().fold(1.0, f64::max);

@@ -1,9 +1,8 @@
 //! Data of a report, collected during the run: a bounded number of stretches at any length of the run, and the modes,
 //! faults and limits that occurred.
 
-use crate::agreement::Path;
 use crate::metrics::{duty, newtons};
-use crate::watch::{Step, Watch};
+use crate::watch::{Path, Step, Watch};
 use fingertip::pipeline::Status;
 use fingertip::shipped::{COLUMNS, Frame, ROWS};
 use fingertip::state::{Fault, Limits, Mode};
@@ -150,7 +149,6 @@ pub struct Tracks {
 }
 
 impl Tracks {
-    /// Modes, faults and limits.
     pub fn strip(&self) -> Strip {
         Strip::of(&self.states)
     }
@@ -162,12 +160,10 @@ pub struct Trace {
     duration_s: f64,
     /// Path of another board, if the difference from it is drawn too.
     pub other: Option<Path>,
-    /// Fingers in order.
     pub fingers: Vec<Tracks>,
 }
 
 impl Trace {
-    /// Trace of a run of this length.
     pub fn new(duration_s: f64) -> Self {
         Self { duration_s, other: None, fingers: Vec::new() }
     }
@@ -267,7 +263,6 @@ const NAMES: [(u32, &str, &[&str]); 3] = [
 pub struct States(u64);
 
 impl States {
-    /// Adds those of a step.
     pub fn add(&mut self, status: &Status) {
         let Status { mode, fault, limits, .. } = *status;
         self.set(0, mode as u32);
@@ -298,7 +293,6 @@ pub struct Row {
 pub struct Strip(pub Vec<Row>);
 
 impl Strip {
-    /// Strip of consecutive stretches.
     pub fn of(states: &[States]) -> Self {
         let row = |bit: u32| {
             let spans = spans(states, bit);

@@ -1,9 +1,9 @@
 //! Reader of scenes. It is strict: everything that is not described is an error. It reports all errors of a text
 //! together.
 
+use crate::effects::{self, NamedEffect};
 use crate::events::{EVENT, Event, KINDS};
 use crate::metrics;
-use crate::registry::{self, Named};
 use crate::scene::tables::{EXPECT, Key, Kind, MANY, ROOT, SCRIPT, TABLES, Table, Value, Values};
 use crate::scene::{Bound, Goal, Scene};
 use fingertip::shipped::Config;
@@ -155,9 +155,9 @@ impl Reader<'_> {
         script
     }
 
-    fn events(&mut self, root: &dyn TableLike, duration_s: f64, effects: &[Named]) -> Vec<Event> {
+    fn events(&mut self, root: &dyn TableLike, duration_s: f64, effects: &[NamedEffect]) -> Vec<Event> {
         let mut events: Vec<Event> = Vec::new();
-        let massive = |named: &Named| named.effect.name == "object_mass" && named.values.number("mass_g") > 0.0;
+        let massive = |named: &NamedEffect| named.effect.name == "object_mass" && named.values.number("mass_g") > 0.0;
         let movable = effects.iter().any(massive);
         for (given, at) in self.many(&EVENT, root) {
             let Some(head) = self.values(&EVENT, given, at.clone(), true) else { continue };
@@ -179,19 +179,19 @@ impl Reader<'_> {
         events
     }
 
-    fn effects(&mut self, root: &dyn TableLike) -> Vec<Named> {
+    fn effects(&mut self, root: &dyn TableLike) -> Vec<NamedEffect> {
         let Some(item) = root.get("effects") else { return Vec::new() };
         let Some(given) = item.as_table_like() else {
             let allowed = "[effects.NAME] for each effect";
             self.error(key_span(root, "effects"), "`effects` is a table of tables".into(), allowed.into());
             return Vec::new();
         };
-        for (name, _) in given.iter().filter(|(name, _)| registry::all().all(|effect| effect.name != *name)) {
-            let names: Vec<_> = registry::all().map(|effect| effect.name).collect();
+        for (name, _) in given.iter().filter(|(name, _)| effects::all().all(|effect| effect.name != *name)) {
+            let names: Vec<_> = effects::all().map(|effect| effect.name).collect();
             self.unknown(&format!("effect `{name}`"), name, key_span(given, name), names.iter().copied());
         }
         let mut named = Vec::new();
-        for effect in registry::all() {
+        for effect in effects::all() {
             let Some(item) = given.get(effect.name) else { continue };
             let at = key_span(given, effect.name);
             let Some(table) = item.as_table_like() else {
@@ -200,7 +200,7 @@ impl Reader<'_> {
                 continue;
             };
             let described = Table { name: effect.name, about: effect.about, keys: effect.keys };
-            named.extend(self.values(&described, table, at, false).map(|values| Named { effect, values }));
+            named.extend(self.values(&described, table, at, false).map(|values| NamedEffect { effect, values }));
         }
         named
     }

@@ -32,7 +32,6 @@ const fn number(name: &'static str, about: &'static str, min: f64, max: f64, def
     Key::number(name, about, min, max, default)
 }
 
-/// Keys before the first table.
 pub const ROOT: Table = Table {
     name: "",
     about: "Keys before the first table.",
@@ -43,7 +42,6 @@ pub const ROOT: Table = Table {
     ],
 };
 
-/// An entry of the script.
 pub const SCRIPT: Table = Table {
     name: "script",
     about: "Goals of the host, in order of time; may occur many times.",
@@ -53,7 +51,6 @@ pub const SCRIPT: Table = Table {
     ],
 };
 
-/// Bound on a metric.
 pub const EXPECT: Table = Table {
     name: "expect",
     about: "Bound on a metric by `min`, `max` or both; may occur many times.",
@@ -173,7 +170,6 @@ pub const TABLES: &[Table] = &[
     },
 ];
 
-/// Keys for the parameters of the core.
 const CONTROLLER: [Key; Params::COUNT] = {
     let mut keys = [number("", "", 0.0, 0.0, 0.0); Params::COUNT];
     let mut place = 0;
@@ -197,13 +193,11 @@ pub struct Key {
 /// Allowed values of a key. A default of `None` makes the key required.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
-    /// A number within bounds.
     Number {
         min: f64,
         max: f64,
         default: Option<f64>,
     },
-    /// A whole number within bounds.
     Whole {
         min: i64,
         max: i64,

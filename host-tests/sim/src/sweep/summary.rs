@@ -4,7 +4,7 @@ use crate::metrics::shown;
 use crate::part::cannot_write;
 use crate::report::around;
 use crate::run::RunError;
-use crate::sweep::files::{DIGEST, EXPECT, PASSED, SEED};
+use crate::sweep::{DIGEST, EXPECT, PASSED, SEED};
 use csv::Writer;
 use output::kept::Lock;
 use output::plot::{Curve, Curves, PlotError, curves};
@@ -124,7 +124,6 @@ impl Table {
         text
     }
 
-    /// True if every run held its bounds.
     pub fn passed(&self) -> bool {
         let passed = self.place(PASSED);
         self.rows.iter().all(|row| row[passed] == "1")
@@ -134,7 +133,6 @@ impl Table {
         self.head.iter().position(|name| name == column).unwrap_or(0)
     }
 
-    /// Columns of the varied keys.
     pub(super) fn varied(&self) -> core::ops::Range<usize> {
         3..self.place(SEED)
     }
@@ -144,7 +142,6 @@ impl Table {
         self.place(DIGEST) + 1..end
     }
 
-    /// Limits of the bound on a metric.
     pub(super) fn expected(&self, metric: &str) -> Option<[Option<f64>; 2]> {
         let place = self.head.iter().position(|name| name.strip_prefix(EXPECT) == Some(metric))?;
         let (min, max) = self.rows.first()?[place].split_once("..")?;

@@ -1,17 +1,11 @@
 //! Texts that are read and files that are written: scenes and populations, the library, reports, recordings, sweeps.
 
-mod demo;
-mod draws;
 mod interrupted;
 mod library;
-mod mistakes;
+mod metrics;
 mod population;
-mod promises;
 mod reader;
-mod recorded;
-mod refused;
 mod report;
-mod response;
 mod swept;
 
 use fingertip::command::Command;

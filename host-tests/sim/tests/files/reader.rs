@@ -6,15 +6,14 @@ use fingertip::params::Params;
 use sim::cli::load;
 use sim::events::{EVENT, KINDS};
 use sim::scene::tables::{EXPECT, Key, Kind, ROOT, SCRIPT, TABLES};
-use sim::scene::text::{self, set};
-use sim::scene::{self, Scene, SceneErrors, read};
-use sim::{metrics, registry};
+use sim::scene::{self, Scene, SceneErrors, read, set};
+use sim::{effects, metrics, population};
 use std::collections::BTreeSet;
 
 /// Names and texts of the library.
 fn library() -> Vec<(String, String)> {
-    let names = scene::library::names().unwrap();
-    names.into_iter().map(|name| (name.clone(), scene::library::text(&name).unwrap().1)).collect()
+    let names = scene::library_names().unwrap();
+    names.into_iter().map(|name| (name.clone(), scene::library_text(&name).unwrap().1)).collect()
 }
 
 fn read_it(text: &str) -> Result<Scene, SceneErrors> {
@@ -31,9 +30,9 @@ fn every_scene_reads_and_writes_the_same() {
     let event = "about = \"\"\nduration_s = 1\n[[event]]\nkind = \"encoder_slip\"\nat_s = 0.5\nby_counts = -4\n";
     for (name, text) in library().into_iter().chain([("event".into(), event.into())]) {
         let once = read_it(&text).unwrap_or_else(|errors| panic!("{name}: {errors}"));
-        let written = text::write(&once);
+        let written = scene::write(&once);
         let again = read_it(&written).unwrap_or_else(|errors| panic!("{name}: {errors}"));
-        assert_eq!(text::write(&again), written);
+        assert_eq!(scene::write(&again), written);
         let named = |scene: &Scene| {
             scene.effects.iter().map(|named| (named.effect.name, named.values.clone())).collect::<Vec<_>>()
         };
@@ -121,7 +120,7 @@ fn any_setting_is_answered() {
     for _ in 0..5_000 {
         let mut some = |most| (0..rng.usize(0..most)).map(|_| TOKENS[rng.usize(0..TOKENS.len())]).collect::<String>();
         let (place, value) = (some(5), some(3));
-        if let Ok(changed) = text::set(&scenes[0].1, &place, &value) {
+        if let Ok(changed) = scene::set(&scenes[0].1, &place, &value) {
             answers(&changed);
         }
     }
@@ -137,7 +136,7 @@ const PLAIN: &[&str] = &[
 fn described() -> Vec<(&'static str, &'static Key)> {
     let tables =
         TABLES.iter().chain([&ROOT, &SCRIPT, &EVENT, &EXPECT]).chain(&KINDS).map(|table| (table.name, table.keys));
-    let effects = registry::all().map(|effect| (effect.name, effect.keys));
+    let effects = effects::all().map(|effect| (effect.name, effect.keys));
     tables.chain(effects).flat_map(|(name, keys)| keys.iter().map(move |key| (name, key))).collect()
 }
 
@@ -192,8 +191,8 @@ fn every_default_lies_within_its_range_and_every_key_says_what_it_is() {
 #[test]
 fn every_effect_is_described_and_no_name_comes_twice() {
     let distinct = |names: Vec<&str>| BTreeSet::from_iter(names.iter().copied()).len() == names.len();
-    assert!(distinct(registry::all().map(|effect| effect.name).collect()));
-    for effect in registry::all() {
+    assert!(distinct(effects::all().map(|effect| effect.name).collect()));
+    for effect in effects::all() {
         assert!(distinct(effect.keys.iter().map(|key| key.name).collect()), "{}", effect.name);
         assert!(!effect.equations.is_empty() && !effect.state.is_empty() && !effect.reference.is_empty());
     }
@@ -227,4 +226,47 @@ fn what_cannot_be_set_is_told() {
     assert!(error("tip.radius_mm").contains("TABLE.KEY=VALUE"));
     assert!(load("wal", &[], None).expect_err("no scene").contains("did you mean `wall`?"));
     assert_eq!(load("wall", &[], Some(12)).unwrap().seed, 12);
+}
+
+// Messages about mistakes in scenes and populations. The lists hold texts, from line 3 of their files on, and the whole
+// message for each; `[...]` in a message stands for any text.
+
+/// Checks the messages of a list for texts that begin with a head.
+fn check(list: &str, head: &str, read: impl Fn(&str) -> Result<(), String>) {
+    let mut wrong = Vec::new();
+    for case in list.split("=== ").skip(1) {
+        let (lines, expected) = case.split_once('\n').and_then(|(_, case)| case.split_once("---\n")).expect("a case");
+        let message = read(&format!("{head}{lines}")).expect_err(case);
+        let (front, end) = expected.trim_end().split_once("[...]").unwrap_or((expected.trim_end(), ""));
+        let fits = message
+            .strip_prefix(front)
+            .is_some_and(|rest| rest == end || expected.contains("[...]") && rest.ends_with(end));
+        wrong.extend((!fits).then(|| format!("{case}instead:\n{message}")));
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n\n"));
+}
+
+#[test]
+fn mistakes_in_scenes() {
+    let names = metrics::names();
+    check(include_str!("mistakes_in_scenes.txt"), "about = \"a test\"\nduration_s = 1\n", |text| {
+        scene::read("my.toml", text, &names).map(drop).map_err(|errors| errors.to_string())
+    });
+}
+
+#[test]
+fn mistakes_in_populations() {
+    check(include_str!("mistakes_in_populations.txt"), "about = \"a test\"\nduration_s = 0.06\n", |text| {
+        population::read("my.toml", text).map(drop).map_err(|errors| errors.to_string())
+    });
+}
+
+#[test]
+fn all_mistakes_come_at_once_in_the_order_of_the_text() {
+    let text =
+        "about = 3\nseeds = 4\n[tip]\nradius_mm = 100\n[effects.noise]\nrms = 1\n[[expect]]\nmetric = \"x\"\nmin = 1\n";
+    let errors = scene::read("my.toml", text, &metrics::names()).expect_err("six mistakes").0;
+    let places: Vec<_> = errors.iter().map(|error| (error.line, error.column)).collect();
+    // `duration_s` is missing: reported at the beginning.
+    assert_eq!(places, [(1, 1), (1, 9), (2, 1), (4, 13), (6, 1), (8, 10)]);
 }

@@ -5,14 +5,11 @@
 //! --nocapture` prints the largest value of each group of cases.
 
 mod goals;
-mod instants;
 mod measure;
-mod memory;
 mod ordinary;
 mod sequences;
 mod served;
 mod signal;
-mod worn;
 
 use fastrand::Rng;
 use fingertip::config::newtons;

@@ -3,21 +3,18 @@
 //! Effects that a scene does not name must cost nothing, and effects without magnitude must change nothing. This file
 //! also has the functions that the tests share.
 
-mod clock;
 mod contact;
 mod drive;
-mod energy;
 mod events;
 mod link;
 mod plant;
 mod sensor;
 
 use fingertip::state::Mode;
-use sim::bridge::Bridge;
-use sim::effects::{Named, Part, Set};
+use sim::effects::{self, Named, Part, Set};
+use sim::mechanics::Bridge;
 use sim::native::simulate_with;
-use sim::registry;
-use sim::scene::{Scene, read, text};
+use sim::scene::{self, Scene, read};
 use sim::watch::{Cost, Step, Summary, Truth, Watch};
 use sim::world::{Surroundings, World};
 
@@ -161,12 +158,12 @@ fn compiled_in_but_not_named_changes_no_bit_and_is_never_called() {
 #[test]
 fn effects_without_magnitude_change_no_bit_and_are_called_alike_alone_and_together() {
     let plain = run_script::<()>("").digest;
-    let all = run_script::<Named>(&registry::all().map(text::zero).collect::<String>());
-    assert_eq!((all.digest.as_str(), all.ledger.len()), (plain.as_str(), registry::all().count()));
+    let all = run_script::<Named>(&effects::all().map(scene::zero).collect::<String>());
+    assert_eq!((all.digest.as_str(), all.ledger.len()), (plain.as_str(), effects::all().count()));
     // Calls of one do not depend on which others are named: cost is linear in their number, to the call.
     for cost in &all.ledger {
-        let effect = registry::all().find(|effect| effect.name == cost.effect).unwrap();
-        let alone = run_script::<Named>(&text::zero(effect));
+        let effect = effects::all().find(|effect| effect.name == cost.effect).unwrap();
+        let alone = run_script::<Named>(&scene::zero(effect));
         let [Cost { evaluations, .. }] = alone.ledger[..] else { panic!("{}: {:?}", effect.name, alone.ledger) };
         assert_eq!((&alone.digest, evaluations), (&plain, cost.evaluations), "{}", effect.name);
         assert!(evaluations > 0, "{} was not called", effect.name);
@@ -175,7 +172,7 @@ fn effects_without_magnitude_change_no_bit_and_are_called_alike_alone_and_togeth
 
 #[test]
 fn every_effect_by_its_default_runs_to_the_end_and_alike_each_time() {
-    for effect in registry::all() {
+    for effect in effects::all() {
         let table = format!("[effects.{}]\n", effect.name);
         let once = run_script::<Named>(&table);
         assert_eq!(once.digest, run_script::<Named>(&table).digest, "{}", effect.name);
@@ -189,7 +186,7 @@ fn scene(text: &str) -> Scene {
 
 /// The first effect of these tables.
 fn part(tables: &str, seed: u64) -> Part {
-    registry::build(&scene(&format!("duration_s = 1.0\n{tables}")).effects, seed, 0).next().expect("an effect").1
+    effects::build(&scene(&format!("duration_s = 1.0\n{tables}")).effects, seed, 0).next().expect("an effect").1
 }
 
 /// Keeps the last step.

@@ -1,18 +1,19 @@
 //! The board's side of a scene: the world behind the pins, and the true state at each frame.
 
-use super::joint::Joint;
-use crate::inside::ROOM_C;
+use crate::bench::STEP_NS;
+use crate::converter::ROOM_C;
 use fingertip::frame::Sense;
 use fingertip::shipped::{COLUMNS, Frame, ROWS, SLOTS};
 use sim::SimError;
-use sim::bridge::Bridge;
 use sim::effects::sensor::{self, Readout, Stages as _};
 use sim::effects::{Named, Parts, Set, link};
+use sim::mechanics::Bridge;
 use sim::scene::Scene;
 use sim::setup::Array;
 use sim::watch::{Cost, Truth};
 use sim::world::{Surroundings, World};
 use std::collections::VecDeque;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 /// A frame as the converters made it, and the world at its end.
 #[derive(Clone, Copy, Debug)]
@@ -218,5 +219,260 @@ impl Finger {
     /// Costs of the effects on sensor, contact and drive.
     pub fn costs(&self) -> Vec<Cost> {
         self.joint.costs(|contact, drive| Named::costs(&self.sensor, contact, drive, &link::Named::default()))
+    }
+}
+
+// The world of a scene, which the fingers' boards share.
+//
+// Each board runs on a separate thread. A single board advances the world whenever it must. Two boards meet at every
+// step of the world's grid: the last to arrive advances the world, and none continues before. The world between two
+// meetings does not depend on which board arrives first, so a run repeats exactly. The mean duty acts on the whole
+// step.
+
+/// The world, and the progress of each board.
+struct SharedWorld {
+    world: World<Named>,
+    bridges: Vec<Bridge>,
+    reached_ns: Vec<u64>,
+    moved_to_ns: u64,
+    now_s: f64,
+    /// True once a board has ended: the others no longer wait for it.
+    closed: bool,
+}
+
+struct Meeting {
+    state: Mutex<SharedWorld>,
+    moved: Condvar,
+    longest_s: f64,
+    grid_ns: u64,
+}
+
+impl Meeting {
+    fn lock(&self) -> MutexGuard<'_, SharedWorld> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A finger's hold on the world.
+pub struct Joint {
+    finger: usize,
+    meeting: Arc<Meeting>,
+    shared: bool,
+    held: Held,
+}
+
+/// Bridge states since the last meeting.
+struct Held {
+    from_ns: u64,
+    until_ns: u64,
+    duty_ns: f64,
+    last: Bridge,
+}
+
+impl Held {
+    fn hold(&mut self, to_ns: u64, bridge: Bridge) {
+        if let Bridge::Driven { duty } = bridge {
+            self.duty_ns += duty * to_ns.saturating_sub(self.until_ns) as f64;
+        }
+        (self.until_ns, self.last) = (self.until_ns.max(to_ns), bridge);
+    }
+
+    /// Bridge state with the mean duty since the last meeting; it coasts if it coasted at the end.
+    fn mean(&mut self) -> Bridge {
+        let duty = std::mem::take(&mut self.duty_ns) / (self.until_ns - self.from_ns) as f64;
+        self.from_ns = self.until_ns;
+        match self.last {
+            Bridge::Coast => Bridge::Coast,
+            Bridge::Driven { .. } => Bridge::Driven { duty },
+        }
+    }
+}
+
+/// Steps of the grid that fit a millisecond.
+const GRIDS_NS: [u64; 3] = [100_000, 50_000, 20_000];
+
+impl Drop for Joint {
+    fn drop(&mut self) {
+        self.meeting.lock().closed = true;
+        self.meeting.moved.notify_all();
+    }
+}
+
+impl Joint {
+    /// A hold for each finger of a world at scene time `now_s`.
+    ///
+    /// # Errors
+    /// The world's step is too long.
+    pub fn all(scene: &Scene, world: World<Named>, now_s: f64) -> Result<Vec<Self>, SimError> {
+        let longest_s = scene.table("world").number("step_us") * 1e-6;
+        world.check_step(longest_s)?;
+        let fingers = world.fingers().len();
+        let state = SharedWorld {
+            world,
+            bridges: vec![Bridge::Coast; fingers],
+            reached_ns: vec![0; fingers],
+            moved_to_ns: 0,
+            now_s,
+            closed: false,
+        };
+        let longest_ns = (longest_s * 1e9).round() as u64;
+        let grid_ns = GRIDS_NS.into_iter().find(|grid_ns| *grid_ns <= longest_ns).unwrap_or(STEP_NS);
+        let meeting = Arc::new(Meeting { state: Mutex::new(state), moved: Condvar::new(), longest_s, grid_ns });
+        let joint = |finger| Self {
+            finger,
+            meeting: meeting.clone(),
+            shared: fingers > 1,
+            held: Held { from_ns: 0, until_ns: 0, duty_ns: 0.0, last: Bridge::Coast },
+        };
+        Ok((0..fingers).map(joint).collect())
+    }
+
+    /// The world's grid: it moves on at least that often.
+    pub fn grid_ns(&self) -> u64 {
+        self.meeting.grid_ns
+    }
+
+    /// Goes on to an instant of the board with this finger's bridge held. Where fingers share the world it moves by
+    /// whole steps of the grid.
+    pub fn advance(&mut self, to_ns: u64, clock: &Clock, bridge: Bridge) {
+        let to_s = clock.time_s(to_ns);
+        if !self.shared {
+            let mut state = self.meeting.lock();
+            state.bridges[self.finger] = bridge;
+            return state.advance(to_s, self.meeting.longest_s);
+        }
+        if to_s <= self.now_s() {
+            // The world is frozen: no finger waits for another.
+            self.held = Held { from_ns: to_ns, until_ns: to_ns, duty_ns: 0.0, last: bridge };
+            return;
+        }
+        // The emulator may come to an instant of the grid an instruction late, with something done there first.
+        while let next_ns = (self.held.from_ns / self.meeting.grid_ns + 1) * self.meeting.grid_ns
+            && next_ns <= to_ns
+        {
+            self.held.hold(next_ns, bridge);
+            let mean = self.held.mean();
+            self.meet(next_ns, clock.time_s(next_ns), mean);
+        }
+        self.held.hold(to_ns, bridge);
+    }
+
+    fn meet(&self, to_ns: u64, to_s: f64, bridge: Bridge) {
+        let mut state = self.meeting.lock();
+        state.bridges[self.finger] = bridge;
+        state.reached_ns[self.finger] = to_ns;
+        if state.reached_ns.iter().all(|reached_ns| *reached_ns >= to_ns) {
+            state.advance(to_s, self.meeting.longest_s);
+            state.moved_to_ns = to_ns;
+            self.meeting.moved.notify_all();
+        }
+        while state.moved_to_ns < to_ns && !state.closed {
+            state = self.meeting.moved.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    /// Present scene time of the world, s.
+    pub fn now_s(&self) -> f64 {
+        self.meeting.lock().now_s
+    }
+
+    /// Time by which the world lags behind a scene time, s; at least 0.
+    fn behind_s(state: &SharedWorld, time_s: f64) -> f64 {
+        (time_s - state.now_s).max(0.0)
+    }
+
+    /// The supply at the bridge.
+    pub fn supply_v(&self) -> f64 {
+        self.meeting.lock().world.fingers()[self.finger].supply_v()
+    }
+
+    /// Counts of the encoder at a scene time.
+    pub fn encoder_counts(&self, time_s: f64) -> i32 {
+        let mut state = self.meeting.lock();
+        let ahead_s = Self::behind_s(&state, time_s);
+        state.world.fingers_mut()[self.finger].count_ahead(ahead_s)
+    }
+
+    /// Mean pressures on a row's taxels at a time.
+    pub fn row_kpa(&self, time_s: f64, row: usize) -> [f64; COLUMNS] {
+        let mut state = self.meeting.lock();
+        let off_s = time_s - state.now_s;
+        state.world.row_off_kpa(self.finger, off_s, row)
+    }
+
+    /// Encoder and supply, and the true state.
+    pub fn look(&self, pressures: bool) -> (Sense, Truth) {
+        let world = &mut self.meeting.lock().world;
+        (world.sense(self.finger, 0), world.truth(self.finger, pressures))
+    }
+
+    /// Costs of the effects on contact and drive.
+    pub fn costs(&self, of: impl Fn(&ContactEffects, &DriveEffects) -> Vec<Cost>) -> Vec<Cost> {
+        let state = self.meeting.lock();
+        let finger = &state.world.fingers()[self.finger];
+        of(&finger.contact.effects, &finger.drive)
+    }
+}
+
+type ContactEffects = sim::effects::contact::Named;
+type DriveEffects = sim::effects::drive::Named;
+
+impl SharedWorld {
+    fn advance(&mut self, to_s: f64, longest_s: f64) {
+        let (from_s, dt_s) = (self.now_s, to_s - self.now_s);
+        if dt_s <= 0.0 {
+            return;
+        }
+        let parts = (dt_s / longest_s).ceil().max(1.0);
+        let part_s = dt_s / parts;
+        for part in 0..parts as usize {
+            self.world.advance(from_s + part as f64 * part_s, part_s, &self.bridges);
+        }
+        self.now_s = to_s;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sim::effects::{Parts, Set};
+    use sim::world::Surroundings;
+
+    const DRIVEN: fn(f64) -> Bridge = |duty| Bridge::Driven { duty };
+
+    fn two() -> Vec<Joint> {
+        let text = "about = \"two\"\nduration_s = 1.0\n[hand]\nfingers = 2\n";
+        let scene = sim::scene::read("test.toml", text, &[]).unwrap_or_else(|errors| panic!("{errors}"));
+        let effects = (0..2).map(|finger| Named::of(&scene, finger));
+        let effects = effects.map(|Parts { drive, contact, .. }| (drive, contact)).collect();
+        let world = World::new(&scene.setup(), &Surroundings::of(&scene), effects);
+        Joint::all(&scene, world, 0.0).expect("the world is sound")
+    }
+
+    #[test]
+    fn a_duty_acts_for_as_long_as_it_was_there() {
+        let mut held = Held { from_ns: 0, until_ns: 0, duty_ns: 0.0, last: Bridge::Coast };
+        held.hold(100, DRIVEN(0.5));
+        held.hold(400, DRIVEN(-0.5));
+        assert_eq!(held.mean(), DRIVEN(-0.25));
+        held.hold(500, DRIVEN(0.5));
+        assert_eq!(held.mean(), DRIVEN(0.5));
+        held.hold(600, Bridge::Coast);
+        assert_eq!(held.mean(), Bridge::Coast);
+    }
+
+    #[test]
+    fn boards_meet_though_one_comes_late_to_the_grid() {
+        let mut joints = two();
+        let clock = Clock::new(0);
+        let (grid_ns, mut late) = (joints[0].grid_ns(), joints.remove(1));
+        let mut early = joints.remove(0);
+        std::thread::scope(|scope| {
+            scope.spawn(|| (1..=50).for_each(|step| early.advance(step * grid_ns, &clock, DRIVEN(0.5))));
+            scope.spawn(|| (1..=50).for_each(|step| late.advance(step * grid_ns + 8, &clock, DRIVEN(0.5))));
+        });
+        assert_eq!(early.now_s(), clock.time_s(50 * grid_ns));
+        assert_eq!(late.encoder_counts(early.now_s()), early.encoder_counts(early.now_s()));
+        assert!(early.encoder_counts(early.now_s()) > 10);
     }
 }

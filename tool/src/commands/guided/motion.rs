@@ -12,11 +12,11 @@ use fingertip::pressure::{GAIN_MAX, GAIN_ONE};
 use fingertip::shipped::address;
 use fingertip::state::Mode;
 use serde_json::{Value, json};
-use solve::drift::HeldSeries;
 use solve::gains::Condition;
 use solve::modulus::Modulus;
 use solve::press::Press;
 use solve::record::{self, Reason};
+use solve::scale::HeldSeries;
 use solve::scale::{Held, SWINGS};
 use std::time::{Duration, Instant};
 

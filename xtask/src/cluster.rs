@@ -2,8 +2,8 @@
 
 use crate::console::{self, Console};
 use crate::host::Program;
-use crate::python::{self, Environment};
-use crate::{apt, paths};
+use crate::install::{self, Environment};
+use crate::paths;
 use anyhow::{Context, Result, bail};
 use std::net::TcpListener;
 use std::os::unix::fs::PermissionsExt;
@@ -28,8 +28,8 @@ const CLIENTS: Environment = Environment {
 
 /// Makes sure of the schedulers and of a Python with the rest, and returns its interpreter.
 pub fn ensure(console: &mut Console) -> Result<PathBuf> {
-    apt::ensure(&PACKAGES, "the test of the examples for clusters", console)?;
-    python::environment(&CLIENTS, console)
+    install::packages(&PACKAGES, "the test of the examples for clusters", console)?;
+    install::environment(&CLIENTS, console)
 }
 
 /// Runs a sweep whole and by each example, and compares what they make byte by byte.

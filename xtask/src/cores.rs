@@ -4,7 +4,7 @@ use crate::console::{self, Console};
 use crate::host::{self, Program};
 use crate::image::{self, Image};
 use crate::toolchain::{self, Choice, TARGET};
-use crate::{apt, docs, paths};
+use crate::{docs, install, paths};
 use anyhow::{Context, Result, ensure};
 use std::fmt::Write as _;
 use std::fs;
@@ -165,7 +165,7 @@ pub fn ensure(console: &mut Console) -> Result<()> {
     match paths::find_program(RISCV_PROGRAM) {
         Some(_) => Ok(()),
         // Of the same version as the emulator for Arm: both share files.
-        None => apt::newest(&["qemu-system-riscv"], WHY, console),
+        None => install::newest(&["qemu-system-riscv"], WHY, console),
     }
 }
 
@@ -214,7 +214,7 @@ pub fn ensure_m4(console: &mut Console) -> Result<()> {
     match paths::find_program(M4_EMULATOR) {
         Some(_) => Ok(()),
         // At once the version that the estimates of cycles need: none is installed to be replaced.
-        None => apt::newest(&[M4_EMULATOR], "running the core on an emulated Cortex-M4F", console),
+        None => install::newest(&[M4_EMULATOR], "running the core on an emulated Cortex-M4F", console),
     }
 }
 

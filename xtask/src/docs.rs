@@ -2,7 +2,7 @@
 
 use crate::console::{self, Console};
 use crate::host::{self, Program};
-use crate::python::{self, Environment};
+use crate::install::{self, Environment};
 use crate::toolchain::Choice;
 use crate::{cores, image, paths};
 use anyhow::{Context, Result, bail};
@@ -180,7 +180,7 @@ pub fn deny(console: &mut Console) -> Result<PathBuf> {
     if compiled.is_file() {
         return Ok(compiled);
     }
-    let packed = python::environment(&DENY_PACKAGE, console).map(|python| python.with_file_name(name));
+    let packed = install::environment(&DENY_PACKAGE, console).map(|python| python.with_file_name(name));
     if let Ok(program) = packed
         && program.is_file()
     {

@@ -4,7 +4,7 @@
 use crate::console::{self, Console, IMAGE};
 use crate::host::{self, Program};
 use crate::toolchain::{self, Choice, Toolchain};
-use crate::{apt, image, paths};
+use crate::{image, install, paths};
 use anyhow::{Context, Result, bail};
 use m4_timing::report::{Measured, parse};
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
@@ -151,7 +151,7 @@ pub fn ensure(console: &mut Console) -> Result<()> {
     if version().is_some_and(|version| version >= VERSION_MIN) {
         return Ok(());
     }
-    apt::newest(&[PROGRAM], WHY, console)?;
+    install::newest(&[PROGRAM], WHY, console)?;
     match version() {
         Some(version) if version >= VERSION_MIN => Ok(()),
         found => {

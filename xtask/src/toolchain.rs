@@ -1,7 +1,7 @@
 //! The compiler for the firmware: rustup's bare-metal target, or Debian's Rust where rustup's server is out of reach.
 
 use crate::console::{self, Console};
-use crate::{apt, paths};
+use crate::{install, paths};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::ValueEnum;
 use std::path::PathBuf;
@@ -119,7 +119,7 @@ pub fn ensure_for(choice: Choice, targets: &[&str], why: &str, console: &mut Con
         return Ok(Toolchain::Native);
     }
     // Debian's compiler once taken is taken again: asking an unreachable server each time would cost minutes.
-    if choice == Choice::Auto && Toolchain::Debian.target_dir().is_dir() && apt::all_installed(&DEBIAN_PACKAGES) {
+    if choice == Choice::Auto && Toolchain::Debian.target_dir().is_dir() && install::all_installed(&DEBIAN_PACKAGES) {
         return debian(console);
     }
     let Err(rustup) = add_targets(&missing, why, console) else { return Ok(Toolchain::Native) };
@@ -139,7 +139,7 @@ pub fn ensure_for(choice: Choice, targets: &[&str], why: &str, console: &mut Con
 }
 
 fn debian(console: &mut Console) -> Result<Toolchain> {
-    apt::ensure(&DEBIAN_PACKAGES, "building the firmware without rustup's target", console)?;
+    install::packages(&DEBIAN_PACKAGES, "building the firmware without rustup's target", console)?;
     console.say("Building the firmware with Debian's Rust (rustc-web), with `core` from source.");
     Ok(Toolchain::Debian)
 }

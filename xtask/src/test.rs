@@ -61,7 +61,7 @@ pub fn run(args: &Args, choice: Choice) -> Result<()> {
         let python = install::bus_python(console)?;
         // The wheel's builder reads the sources of every platform, also those that no build here needs.
         console.prepare(console::cargo("fetch").args(["--locked", "--quiet"]))?;
-        let mut command = on_a_board(&["--test", "python"]);
+        let mut command = on_a_board(&["--test", "served"]);
         command.env("FINGERTIP_PYTHON", &python).args(["--", "--ignored"]);
         host::test(&mut command, console)
     });

@@ -6,7 +6,7 @@ use crate::host::{self, Program};
 use crate::toolchain::{self, Choice, Toolchain};
 use crate::{image, install, paths};
 use anyhow::{Context, Result, bail};
-use m4_timing::report::{Measured, parse};
+use m4_timing::meter::{Measured, parse};
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::fmt::Write as _;
 use std::fs;

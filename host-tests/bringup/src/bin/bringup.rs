@@ -13,8 +13,7 @@ mod board;
 mod converters;
 #[path = "../image/flash_times.rs"]
 mod flash_times;
-#[path = "../image/host.rs"]
-mod host;
+
 #[path = "../image/kernels.rs"]
 mod kernels;
 #[path = "../image/loopback.rs"]
@@ -41,6 +40,7 @@ use fingertip::control::Winding;
 use fingertip::link::snapshot::CrashCause;
 use fingertip::pipeline::AcknowledgedRequests;
 use fingertip::shipped::{Config, Pipeline};
+use kernels::host;
 use stages::{Kept, Stage};
 use static_cell::{ConstStaticCell, StaticCell};
 

@@ -6,7 +6,7 @@ use crate::host::{self, Program};
 use crate::image::{self, Image};
 use crate::option_bytes::{self, PAUSE_MS, Probe};
 use crate::toolchain::{self, Choice, Toolchain};
-use crate::{paths, sim, timing};
+use crate::{sim, timing};
 use anyhow::{Context, Result, bail, ensure};
 use clap::ValueEnum;
 use std::fmt::Write as _;
@@ -41,7 +41,7 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
 
 /// Looks for probe-rs before a build, so that nobody waits for an image that cannot be written.
 pub fn need_probe_rs() -> Result<()> {
-    if paths::find_program("probe-rs").is_some() {
+    if host::find_program("probe-rs").is_some() {
         return Ok(());
     }
     bail!(
@@ -279,7 +279,7 @@ pub fn bringup(args: &BringupArgs, choice: Choice, console: &mut Console) -> Res
 /// The kernels' estimated cycles, with the flash's wait states, of the inputs that the image has: a file with a line
 /// each.
 fn estimates(toolchain: Toolchain, console: &mut Console) -> Result<PathBuf> {
-    let folder = paths::made("study")?;
+    let folder = host::made("study")?;
     let [kept, full, file] = ["kept.bin", "few.bin", "few.txt"].map(|name| folder.join(name));
     let mut inputs = Program::tool("study").build(console)?;
     console.run(inputs.arg("few").arg(&kept).arg(&full))?;
@@ -291,7 +291,7 @@ fn estimates(toolchain: Toolchain, console: &mut Console) -> Result<PathBuf> {
         // A string takes every write.
         let _ = writeln!(text, "{} {}", region.flash.median.saturating_sub(call), run.name(region.region));
     }
-    fs::write(&file, text).with_context(|| format!("cannot write {}", paths::shown(&file)))?;
+    fs::write(&file, text).with_context(|| format!("cannot write {}", host::shown(&file)))?;
     Ok(file)
 }
 

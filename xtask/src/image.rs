@@ -2,7 +2,7 @@
 //! and static RAM.
 
 use crate::console::{Console, IMAGE};
-use crate::paths;
+use crate::host;
 use crate::toolchain::{self, Choice, Toolchain};
 use anyhow::{Context, Result, bail};
 use object::elf::{FileHeader32, PT_LOAD, SHF_ALLOC};
@@ -38,9 +38,9 @@ impl Image {
     /// # Errors
     /// The file is missing, no image for the target, loads nothing, or names a folder of this machine.
     pub fn read(elf: &Path) -> Result<Self> {
-        let data = fs::read(elf).with_context(|| format!("cannot read the image {}", paths::shown(elf)))?;
+        let data = fs::read(elf).with_context(|| format!("cannot read the image {}", host::shown(elf)))?;
         let file = ElfFile::<FileHeader32<LittleEndian>>::parse(&*data)
-            .with_context(|| format!("{} is no image for a 32-bit microcontroller", paths::shown(elf)))?;
+            .with_context(|| format!("{} is no image for a 32-bit microcontroller", host::shown(elf)))?;
         let mut segments = Vec::new();
         for header in file.elf_program_headers() {
             if header.p_type(LittleEndian) == PT_LOAD && header.p_filesz(LittleEndian) > 0 {
@@ -48,7 +48,7 @@ impl Image {
                 segments.push((header.p_paddr(LittleEndian), bytes));
             }
         }
-        let (base, bytes) = lay_out(&segments).with_context(|| paths::shown(elf))?;
+        let (base, bytes) = lay_out(&segments).with_context(|| host::shown(elf))?;
         let image = Self { elf: elf.into(), bin: elf.with_extension("bin"), bytes, base };
         image.names_no_folder()?;
         Ok(image)
@@ -65,10 +65,10 @@ impl Image {
     /// Names the path: where the sources of the core lie, or those of other crates.
     fn names_no_folder(&self) -> Result<()> {
         // With its subfolder: that of a checkout in `/src` alone is part of most paths.
-        for folder in toolchain::sources().into_iter().chain([paths::root().join("src")]) {
+        for folder in toolchain::sources().into_iter().chain([host::root().join("src")]) {
             let name = folder.as_os_str().as_encoded_bytes();
             if self.bytes.windows(name.len()).any(|bytes| bytes == name) {
-                bail!("{} names {}: it would be other bytes elsewhere", paths::shown(&self.elf), folder.display());
+                bail!("{} names {}: it would be other bytes elsewhere", host::shown(&self.elf), folder.display());
             }
         }
         Ok(())
@@ -78,7 +78,7 @@ impl Image {
     pub fn summary(&self) -> String {
         format!(
             "image    {}\nflashed  {} bytes from {:#010x}\nsha-256  {}",
-            paths::shown(&self.elf),
+            host::shown(&self.elf),
             self.bytes.len(),
             self.base,
             self.sha256()
@@ -126,7 +126,7 @@ pub fn checking(toolchain: Toolchain, name: &str, console: &mut Console) -> Resu
 /// Builds an image, with the flashable bytes beside it.
 fn with_bytes(command: &mut Command, toolchain: Toolchain, name: &str, console: &mut Console) -> Result<Image> {
     let image = Image::read(&built(command.arg("--release"), toolchain, name, console)?)?;
-    fs::write(&image.bin, &image.bytes).with_context(|| format!("cannot write {}", paths::shown(&image.bin)))?;
+    fs::write(&image.bin, &image.bytes).with_context(|| format!("cannot write {}", host::shown(&image.bin)))?;
     Ok(image)
 }
 
@@ -309,7 +309,7 @@ fn controls(toolchain: Toolchain, console: &mut Console) -> Result<()> {
     }
     let elf = build(toolchain, NAME, "proof-control-float", console)?;
     if float_calls(&elf)?.is_empty() {
-        bail!("the control that computes in f64 shows no floating-point routine in {}", paths::shown(&elf));
+        bail!("the control that computes in f64 shows no floating-point routine in {}", host::shown(&elf));
     }
     Ok(())
 }

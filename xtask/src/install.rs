@@ -4,7 +4,7 @@
 //! environments have clients of the bus, readers of a sweep's files, and the fit of a real sensor.
 
 use crate::console::Console;
-use crate::{paths, sim};
+use crate::{host, sim};
 use anyhow::{Context, Result, bail, ensure};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -24,7 +24,7 @@ pub fn packages(names: &[&str], why: &str, console: &mut Console) -> Result<()> 
         return Ok(());
     }
     let list = missing.join(" ");
-    if paths::find_program("apt-get").is_none() {
+    if host::find_program("apt-get").is_none() {
         bail!("{why} needs the Debian packages `{list}`, and there is no apt-get here: install their like by hand");
     }
     if !is_root() {
@@ -53,7 +53,7 @@ pub fn newest(packages: &[&str], why: &str, console: &mut Console) -> Result<()>
     let release = fs::read_to_string("/etc/os-release").unwrap_or_default();
     let field = |name| release.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix('='));
     let codename = field("VERSION_CODENAME").filter(|_| field("ID") == Some("debian"));
-    let Some(codename) = codename.filter(|_| paths::find_program("apt-get").is_some()) else {
+    let Some(codename) = codename.filter(|_| host::find_program("apt-get").is_some()) else {
         bail!("{why} needs a recent `{list}`, and this is no Debian: install it by hand");
     };
     let suite = format!("{codename}-backports");
@@ -79,16 +79,16 @@ struct Apt {
 
 impl Apt {
     fn new(suite: Option<&str>) -> Result<Self> {
-        let folder = paths::target().join("apt");
+        let folder = host::target().join("apt");
         for part in ["lists/partial", "cache/archives/partial"] {
-            fs::create_dir_all(folder.join(part)).with_context(|| format!("cannot make {}", paths::shown(&folder)))?;
+            fs::create_dir_all(folder.join(part)).with_context(|| format!("cannot make {}", host::shown(&folder)))?;
         }
         let sources = suite.map(|suite| {
             let file = folder.join(format!("{suite}.list"));
             // It replaces the system's own list, which it repeats.
             let own = fs::read_to_string("/etc/apt/sources.list").unwrap_or_default();
             let line = format!("deb [signed-by={KEYRING}] {} {suite} main\n", mirror());
-            fs::write(&file, own + "\n" + &line).with_context(|| format!("cannot write {}", paths::shown(&file)))?;
+            fs::write(&file, own + "\n" + &line).with_context(|| format!("cannot write {}", host::shown(&file)))?;
             anyhow::Ok(file)
         });
         Ok(Self { folder, sources: sources.transpose()? })
@@ -149,7 +149,7 @@ const BROWSERS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "g
 /// # Errors
 /// The browser is missing and cannot be installed; the text says what to install by hand.
 pub fn browser(console: &mut Console) -> Result<PathBuf> {
-    let find = || BROWSERS.into_iter().find_map(paths::find_program);
+    let find = || BROWSERS.into_iter().find_map(host::find_program);
     if let Some(program) = find() {
         return Ok(program);
     }
@@ -187,7 +187,7 @@ pub fn bus_python(console: &mut Console) -> Result<PathBuf> {
 /// No Python, no `venv`, or no package; the text says what to install.
 pub fn environment(environment: &Environment, console: &mut Console) -> Result<PathBuf> {
     let Environment { folder, packages, imports, does } = environment;
-    let folder = paths::target().join(folder);
+    let folder = host::target().join(folder);
     let python = folder.join("bin").join("python");
     if has(&python, imports) {
         return Ok(python);
@@ -206,7 +206,7 @@ pub fn environment(environment: &Environment, console: &mut Console) -> Result<P
     console
         .prepare(&mut install)
         .with_context(|| format!("pip cannot install {list}: is a package index in reach?"))?;
-    ensure!(has(&python, imports), "{list} is installed in {}, but does not import", paths::shown(&folder));
+    ensure!(has(&python, imports), "{list} is installed in {}, but does not import", host::shown(&folder));
     Ok(python)
 }
 
@@ -227,7 +227,7 @@ const LEAST_SQUARES: Environment = Environment {
 pub fn script(name: &str, console: &mut Console) -> Result<Command> {
     let mut command = Command::new(environment(&LEAST_SQUARES, console)?);
     // -B leaves no compiled files among the sources.
-    command.arg("-B").arg(paths::root().join("host-tests/sensor").join(name));
+    command.arg("-B").arg(host::root().join("host-tests/sensor").join(name));
     Ok(command)
 }
 

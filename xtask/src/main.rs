@@ -9,7 +9,6 @@ mod host;
 mod image;
 mod install;
 mod option_bytes;
-mod paths;
 mod sim;
 mod test;
 mod timing;

@@ -5,7 +5,7 @@ use bringup::checks::checks;
 use bringup::judge::{Board, Judgement, Verdict, judge};
 use bringup::listen::{Report, listen};
 use bringup::script::{Bench, STEPS};
-use bringup::text::{CHECK, READY, asked_frames, checked};
+use bringup::{CHECK, READY, asked_frames, checked};
 use fingertip::shipped::{Config, Pipeline};
 use fingertip::units::CoreCycles;
 use serde_json::Value;

@@ -116,15 +116,11 @@ pub fn info(client: &mut Client, json: bool) -> Result<(), Error> {
     }
     let known = shape == SHAPE.map(|side| side as i64);
     if json {
-        let mut all = Map::new();
-        all.insert("port".into(), json!(client.port));
-        all.insert("baud".into(), json!(client.baud));
-        all.insert("id".into(), json!(pong.id));
-        all.insert("model_number".into(), json!(pong.model));
-        all.insert("firmware_version".into(), json!(pong.firmware));
-        all.insert("rows".into(), json!(shape[0]));
-        all.insert("columns".into(), json!(shape[1]));
-        all.insert("table_version".into(), json!(version));
+        let identity = json!({
+            "port": client.port, "baud": client.baud, "id": pong.id, "model_number": pong.model,
+            "firmware_version": pong.firmware, "rows": shape[0], "columns": shape[1], "table_version": version,
+        });
+        let mut all = identity.as_object().cloned().unwrap_or_default();
         all.extend(state.json());
         all.extend(numbers);
         say_json(&json!(all));

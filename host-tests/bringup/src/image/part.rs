@@ -6,7 +6,7 @@
 use crate::board::flash::Chip;
 use crate::board::guard;
 use crate::{CYCLES_PER_US, passed, report};
-use bringup::text::BAUD;
+use bringup::BAUD;
 use cortex_m::peripheral::DWT;
 use embassy_stm32::pac::gpio::vals::Pupdr;
 use embassy_stm32::pac::timer::vals::CcmrInputCcs;

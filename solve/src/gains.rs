@@ -185,23 +185,6 @@ pub(crate) fn settle(presses: &[Press]) -> Result<Settled, NoGains> {
     Ok(Settled { presses: kept, gains, creep })
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The chip applies the factor before the characteristic: a corrected code must still give the true pressure.
-    #[test]
-    fn the_factor_goes_through_the_characteristic() {
-        for (curve_permille, reads) in [(0, 1.2), (500, 1.2), (3_000, 0.8), (8_000, 1.2)] {
-            let p = 1e-3 * f64::from(curve_permille);
-            let reading = |code: f64| code * (1.0 + p * code / 4_096.0) / (1.0 + p);
-            let gain = Gain { reads, sigma: 0.01, condition: Condition::Sound, highest: reading(1_500.0) / 0.75 };
-            let corrected = reading(1_500.0 * gain.factor(curve_permille));
-            assert!((corrected * reads / reading(1_500.0) - 1.0).abs() < 1e-9, "{curve_permille}: {corrected}");
-        }
-    }
-}
-
 impl fmt::Display for Gains {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let count = |condition| self.taxels.iter().filter(|gain| gain.condition == condition).count();
@@ -378,4 +361,21 @@ fn speed(seen: &[&Shift]) -> [f64; 2] {
     let off2: f64 = seen.iter().map(|shift| ((shift.shift_mm - line.dot(&row(shift))) / shift.sigma_mm).powi(2)).sum();
     let scale2 = (off2 / seen.len().saturating_sub(3).max(1) as f64).max(1.0);
     [line[2], (scale2 * inverse[(2, 2)]).sqrt()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The chip applies the factor before the characteristic: a corrected code must still give the true pressure.
+    #[test]
+    fn the_factor_goes_through_the_characteristic() {
+        for (curve_permille, reads) in [(0, 1.2), (500, 1.2), (3_000, 0.8), (8_000, 1.2)] {
+            let p = 1e-3 * f64::from(curve_permille);
+            let reading = |code: f64| code * (1.0 + p * code / 4_096.0) / (1.0 + p);
+            let gain = Gain { reads, sigma: 0.01, condition: Condition::Sound, highest: reading(1_500.0) / 0.75 };
+            let corrected = reading(1_500.0 * gain.factor(curve_permille));
+            assert!((corrected * reads / reading(1_500.0) - 1.0).abs() < 1e-9, "{curve_permille}: {corrected}");
+        }
+    }
 }

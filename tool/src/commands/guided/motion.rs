@@ -249,18 +249,6 @@ fn carry_out(task: Task, run: &Run<'_>, client: &mut Client) -> Result<(), Error
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_early_end_names_reason_and_number() {
-        let said = ended_early(Task::Strokes, 5, -12).to_string();
-        assert!(said.contains("counted -12 against the voltage"), "{said}");
-        assert!(said.ends_with("(measure_ended 5, value -12)"), "{said}");
-    }
-}
-
 /// Longest time for a force to be reached.
 const REACHED_S: f64 = 30.0;
 /// Time within its tolerance after which a force counts as reached.
@@ -442,4 +430,16 @@ fn same_goal(goal_mn: i64, client: &mut Client) -> Result<State, Error> {
         return Err("another program stopped the finger while the force was held".into());
     }
     Ok(state)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_early_end_names_reason_and_number() {
+        let said = ended_early(Task::Strokes, 5, -12).to_string();
+        assert!(said.contains("counted -12 against the voltage"), "{said}");
+        assert!(said.ends_with("(measure_ended 5, value -12)"), "{said}");
+    }
 }

@@ -245,7 +245,7 @@ fn panic(info: &core::panic::PanicInfo) -> ! {
 }
 
 /// A press that holds the tip, and the memory of a row.
-pub struct Press {
+struct Press {
     motion: Option<Motion>,
     step: Step<ROWS, COLUMNS>,
     standing: MeasureStatus,
@@ -256,7 +256,7 @@ pub struct Press {
 
 impl Press {
     /// Press that has not begun.
-    pub fn new() -> Self {
+    fn new() -> Self {
         let standing = MeasureStatus::running(Task::Press);
         Self { motion: None, step: Step::NONE, standing, bytes: [0; step_bytes(ROWS * COLUMNS)], part: 0, frames: 0 }
     }

@@ -1,7 +1,8 @@
-//! The pass over a frame, which works on rows, against the same taxel by taxel: any codes, gains, masks and tares.
+//! The pass over a frame, which works on rows, against the same taxel by taxel: any codes, gains, masks and tares. Then
+//! gains and masks of single taxels.
 
 use crate::common::*;
-use fingertip::pressure::{CODE_BITS, GAIN_MAX, TARE_BITS};
+use fingertip::pressure::{CODE_BITS, CalibrationError, GAIN_MAX, TARE_BITS};
 use fingertip::shipped::Array;
 use host_tests::stimulus::tared;
 
@@ -39,7 +40,7 @@ fn calibration() -> impl Strategy<Value = Calibration> {
     (gains, mask).prop_map(|(gains, mask)| Calibration::new(&gains, &mask).unwrap())
 }
 
-fn config(row_sag_ppb_per_code: i32, dead_codes: i32) -> Config {
+fn scanned(row_sag_ppb_per_code: i32, dead_codes: i32) -> Config {
     allowed(Params { row_sag_ppb_per_code, dead_codes, ..Params::DEFAULT })
 }
 
@@ -59,7 +60,7 @@ proptest! {
     fn the_sums_are_those_of_the_taxels(
         blank in codes(0, 0), codes in codes(3, 4095), calibration in calibration(), sag in 0..7_601, dead in 1..13,
     ) {
-        let mut config = config(sag, dead);
+        let mut config = scanned(sag, dead);
         // A wild level spoils a column: the sums of an array that is not broken.
         config.params.bad_taxels_max = 100;
         let mut array = tared(&calibration, &blank.frame(), &config);
@@ -88,10 +89,10 @@ proptest! {
     fn bad_taxels_are_those_of_the_definition(
         codes in codes(12, 4095), calibration in calibration(), dead in prop_oneof![1..20, 1..1_001],
     ) {
-        let (frame, config) = (codes.frame(), config(1_667, dead));
+        let (frame, config) = (codes.frame(), scanned(1_667, dead));
         let mut array = Array::new();
         array.calibrate(&calibration);
-        let masks = array.read(&Codes { wild: vec![], ..codes }.frame(), &self::config(1_667, 1)).bad;
+        let masks = array.read(&Codes { wild: vec![], ..codes }.frame(), &scanned(1_667, 1)).bad;
         let picture = *array.read(&frame, &config);
         let mut count = 0;
         for (row, mask) in masks.iter().enumerate() {
@@ -105,12 +106,12 @@ proptest! {
         prop_assert_eq!(u32::from(picture.bad_count), count);
         prop_assert_eq!(array.bad_taxels(&frame, &config), count);
         // What was bad in one frame is not in the next.
-        prop_assert_eq!(array.read(&Codes { wild: vec![], ..codes }.frame(), &self::config(1_667, 1)).bad, masks);
+        prop_assert_eq!(array.read(&Codes { wild: vec![], ..codes }.frame(), &scanned(1_667, 1)).bad, masks);
     }
 
     #[test]
     fn a_tare_is_the_mean_of_what_it_looks_at(frames in proptest::collection::vec(codes(0, 0), 1..12), calibration in calibration()) {
-        let config = config(0, 1);
+        let config = scanned(0, 1);
         let mut array = Array::new();
         array.calibrate(&calibration);
         let gains = array.clone();
@@ -139,7 +140,7 @@ proptest! {
 
     #[test]
     fn any_codes_are_taken(codes in codes(110, u16::MAX), calibration in calibration()) {
-        let (frame, config) = (codes.frame(), config(7_600, 1_000));
+        let (frame, config) = (codes.frame(), scanned(7_600, 1_000));
         let mut array = Array::new();
         array.calibrate(&calibration);
         array.read(&frame, &config);
@@ -154,7 +155,7 @@ proptest! {
 
 #[test]
 fn a_taxel_is_bad_from_the_very_limit_on() {
-    let config = config(1_667, 12);
+    let config = scanned(1_667, 12);
     for (column, highest) in (0..COLUMNS).flat_map(|column| (0..COLUMNS).map(move |highest| (column, highest))) {
         let mut levels = [300; COLUMNS];
         levels[highest] = 320;
@@ -177,7 +178,7 @@ fn a_taxel_is_bad_from_the_very_limit_on() {
 
 #[test]
 fn a_broken_array_shows_nothing() {
-    let config = config(1_667, 12);
+    let config = scanned(1_667, 12);
     let most = config.params.bad_taxels_max as usize;
     let mut array = Array::new();
     for bad in [most + 1, most, 0] {
@@ -193,4 +194,75 @@ fn a_broken_array_shows_nothing() {
         assert_eq!(picture.peak, taxels.iter().fold(0, |peak, taxel| peak.max(*taxel)));
         assert_eq!(picture.peak > 6_000, bad <= most, "{}", picture.peak);
     }
+}
+
+const GAINS: [[u16; COLUMNS]; ROWS] = [[GAIN_ONE; COLUMNS]; ROWS];
+
+/// A frame of a contact of 1.5 mm, and one without contact.
+pub fn frames() -> [Frame; 2] {
+    let mut world = Plant::new(&Setup::default());
+    let mut frames = [Frame::EMPTY; 2];
+    world.fill_frame(&mut frames[1]);
+    world.place(world.setup().wall.distance_mm + 1.5);
+    world.fill_frame(&mut frames[0]);
+    frames
+}
+
+#[test]
+fn a_gain_scales_its_taxel_and_no_other() {
+    let [pressed, blank] = frames();
+    let config = config();
+    let plain = *tared(&Calibration::NONE, &blank, &config).read(&pressed, &config);
+    let mut gains = GAINS;
+    gains[4][6] = GAIN_ONE / 2;
+    gains[5][3] = GAIN_ONE / 4 * 5;
+    let calibration = Calibration::new(&gains, &[0; ROWS]).unwrap();
+    let scaled = *tared(&calibration, &blank, &config).read(&pressed, &config);
+    for (row, column) in places() {
+        let share = f64::from(gains[row][column]) / f64::from(GAIN_ONE);
+        let expected = f64::from(plain.taxels[row][column]) * share;
+        let found = f64::from(scaled.taxels[row][column]);
+        assert!((found - expected).abs() <= 1.5, "row {row}, column {column}: {found}, not {expected}");
+    }
+    assert!(plain.taxels[4][6] > 1_000, "the contact lies there");
+}
+
+#[test]
+fn a_masked_taxel_reads_as_nothing_and_is_no_fault() {
+    let [mut pressed, blank] = frames();
+    let config = config();
+    let mut mask = [0; ROWS];
+    mask[4] = 1 << 5;
+    mask[7] = 0x3ff;
+    let array = |frame: &Frame| {
+        let mut array = tared(&Calibration::new(&GAINS, &mask).unwrap(), &blank, &config);
+        (*array.read(frame, &config), array.bad_taxels(frame, &config))
+    };
+    let (sound, _) = array(&pressed);
+    assert_eq!((sound.taxels[4][5], sound.taxels[7], sound.bad, sound.bad_count), (0, [0; COLUMNS], mask, 0));
+    // One of them dies, and one that counts.
+    pressed.set_code(4, 5, 0);
+    pressed.set_code(4, 4, 4095);
+    let (dead, glanced) = array(&pressed);
+    assert_eq!((dead.taxels[4][4], dead.taxels[4][5]), (0, 0));
+    assert_eq!((dead.bad[4], dead.bad[7], dead.bad_count, glanced), (0b11_0000, 0x3ff, 1, 1));
+}
+
+#[test]
+fn what_cannot_be_is_refused_by_name() {
+    for (value, row, column) in [(0, 0, 0), (GAIN_MAX + 1, 9, 9), (u16::MAX, 3, 7)] {
+        let mut gains = GAINS;
+        gains[row][column] = value;
+        let error = Calibration::new(&gains, &[0; ROWS]).unwrap_err();
+        assert_eq!(error, CalibrationError::Gain { row, column, value });
+        assert!(error.to_string().contains(&format!("row {row}, column {column}: 1 to {GAIN_MAX}")), "{error}");
+    }
+    let mut mask = [0; ROWS];
+    mask[6] = 0x400;
+    let error = Calibration::new(&GAINS, &mask).unwrap_err();
+    assert_eq!(error, CalibrationError::Mask { row: 6, value: 0x400, all: 0x3ff });
+    assert_eq!(error.to_string(), "mask of 0x400 for row 6: 0 to 0x3ff are allowed");
+    let mut gains = GAINS;
+    (gains[2][2], gains[2][3], mask[6]) = (1, GAIN_MAX, 0x3ff);
+    assert!(Calibration::new(&gains, &mask).is_ok());
 }

@@ -1,30 +1,22 @@
 //! Tests of the core. All files are linked into one program, so its threads have work until the end. To run one file:
 //! `cargo test -p host-tests --test all winding::`.
 
-mod bad_input;
 mod baseline_touched;
-mod bridge;
 mod budget;
-mod calibration;
 mod capture;
 mod common;
+mod configurations;
 mod control;
 mod doubt;
 mod faults;
 mod fit;
-mod fit_levels;
 mod force_loop;
 mod frame_pass;
 mod guard;
-mod guard_limits;
-mod let_go;
 mod link;
-mod long_run;
 mod measure;
-mod model_hard_cases;
-mod model_properties;
+mod model;
 mod monitor;
-mod order;
 mod pages;
 mod pipeline_properties;
 mod requests;
@@ -32,8 +24,6 @@ mod same_bits;
 mod sensing;
 mod shapes;
 mod store;
-mod temperature;
-mod warnings;
 mod winding;
 
 /// A file that is not in the list above would never be compiled.

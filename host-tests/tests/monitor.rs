@@ -232,7 +232,7 @@ fn an_array_that_reads_much_more_within_a_frame_is_broken() {
 #[test]
 fn an_array_without_some_of_its_taxels_does_not_read_less() {
     let config = config();
-    let [pressed, blank] = crate::calibration::frames();
+    let [pressed, blank] = crate::frame_pass::frames();
     let most = config.params.bad_taxels_max as usize;
     for masked in 0..=ROWS {
         let mask = core::array::from_fn(|row| if row < masked { (1 << COLUMNS) - 1 } else { 0 });

@@ -1,7 +1,9 @@
-//! The winding's temperature in the controller: bounded, never lower than the true one, and its effect on the current.
+//! Temperatures: the winding's in the controller is bounded, never lower than the true one, and limits the current; the
+//! array's drift with the microcontroller's is compensated.
 
 use crate::common::*;
-use fingertip::control::Winding;
+use fingertip::chip::{Chip, FRAMES, Factory};
+use fingertip::control::{Creep, TemperatureDrift, Winding};
 
 /// Parameters with the thermal lag of a winding only, of a small motor: enough for these tests.
 const QUICK: Params = Params { housing_k_per_w: 0, winding_k_per_w: 46, winding_time_ms: 2_000, ..images::CONFIRMED };
@@ -226,4 +228,297 @@ fn a_motor_that_may_hardly_be_driven_presses_no_harder_and_lets_go_no_farther() 
         assert!((0.3 * first_n..1.03 * first_n).contains(&peak_n), "{goals_n:?}: up to {peak_n} N");
         assert!(least_n > 0.97 * then_n && (ends_n / then_n - 1.0).abs() < 0.02, "{goals_n:?}: {least_n}, {ends_n} N");
     }
+}
+
+fn config(array_gain_ppm_per_k: i32, array_zero_pa_per_k: i32) -> Config {
+    allowed(Params { array_gain_ppm_per_k, array_zero_pa_per_k, ..images::CONFIRMED })
+}
+
+fn celsius(degrees: i32) -> Option<Celsius> {
+    Some(Celsius::from_bits(degrees << 16))
+}
+
+/// From a tare at one temperature to another, long after.
+fn warmed(from: i32, to: i32, config: &Config) -> TemperatureDrift {
+    let mut drift = TemperatureDrift::default();
+    // What it was before the tare is forgotten.
+    (0..30_000).for_each(|frame| drift.observe(celsius(if frame == 0 { from + 7 } else { from }), config));
+    drift.zero(1 << 16);
+    (0..30_000).for_each(|_| drift.observe(celsius(to), config));
+    drift
+}
+
+#[test]
+fn gain_goes_by_the_calibration_and_zero_by_the_tare() {
+    // 0.36 % and 10 Pa a K; 225 mm^2 of array.
+    for (from, to, gain_k, zero_k) in [(25, 45, 20.0, 20.0), (35, 45, 20.0, 10.0), (25, 5, -20.0, -20.0)] {
+        let config = config(3_600, 10);
+        let found: f64 = warmed(from, to, &config).force(newtons(3_000), &config).0.to_num();
+        let expected = 3.0 * 0.0036 * gain_k + 10.0 * 225e-6 * zero_k;
+        assert!((found - expected).abs() < 3e-4, "{from} to {to}: {found} of {expected}");
+    }
+}
+
+#[test]
+fn at_coefficients_of_zero_and_before_a_reading_there_is_none() {
+    let off = config(0, 0);
+    assert_eq!(warmed(0, 100, &off), TemperatureDrift::default());
+    let on = config(3_600, 10);
+    let mut drift = TemperatureDrift::default();
+    drift.observe(None, &on);
+    assert_eq!(drift.force(newtons(3_000), &on), Newtons::ZERO);
+    let mut drift = warmed(25, 45, &on);
+    drift.observe(celsius(45), &off);
+    assert_eq!(drift.force(newtons(3_000), &on), Newtons::ZERO);
+}
+
+#[test]
+fn a_reading_that_stays_away_and_comes_back_moves_nothing() {
+    let config = config(3_600, 10);
+    let mut drift = warmed(25, 45, &config);
+    let before = drift.force(newtons(3_000), &config);
+    assert!(before > newtons(200));
+    for chip in [None, celsius(45), None, None, celsius(45)] {
+        drift.observe(chip, &config);
+        assert_eq!(drift.force(newtons(3_000), &config), before);
+    }
+}
+
+#[test]
+fn the_zero_s_temperature_moves_as_the_baseline_does() {
+    let config = config(0, 10);
+    let mut drift = warmed(45, 25, &config);
+    let at = |drift: &TemperatureDrift| drift.force(newtons(3_000), &config).0.to_num::<f64>();
+    assert!((at(&drift) + 0.045).abs() < 1e-3);
+    // Nothing of the baseline, a hundredth, a half, all of it.
+    for (share, left) in [(0, 1.0), (655, 0.99), (1 << 15, 0.495), (1 << 16, 0.0)] {
+        drift.zero(share);
+        assert!((at(&drift) + 0.045 * left).abs() < 1e-4, "{share}: {}", at(&drift));
+    }
+}
+
+/// Contact lost for a frame, after the array has cooled since its tare: the baseline has learnt almost nothing.
+#[test]
+fn a_frame_without_contact_does_not_forget_the_drift() {
+    let mut board: Bench = Bench::of(&Setup::default(), &config(0, 10));
+    *board.command() = Command { tare_request: 1, ..Command::default() };
+    (0..TARE_FRAMES + 2).for_each(|_| _ = board.step_with(|record| record.sense.chip = celsius(45)));
+    let quiet = *board.frame();
+    (board.command().torque, board.command().goal) = (true, newtons(1_000));
+    let mut cool = |frames: u32, lost: bool| {
+        let step = |record: &mut Record| {
+            record.sense.chip = celsius(25);
+            if lost {
+                record.frame.codes = quiet.codes;
+            }
+        };
+        (0..frames).map(|_| board.step_with(step)).last().unwrap()
+    };
+    let held = cool(30_000, false);
+    assert_eq!(held.mode, Mode::Force);
+    let after = cool(40, true);
+    assert_ne!(after.mode, Mode::Force);
+    let [before, after]: [f64; 2] = [held, after].map(|status| status.drift.0.to_num());
+    assert!((before + 0.045).abs() < 6e-3 && (after - before).abs() < 0.02 * 0.045, "{before} {after}");
+}
+
+#[test]
+fn the_reading_exceeds_the_goal_by_its_drift() {
+    let mut board: Bench = Bench::of(&Setup::default(), &config(3_600, 10));
+    let mut run = |command: Command, frames: u32| {
+        *board.command() = command;
+        (0..frames).map(|_| board.step_with(|record| record.sense.chip = celsius(45))).last().unwrap()
+    };
+    let tare = Command { tare_request: 1, ..Command::default() };
+    run(tare, TARE_FRAMES + 2);
+    let hold = Command { torque: true, goal: newtons(3_000), ..tare };
+    let held = run(hold, 30_000);
+    assert_eq!(held.mode, Mode::Force);
+    let [reading, drift]: [f64; 2] = [held.contact.force, held.drift].map(|force| force.0.to_num());
+    assert!((drift - 0.216).abs() < 2e-3 && (reading - 3.216).abs() < 0.01, "{reading} {drift}");
+}
+
+#[test]
+fn it_follows_slowly() {
+    let config = config(3_600, 0);
+    let mut drift = TemperatureDrift::default();
+    drift.observe(celsius(25), &config);
+    // A reading that is wrong for a frame moves it by a thousandth of that.
+    drift.observe(celsius(125), &config);
+    let found: f64 = drift.force(newtons(5_000), &config).0.to_num();
+    assert!(found > 0.0 && found < 5.0 * 0.0036 * 0.11, "{found}");
+}
+
+proptest! {
+    #![proptest_config(seeded(256, 7))]
+
+    #[test]
+    fn it_stays_within_half_of_what_is_held(
+        chips in proptest::collection::vec((any::<Option<i32>>(), 1_u32..3_000, any::<bool>()), 1..12),
+        held in any::<i32>(), array_gain_ppm_per_k in -10_000..=10_000, array_gain_at_c in -40..=125,
+        array_zero_pa_per_k in -1_000..=1_000, pitch_um in 500..=4_000,
+    ) {
+        let zero = Params { array_zero_pa_per_k, pitch_um, ..images::CONFIRMED };
+        let config = allowed(Params { array_gain_ppm_per_k, array_gain_at_c, ..zero });
+        let mut drift = TemperatureDrift::default();
+        for (chip, frames, zeroes) in chips {
+            for _ in 0..frames {
+                drift.observe(chip.map(Celsius::from_bits), &config);
+            }
+            if zeroes {
+                drift.zero(1 << 16);
+            }
+            let found = drift.force(Newtons::from_bits(held), &config).to_bits();
+            prop_assert!(i64::from(found).abs() <= i64::from(held.max(0)) / 2);
+        }
+    }
+}
+
+/// Temperature that is reported after the given number of frames with repeating codes.
+fn told(factory: Factory, codes: &[(u16, u16)], frames: u32) -> (u16, Option<f64>) {
+    let mut chip = Chip::new(factory);
+    for (_, (reference, sensor)) in (0..frames).zip(codes.iter().cycle()) {
+        chip.observe(Some([*reference, *sensor]));
+    }
+    (chip.analogue_mv(), chip.temperature().map(|chip| chip.0.to_num()))
+}
+
+proptest! {
+    #[test]
+    fn any_codes_are_believed_within_bounds_or_not_at_all(
+        reference in any::<u16>(),
+        sensor in any::<[u16; 2]>(),
+        near in any::<bool>(),
+        codes in proptest::collection::vec(any::<(u16, u16)>(), 1..20),
+        frames in 0..1_000_u32,
+    ) {
+        // As they come hardly any factory's codes are sensible.
+        let sensible = Factory { reference: 1_300 + reference % 400, sensor: [900 + sensor[0] % 100, 1_150 + sensor[1] % 200] };
+        let (mv, chip) = told(if near { sensible } else { Factory { reference, sensor } }, &codes, frames);
+        prop_assert!(mv == 0 || (1_600..=4_000).contains(&mv));
+        prop_assert!(chip.is_none_or(|chip| (-60.0..=160.0).contains(&chip)));
+        prop_assert!(mv != 0 || chip.is_none());
+        prop_assert!(frames >= FRAMES || (mv, chip) == (0, None));
+    }
+
+    #[test]
+    fn a_sound_board_tells_its_temperature_and_supply(
+        chip_c in -40.0..125.0_f64,
+        supply_v in 1.8..3.6_f64,
+        (reference_v, sensor_v, volts_per_k) in (1.18..1.24_f64, 0.70..0.82_f64, 0.0022..0.0028_f64),
+        noise in proptest::collection::vec((-1.5..1.5_f64, -1.5..1.5_f64), 64),
+    ) {
+        let volts = |chip_c: f64| sensor_v + volts_per_k * (chip_c - 25.0);
+        let code = |volts: f64, supply_v: f64| (volts / supply_v * 4096.0) as u16;
+        let factory = Factory { reference: code(reference_v, 3.3), sensor: [30.0, 110.0].map(|chip_c| code(volts(chip_c), 3.3)) };
+        let noisy = |volts: f64, noise: f64| (volts / supply_v * 4096.0 + noise) as u16;
+        let codes: Vec<_> = noise.iter().map(|(a, b)| (noisy(reference_v, *a), noisy(volts(chip_c), *b))).collect();
+        let (mv, found) = told(factory, &codes, FRAMES);
+        let found = found.expect("it is sound");
+        // The mean noise of 64 draws, the factory's truncated codes (a code is 0.4 K), and that of the ratio.
+        prop_assert!((found - chip_c).abs() < 1.5, "{found} C of {chip_c} C");
+        prop_assert!((f64::from(mv) - 1e3 * supply_v).abs() < 6.0, "{mv} mV of {supply_v} V");
+    }
+}
+
+// Compensation of the creep of a held force: result, bounds, and parts that must not depend on it.
+
+fn creeping(creep_permille: i32, creep_time_ms: i32) -> Config {
+    allowed(Params { creep_permille, creep_time_ms, ..images::CONFIRMED })
+}
+
+#[test]
+fn a_reading_that_creeps_as_described_gives_the_force_that_is_held() {
+    for (permille, time_ms) in [(66, 10_000), (300, 500), (100, 200), (10, 100_000)] {
+        let config = creeping(permille, time_ms);
+        let (rate, tau) = (f64::from(permille) / 1e3, f64::from(time_ms) / 1e3);
+        let mut creep = Creep::default();
+        let mut worst = 0.0_f64;
+        for frame in 0..(3.0 * tau / frame_s(&config)) as u32 {
+            let reading = 2.0 * (1.0 + rate * (1.0 - (-f64::from(frame) * frame_s(&config) / tau).exp()));
+            creep.observe(true, Newtons::from_bits((reading * 65_536.0) as i32), &config);
+            worst = worst.max((reading - creep.force().0.to_num::<f64>() - 2.0).abs());
+        }
+        // Units of 15 uN, the change in a frame, and the filter rate, which is exact to 2^-10 of itself.
+        assert!(worst < 2.0 * rate * 2e-3 + 1e-4, "{permille} {time_ms}: {worst} N");
+        assert!(creep.force().0.to_num::<f64>() > 1.8 * rate, "there was something to take off");
+    }
+}
+
+#[test]
+fn at_rate_zero_and_where_nothing_is_held_there_is_none() {
+    let mut creep = Creep::default();
+    for _ in 0..10_000 {
+        creep.observe(true, newtons(5_000), &creeping(0, 500));
+    }
+    assert_eq!(creep, Creep::default());
+    for _ in 0..10_000 {
+        creep.observe(true, newtons(5_000), &creeping(100, 500));
+    }
+    assert!(creep.force() > newtons(400));
+    creep.observe(false, newtons(5_000), &creeping(100, 500));
+    assert_eq!(creep, Creep::default());
+}
+
+proptest! {
+    #![proptest_config(seeded(256, 3))]
+
+    #[test]
+    fn it_stays_between_none_and_its_share_of_the_largest_reading(
+        readings in proptest::collection::vec((any::<i32>(), 1_u32..3_000), 1..12),
+        permille in 0..=300, time_ms in 50..=600_000,
+    ) {
+        let config = creeping(permille, time_ms);
+        let mut creep = Creep::default();
+        let mut largest = 0_i64;
+        for (reading, frames) in readings {
+            largest = largest.max(reading.into());
+            for _ in 0..frames {
+                creep.observe(true, Newtons::from_bits(reading), &config);
+                let found = i64::from(creep.force().to_bits());
+                prop_assert!(found >= 0 && found * (1_000 + i64::from(permille)) <= largest * i64::from(permille) + 1_300);
+            }
+        }
+    }
+}
+
+/// A board that holds so much for a time, s; its true force and status.
+fn hold(config: &Config, goal_mn: i32, seconds: f64) -> (f64, Bench) {
+    let mut board = Bench::of(&Setup::default(), config);
+    board.tare();
+    board.hold(goal_mn, seconds - board.time_s());
+    (board.truth().force_n, board)
+}
+
+#[test]
+fn what_is_held_grows_by_the_rate_and_no_more_than_that() {
+    // This array does not creep: the loop presses harder by all that it takes for creep.
+    let (force, board) = hold(&creeping(100, 500), 2_000, 4.0);
+    assert!((2.19..2.21).contains(&force), "{force}");
+    let status = board.status();
+    assert_eq!((status.mode, status.fault), (Mode::Force, None));
+    let [contact, creep]: [f64; 2] = [status.contact.force, status.creep].map(|force| force.0.to_num());
+    assert!((contact - force).abs() < 0.01 && (contact - creep - 2.0).abs() < 0.01, "{contact} {creep}");
+    let (force, _) = hold(&creeping(0, 500), 2_000, 4.0);
+    assert!((1.99..2.01).contains(&force), "{force}");
+}
+
+#[test]
+fn it_never_leads_beyond_the_largest_force() {
+    let params = Params { creep_permille: 300, creep_time_ms: 50, force_max_mn: 3_000, ..images::CONFIRMED };
+    let (force, board) = hold(&allowed(params), 3_000, 3.0);
+    assert!((2.98..3.02).contains(&force), "{force}");
+    assert_eq!(board.status().fault, None);
+}
+
+#[test]
+fn over_force_is_judged_by_the_reading() {
+    // 2.6 N are read; 2 N are taken for true.
+    let params = Params { force_max_mn: 2_650, force_fault_mn: 2_700, ..creeping(300, 50).params };
+    let (_, mut board) = hold(&allowed(params), 2_000, 4.0);
+    assert_eq!(board.status().fault, None);
+    let travel = board.truth().travel_mm;
+    board.place(travel + 0.2);
+    board.frames(50);
+    assert_eq!(board.status().fault, Some(Fault::OverForce));
 }

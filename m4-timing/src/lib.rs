@@ -8,10 +8,8 @@
 
 pub mod core;
 pub mod decode;
-pub mod flash;
 pub mod instruction;
 pub mod meter;
-pub mod report;
 
 #[cfg(feature = "plugin")]
 #[allow(unsafe_code)]

@@ -3,11 +3,10 @@
 //! The only unsafe code of the crate. QEMU runs one virtual CPU here; its callbacks come from one thread, the last one
 //! possibly from another, so all state lies behind a lock.
 
-use crate::core::Touched;
+use crate::core::{Settings, Touched};
 use crate::decode::{decode, is_wide};
-use crate::flash::Settings;
-use crate::meter::{Meter, MeterError, Registers, Site};
-use crate::report;
+use crate::meter::{self, Meter, MeterError, Registers, Site};
+
 use std::collections::HashMap;
 use std::ffi::{CStr, c_char, c_int, c_uint, c_void};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -265,9 +264,9 @@ extern "C" fn ended(_: Id, _: *mut c_void) {
             Ok(regions) => regions,
             Err(refusal) => refuse(&refusal),
         };
-        eprint!("{}", report::text(regions));
+        eprint!("{}", meter::text(regions));
         if let Some(path) = &plugin.out
-            && let Err(error) = fs::write(path, report::json_lines(regions))
+            && let Err(error) = fs::write(path, meter::json_lines(regions))
         {
             fail(&format!("cannot write {}: {error}", path.display()));
         }

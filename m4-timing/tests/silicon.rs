@@ -4,7 +4,7 @@
 //! The kernels are assembly, so no compiler changes these figures; `m4-timing/tests/kernels`
 //! has them with their licences. What was measured there is the call with its arguments in place: so it is here.
 
-use m4_timing::report::{Measured, parse};
+use m4_timing::meter::{Measured, parse};
 use std::{env, fs, path::PathBuf, process::Command};
 
 /// Folder of this package. Its use rebuilds the paths below after the checkout was moved.

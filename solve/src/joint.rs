@@ -4,7 +4,7 @@
 //! unknowns and ten thousand residuals for three presses.
 
 use crate::gains::{Condition, Gain, Gains, NoGains, Posed};
-use crate::judge::{judge, shifts};
+use crate::gains::{judge, shifts};
 use crate::model::{At, Pose, Share, Square, UNKNOWNS};
 use crate::press::{Array, Press, Step, first_pose, forces};
 use crate::robust::{huber, huber_cost, median, spread};

@@ -24,22 +24,52 @@
 //! # Ok::<(), solve::scale::NoScale>(())
 //! ```
 
-pub mod drift;
 pub mod gains;
 mod joint;
-pub mod judge;
 pub mod memory;
 pub mod model;
 pub mod modulus;
 pub mod press;
 pub mod record;
-mod report;
 mod robust;
 pub mod scale;
 pub mod strokes;
 
-pub use drift::{creep, temperature};
 pub use gains::gains;
 pub use modulus::modulus;
-pub use report::Value;
-pub use scale::scale;
+pub use scale::{creep, scale, temperature};
+
+use std::fmt;
+
+/// A number with its standard uncertainty, in the same unit.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Value {
+    /// The estimate.
+    pub value: f64,
+    /// Standard uncertainty of the estimate.
+    pub sigma: f64,
+}
+
+impl Value {
+    /// The uncertainty as a share of the value.
+    pub fn relative(&self) -> f64 {
+        self.sigma / self.value.abs()
+    }
+
+    /// True if the number differs from 0 by more than three of its uncertainties.
+    pub fn differs(&self) -> bool {
+        self.value.abs() > 3.0 * self.sigma
+    }
+}
+
+/// The uncertainty with two digits, the value with as many decimals.
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { value, sigma } = self;
+        if !(1e-12..1e12).contains(sigma) {
+            return write!(f, "{value:.4} +- {sigma:.1e}");
+        }
+        let decimals = (1.0 - sigma.log10().floor()).max(0.0) as usize;
+        write!(f, "{value:.decimals$} +- {sigma:.decimals$}")
+    }
+}

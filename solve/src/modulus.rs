@@ -5,6 +5,7 @@
 //! ([`crate::memory`]): the two ways of a press and its holds show all of it. Unknowns of a press: Y, the contact point,
 //! hysteresis, creep, relaxation and its time constant.
 
+use crate::Value;
 use crate::gains::{Gains, NoGains, Settled, settle};
 use crate::memory::{Memory, Motion};
 use crate::model::Pose;
@@ -12,6 +13,7 @@ use crate::press::Press;
 use crate::robust::{Fit, minimise};
 use nalgebra::DVector;
 use std::f64::consts::PI;
+use std::fmt;
 
 /// Usual sizes of hysteresis, creep and relaxation; they only matter if a press does not determine these. Hysteresis up
 /// to 10 %, creep under 5 % a decade (Interlink FSR 400 guide); silicones relax by 5 to 20 %, mostly within two seconds
@@ -179,4 +181,35 @@ fn of_press(press: &Press, pose: &Pose, measured: &[f64]) -> Option<OfPress> {
     let (kpa, touch_mm, memory) = read(&mean, mean[UNKNOWNS].exp());
     let [kpa_sigma, _, _, creep_sigma, _] = variance.map(f64::sqrt);
     Some(OfPress { kpa, sigma_kpa: kpa_sigma * kpa, touch_mm, memory, creep_sigma })
+}
+
+impl fmt::Display for Modulus {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { kpa, sigma_kpa, parts, presses, gains } = self;
+        let value = Value { value: *kpa, sigma: *sigma_kpa };
+        let [residuals, between, common, memory] =
+            [parts.residuals, parts.presses, parts.gains, parts.memory].map(|part| 100.0 * part);
+        write!(
+            f,
+            "Young's modulus is {value} kPa, from {} press{}. Its uncertainty: {residuals:.1} % residuals, {between:.1} % \
+             spread between presses, {common:.1} % common gain of the taxels, {memory:.1} % creep and relaxation.",
+            presses.len(),
+            if presses.len() == 1 { "" } else { "es" }
+        )?;
+        for (index, press) in presses.iter().enumerate() {
+            let memory = &press.memory;
+            let [hysteresis, creep, relaxation] =
+                [memory.hysteresis, memory.creep, memory.relaxation].map(|share| 100.0 * share);
+            write!(
+                f,
+                " Press {}: {:.1} kPa, contact at {:.3} mm, hysteresis {hysteresis:.1} %, creep {creep:.1} % per decade, \
+                 relaxation {relaxation:.1} % with a time constant of {:.2} s.",
+                index + 1,
+                press.kpa,
+                press.touch_mm,
+                memory.relaxation_s
+            )?;
+        }
+        write!(f, " {gains}")
+    }
 }

@@ -14,6 +14,7 @@ use fingertip::measure::series::{HEAD, VERSION, check, step_bytes};
 use fingertip::measure::strokes::SAMPLE_FRAMES;
 use fingertip::params::{ParamError, Params};
 use std::f64::consts::TAU;
+use std::fmt;
 
 /// First bytes of a series.
 pub const MAGIC: [u8; 3] = *b"FTS";
@@ -269,5 +270,60 @@ impl Cursor<'_> {
 
     fn i32(&mut self) -> i32 {
         i32::from_le_bytes(self.take())
+    }
+}
+
+impl fmt::Display for Ended {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let value = self.value;
+        let thousandths = 1e-3 * f64::from(value);
+        match self.reason {
+            Reason::Complete => write!(f, "the motion is complete"),
+            Reason::Interrupted => {
+                write!(f, "a stop, torque, a fault, a tare or new parameters ended the motion: run it again")
+            }
+            Reason::NotReady => {
+                write!(
+                    f,
+                    "not tared, something touches the tip, or torque is not as needed: free the tip, tare, run it again"
+                )
+            }
+            Reason::Unconfirmed => write!(f, "the motor's direction is not confirmed: `fingertip commission` does it"),
+            Reason::Still => write!(
+                f,
+                "the encoder did not count at {thousandths:.2} V: is the motor connected, the encoder supplied, the tip free?"
+            ),
+            Reason::Reversed => write!(
+                f,
+                "the encoder counted {value} against the voltage: swap the motor's leads if the tip went back first, else the \
+                 encoder's channels"
+            ),
+            Reason::Astray => write!(
+                f,
+                "the tip was {thousandths:.2} mm away, outside of its bounds: is a channel of the encoder open?"
+            ),
+            Reason::Touched => write!(
+                f,
+                "the array measured {thousandths:.3} N, more than allowed here: clear the tip's way, hold the plate fast"
+            ),
+            Reason::Pushed => {
+                write!(f, "an external force of {thousandths:.3} N was estimated from the motor: clear the tip's way")
+            }
+            Reason::Restless => {
+                write!(f, "the tip did not come to rest: it still went {value} counts; hold the finger fast")
+            }
+            Reason::NoContact => {
+                write!(f, "the tip touched nothing within {thousandths:.2} mm: bring the plate nearer")
+            }
+            Reason::Stalled => write!(
+                f,
+                "the tip stopped at {thousandths:.2} mm before it was deep enough: is current_max_ma too small, or the \
+                 tip blocked?"
+            ),
+            Reason::Full => write!(
+                f,
+                "the memory was full after {value} records: lower modulus or force_max_mn make a shorter press"
+            ),
+        }
     }
 }

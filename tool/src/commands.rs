@@ -2,22 +2,14 @@
 
 pub mod calibrate;
 pub mod capture;
-pub mod commission;
+pub mod device;
 mod guided;
-pub mod identify;
-pub mod info;
-pub mod latency;
-pub mod moving;
 pub mod params;
 pub mod press;
 pub mod record;
-pub mod recover;
-pub mod replay;
-pub mod scan;
 pub mod share;
 pub mod stop;
 pub mod stream;
-pub mod tare;
 pub mod view;
 
 use crate::client::{Pong, Reach};

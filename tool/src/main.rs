@@ -3,10 +3,7 @@
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use clap_complete::Shell;
 use fingertip_cli::client::Reach;
-use fingertip_cli::commands::{
-    calibrate, capture, commission, each, identify, info, latency, params, press, record, recover, replay, scan, share,
-    stop, stream, tare, view,
-};
+use fingertip_cli::commands::{calibrate, capture, device, each, params, press, record, share, stop, stream, view};
 use fingertip_cli::{Client, Error};
 use serde_json::json;
 use std::io::{self, Write as _};
@@ -44,7 +41,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     /// Look for controllers: on all ports or the one named, at all speeds
-    Scan(scan::Args),
+    Scan(device::Scan),
     /// Show identity and status of the controller
     #[command(after_help = "Examples:\n  fingertip info\n  fingertip info --json")]
     Info,
@@ -60,27 +57,27 @@ enum Command {
     /// Keep every frame from a tare on, on the board itself, and write a file that replays to the bit
     Capture(capture::Args),
     /// Feed captures through the core on this machine, and compare
-    Replay(replay::Args),
+    Replay(capture::Replay),
     /// Read, write, save, back up and restore the parameters
     #[command(subcommand)]
     Params(params::Command),
     /// Measure the zero of every taxel; nothing may touch the tip
-    Tare(tare::Args),
+    Tare(stop::Tare),
     /// Prove the motor's direction and measure the drive, by small motions in the air
-    Commission(commission::Args),
+    Commission(calibrate::Commission),
     /// Measure Young's modulus of the tip, by presses onto a hard plate
-    Identify(identify::Args),
+    Identify(calibrate::Identify),
     /// Touch, hold a force for a time, release
     Press(press::Args),
     /// Stop the finger in any mode: release, torque off, measurements aborted, bus watchdog off
-    Stop(stop::Args),
+    Stop(stop::Stop),
     /// Measure gains and modulus by presses onto a hard flat plate, and the scale of forces by a kitchen scale
-    Calibrate(calibrate::Args),
+    Calibrate(calibrate::Calibrate),
     /// Clear what stopped the motor, or report what prevents it
     #[command(after_help = "Examples:\n  fingertip recover")]
     Recover,
     /// Measure how long answers take: reads without a pause
-    Latency(latency::Args),
+    Latency(device::Latency),
     /// Print a shell's completions
     #[command(
         after_help = "Examples:\n  fingertip completions bash > ~/.local/share/bash-completion/completions/fingertip"
@@ -135,23 +132,23 @@ fn run(cli: &Cli) -> Result<(), Error> {
         each(&cli.reach, !cli.json, |client| client.check().and_then(|()| command(client)))
     };
     match &cli.command {
-        Command::Scan(args) => scan::run(args, &cli.reach, cli.json),
-        Command::Info => for_each(&|client| info::run(client, cli.json)),
+        Command::Scan(args) => device::scan(args, &cli.reach, cli.json),
+        Command::Info => for_each(&|client| device::info(client, cli.json)),
         Command::Share(args) => share::run(args, &cli.reach),
         Command::View(args) => view::run(args, &mut connect()?),
         Command::Stream(args) => stream::run(args, &mut connect()?),
         Command::Record(args) => record::run(args, record::format(args)?, &mut connect()?, cli.json),
         Command::Capture(args) => args.check().and_then(|()| capture::run(args, &mut connect()?, cli.json)),
-        Command::Replay(args) => replay::run(args, cli.json),
+        Command::Replay(args) => capture::replay_all(args, cli.json),
         Command::Params(command) => params::run(command, &mut connect()?, cli.json),
-        Command::Tare(args) => for_each(&|client| tare::run(args, client, cli.json)),
-        Command::Commission(args) => commission::run(args, &mut connect()?, cli.json),
+        Command::Tare(args) => for_each(&|client| stop::tare(args, client, cli.json)),
+        Command::Commission(args) => calibrate::commission(args, &mut connect()?, cli.json),
         Command::Press(args) => press::run(args, &mut connect()?, cli.json),
-        Command::Stop(args) => stop::run(args, &cli.reach, cli.json),
-        Command::Identify(args) => identify::run(args, &mut connect()?, cli.json),
-        Command::Calibrate(args) => calibrate::run(args, &mut connect()?, cli.json),
-        Command::Recover => for_each(&|client| recover::run(client, cli.json)),
-        Command::Latency(args) => latency::run(args, &mut connect()?, cli.json),
+        Command::Stop(args) => stop::stop_all(args, &cli.reach, cli.json),
+        Command::Identify(args) => calibrate::identify(args, &mut connect()?, cli.json),
+        Command::Calibrate(args) => calibrate::calibrate(args, &mut connect()?, cli.json),
+        Command::Recover => for_each(&|client| stop::recover(client, cli.json)),
+        Command::Latency(args) => device::latency(args, &mut connect()?, cli.json),
         Command::Completions { shell } => {
             let mut text = Vec::new();
             clap_complete::generate(*shell, &mut Cli::command(), "fingertip", &mut text);

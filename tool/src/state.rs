@@ -1,7 +1,7 @@
 //! The state of the loop, all of it from one frame.
 
+use crate::Error;
 use crate::client::Client;
-use crate::error::Error;
 use crate::table::{self, Block};
 use fingertip::shipped::{COLUMNS, ROWS, address};
 use serde_json::{Map, Value, json};

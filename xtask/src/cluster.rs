@@ -1,9 +1,9 @@
 //! The examples for clusters, tried on this machine: Slurm with one node, GNU parallel, the shell of the Kubernetes job.
 
 use crate::console::{self, Console};
+use crate::host;
 use crate::host::Program;
-use crate::python::{self, Environment};
-use crate::{apt, paths};
+use crate::install::{self, Environment};
 use anyhow::{Context, Result, bail};
 use std::net::TcpListener;
 use std::os::unix::fs::PermissionsExt;
@@ -28,21 +28,21 @@ const CLIENTS: Environment = Environment {
 
 /// Makes sure of the schedulers and of a Python with the rest, and returns its interpreter.
 pub fn ensure(console: &mut Console) -> Result<PathBuf> {
-    apt::ensure(&PACKAGES, "the test of the examples for clusters", console)?;
-    python::environment(&CLIENTS, console)
+    install::packages(&PACKAGES, "the test of the examples for clusters", console)?;
+    install::environment(&CLIENTS, console)
 }
 
 /// Runs a sweep whole and by each example, and compares what they make byte by byte.
 pub fn run(console: &mut Console) -> Result<()> {
     let python = ensure(console)?;
     Program::sim("sweep").build(console)?;
-    let sweep = paths::target().join("host").join("sweep");
-    let folder = paths::target().join("cluster");
+    let sweep = host::target().join("host").join("sweep");
+    let folder = host::target().join("cluster");
     if folder.is_dir() {
-        fs::remove_dir_all(&folder).with_context(|| format!("cannot empty {}", paths::shown(&folder)))?;
+        fs::remove_dir_all(&folder).with_context(|| format!("cannot empty {}", host::shown(&folder)))?;
     }
-    let examples = paths::root().join("examples/cluster");
-    let scene = paths::root().join(SCENE);
+    let examples = host::root().join("examples/cluster");
+    let scene = host::root().join(SCENE);
     let given = |command: &mut Command, out: &Path| {
         command.arg(&scene).args(["--seeds", SEEDS, "--out"]).arg(out).env("SWEEP", &sweep);
     };
@@ -69,12 +69,12 @@ pub fn run(console: &mut Console) -> Result<()> {
 
     // The job's folder has the program and the scene in it.
     let kubernetes = folder.join("kubernetes");
-    fs::create_dir_all(&kubernetes).with_context(|| format!("cannot make {}", paths::shown(&kubernetes)))?;
+    fs::create_dir_all(&kubernetes).with_context(|| format!("cannot make {}", host::shown(&kubernetes)))?;
     for file in [&sweep, &scene] {
         let to = kubernetes.join(file.file_name().unwrap_or_default());
-        fs::copy(file, &to).with_context(|| format!("cannot write {}", paths::shown(&to)))?;
+        fs::copy(file, &to).with_context(|| format!("cannot write {}", host::shown(&to)))?;
     }
-    let check = paths::root().join("xtask/src/cluster/check.py");
+    let check = host::root().join("xtask/src/cluster/check.py");
     let mut command = Command::new(&python);
     command.arg(&check).arg("kubernetes").arg(examples.join("kubernetes.yaml")).arg(&kubernetes).args([SEEDS, SHARES]);
     tried("the shell of the Kubernetes job", &mut command, console)?;
@@ -106,7 +106,7 @@ fn same(sweep: &Path, whole: &Path, folder: &Path) -> Result<()> {
         anyhow::ensure!(
             read(whole)? == read(folder)?,
             "{file} of {} is not that of the whole sweep",
-            paths::shown(folder)
+            host::shown(folder)
         );
     }
     Ok(())
@@ -238,7 +238,7 @@ mod tests {
     /// Command that a task of an array would run; `None` if it refuses.
     fn task([id, min, max, count]: [u32; 4], shares: Option<&str>) -> Option<String> {
         let mut command = Command::new("sh");
-        command.arg(paths::root().join("examples/cluster/slurm.sh")).arg("scene").env("SWEEP", "echo");
+        command.arg(host::root().join("examples/cluster/slurm.sh")).arg("scene").env("SWEEP", "echo");
         let names = ["ID", "MIN", "MAX", "COUNT"].map(|name| format!("SLURM_ARRAY_TASK_{name}"));
         command.envs(names.iter().zip([id, min, max, count].map(|number| number.to_string())));
         command.env_remove("SHARES").envs(shares.map(|shares| ("SHARES", shares)));

@@ -1,6 +1,6 @@
 //! Running programs and saying what goes on: straight to the terminal, or captured for a stage of the tests.
 
-use crate::paths;
+use crate::host;
 use anyhow::{Context, Result, bail};
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
@@ -55,7 +55,7 @@ impl Console {
 
     /// Runs a program to its end.
     pub fn run(&mut self, command: &mut Command) -> Result<()> {
-        command.current_dir(paths::root());
+        command.current_dir(host::root());
         let shown = show(command);
         let Some(text) = &mut self.captured else {
             let _ = writeln!(io::stderr(), "$ {shown}");
@@ -82,7 +82,7 @@ impl Console {
     pub fn build(&mut self, command: &mut Command, what: &str, slow: Slow) -> Result<()> {
         let before_s = cpu_s();
         let shown = show(command);
-        command.args(["--message-format", "json-render-diagnostics"]).current_dir(paths::root());
+        command.args(["--message-format", "json-render-diagnostics"]).current_dir(host::root());
         command.env("CARGO_TERM_PROGRESS_WHEN", "always").env("CARGO_TERM_PROGRESS_WIDTH", "400");
         let child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
         let mut child = child.with_context(|| missing(command))?;
@@ -109,7 +109,7 @@ impl Console {
 
     /// Runs a program that is expected to fail, and returns what it wrote.
     pub fn run_to_failure(&mut self, command: &mut Command) -> Result<String> {
-        command.current_dir(paths::root());
+        command.current_dir(host::root());
         let output = command.output().with_context(|| missing(command))?;
         let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
         if let Some(captured) = &mut self.captured {
@@ -177,7 +177,7 @@ pub fn cpu_s() -> f64 {
 /// Returns a program's standard output; its errors go to the terminal.
 pub fn output(command: &mut Command) -> Result<String> {
     let output =
-        command.current_dir(paths::root()).stderr(Stdio::inherit()).output().with_context(|| missing(command))?;
+        command.current_dir(host::root()).stderr(Stdio::inherit()).output().with_context(|| missing(command))?;
     if !output.status.success() {
         bail!("{}: {}", output.status, show(command));
     }
@@ -194,7 +194,7 @@ pub fn cargo(subcommand: &str) -> Command {
 /// The command as one would type it.
 pub fn show(command: &Command) -> String {
     let name = |word: &OsStr| word.to_string_lossy().into_owned();
-    let program = paths::shown(command.get_program().as_ref());
+    let program = host::shown(command.get_program().as_ref());
     let program =
         if command.get_program() == env::var_os("CARGO").unwrap_or_default() { "cargo".into() } else { program };
     let variables = command.get_envs().filter_map(|(key, value)| Some(format!("{}={}", name(key), name(value?))));

@@ -4,7 +4,7 @@ use crate::console::{self, Console};
 use crate::host::{self, Program};
 use crate::image::{self, Image};
 use crate::toolchain::{self, Choice, TARGET};
-use crate::{apt, docs, paths};
+use crate::{docs, install};
 use anyhow::{Context, Result, ensure};
 use std::fmt::Write as _;
 use std::fs;
@@ -97,7 +97,7 @@ pub fn page(choice: Choice, console: &mut Console) -> Result<String> {
     let targets = CORES.map(|core| core.target);
     let toolchain =
         toolchain::ensure_for(choice, &targets, "the loop is built for other cores than the board's", console)?;
-    let folder = paths::made("cores")?;
+    let folder = host::made("cores")?;
     let mut list = String::new();
     for (number, core) in CORES.iter().enumerate() {
         let mut command = image::apart(toolchain, "build", LOOP, core.target, core.flags);
@@ -105,7 +105,7 @@ pub fn page(choice: Choice, console: &mut Console) -> Result<String> {
         // Two boards have the same target and name.
         let elf = folder.join(format!("{number}.elf"));
         fs::copy(toolchain.images_for(core.target, core.flags).join("cores"), &elf)
-            .with_context(|| paths::shown(&elf))?;
+            .with_context(|| host::shown(&elf))?;
         let bytes = Image::read(&elf)?.bytes.len();
         // A string takes every write.
         let _ = writeln!(
@@ -120,11 +120,11 @@ pub fn page(choice: Choice, console: &mut Console) -> Result<String> {
         );
     }
     let file = folder.join("list.tsv");
-    fs::write(&file, list).with_context(|| paths::shown(&file))?;
+    fs::write(&file, list).with_context(|| host::shown(&file))?;
     // Built with what the other programs select; `cargo run` takes one package only.
     let mut build = host::cargo("build", "host-tests");
     console.build(build.args(host::SHARED).args(["--example", PAGE.1]), PAGE.1, console::HOST)?;
-    let program = paths::target().join(host::PROFILE).join("examples").join(PAGE.1);
+    let program = host::target().join(host::PROFILE).join("examples").join(PAGE.1);
     console::output(Command::new(program).arg(&file))
 }
 
@@ -162,10 +162,10 @@ fn table(page: &str) -> String {
 /// One is missing and cannot be installed.
 pub fn ensure(console: &mut Console) -> Result<()> {
     ensure_m4(console)?;
-    match paths::find_program(RISCV_PROGRAM) {
+    match host::find_program(RISCV_PROGRAM) {
         Some(_) => Ok(()),
         // Of the same version as the emulator for Arm: both share files.
-        None => apt::newest(&["qemu-system-riscv"], WHY, console),
+        None => install::newest(&["qemu-system-riscv"], WHY, console),
     }
 }
 
@@ -190,7 +190,7 @@ pub fn run_m4(args: &QemuArgs, choice: Choice, console: &mut Console) -> Result<
     let image = prepare(choice, console)?;
     let [mut replay, mut same_bits] =
         [Program::tool("qemu-host").build(console)?, Program::tool("same-bits").build(console)?];
-    console.run(replay.arg(&image).arg(paths::target().join("stimulus")).args(&args.inject))?;
+    console.run(replay.arg(&image).arg(host::target().join("stimulus")).args(&args.inject))?;
     console.run(same_bits.arg(&image))
 }
 
@@ -211,10 +211,10 @@ pub fn test_m4(choice: Choice, console: &mut Console) -> Result<()> {
 /// # Errors
 /// The emulator is missing and cannot be installed.
 pub fn ensure_m4(console: &mut Console) -> Result<()> {
-    match paths::find_program(M4_EMULATOR) {
+    match host::find_program(M4_EMULATOR) {
         Some(_) => Ok(()),
         // At once the version that the estimates of cycles need: none is installed to be replaced.
-        None => apt::newest(&[M4_EMULATOR], "running the core on an emulated Cortex-M4F", console),
+        None => install::newest(&[M4_EMULATOR], "running the core on an emulated Cortex-M4F", console),
     }
 }
 

@@ -2,9 +2,9 @@
 
 use crate::console::{self, Console};
 use crate::host::{self, Program};
-use crate::python::{self, Environment};
+use crate::install::{self, Environment};
 use crate::toolchain::Choice;
-use crate::{cores, image, paths};
+use crate::{cores, image};
 use anyhow::{Context, Result, bail};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -47,21 +47,21 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     let mut budget = Program::sim("budget").build(console)?;
     renew(BUDGET.0, &console::output(budget.args(["--fingers", BUDGET.1]))?, args.check, &mut stale, console)?;
     renew(cores::PAGE.0, &cores::page(choice, console)?, args.check, &mut stale, console)?;
-    let drawn = paths::target().join("docs").join("figures");
+    let drawn = host::target().join("docs").join("figures");
     draw(&drawn, console)?;
     for path in PAPER {
         let file = drawn.join(Path::new(path).file_name().unwrap_or_default());
-        let text = fs::read_to_string(&file).with_context(|| format!("cannot read {}", paths::shown(&file)))?;
+        let text = fs::read_to_string(&file).with_context(|| format!("cannot read {}", host::shown(&file)))?;
         renew(path, &text, args.check, &mut stale, console)?;
     }
 
-    let root = paths::root();
+    let root = host::root();
     let (json, pictures) = if args.check {
-        (paths::target().join("docs").join("demo.json"), paths::target().join("docs").join("pictures"))
+        (host::target().join("docs").join("demo.json"), host::target().join("docs").join("pictures"))
     } else {
         (root.join(FIGURES), root.join(PICTURES))
     };
-    fs::create_dir_all(&pictures).with_context(|| format!("cannot make {}", paths::shown(&pictures)))?;
+    fs::create_dir_all(&pictures).with_context(|| format!("cannot make {}", host::shown(&pictures)))?;
     let image = image::firmware(choice, console)?;
     // Like the programs before it: the one of `cargo xtask demo` would compile the emulator again, with fewer features.
     let mut command = host::SCENE_BOARD.build(console)?;
@@ -84,7 +84,7 @@ fn print(example: &str, argument: Option<&Path>) -> Result<String> {
 
 /// Writes a file that is not fresh, or adds it to the stale ones.
 pub fn renew(path: &str, text: &str, check: bool, stale: &mut Vec<String>, console: &Console) -> Result<()> {
-    let file = paths::root().join(path);
+    let file = host::root().join(path);
     if fs::read_to_string(&file).is_ok_and(|present| present == text) {
         console.print(&format!("fresh    {path}"));
     } else if check {
@@ -111,7 +111,7 @@ pub struct FiguresArgs {
 /// Draws the figures.
 pub fn figures(args: &FiguresArgs, console: &mut Console) -> Result<()> {
     let default = args.out == Path::new(PICTURES);
-    draw(&if default { paths::root().join(PICTURES) } else { args.out.clone() }, console)
+    draw(&if default { host::root().join(PICTURES) } else { args.out.clone() }, console)
 }
 
 /// Draws the figures into a folder.
@@ -133,12 +133,12 @@ pub fn package(console: &mut Console) -> Result<()> {
     // The project outside compiles them.
     package.args(["--allow-dirty", "--no-verify"]).args(PACKAGES.iter().flat_map(|name| ["--package", name]));
     console.run(&mut package)?;
-    let made = paths::target().join("package");
-    let unpacked = paths::target().join("outside").join("packages");
+    let made = host::target().join("package");
+    let unpacked = host::target().join("outside").join("packages");
     if unpacked.is_dir() {
-        fs::remove_dir_all(&unpacked).with_context(|| format!("cannot empty {}", paths::shown(&unpacked)))?;
+        fs::remove_dir_all(&unpacked).with_context(|| format!("cannot empty {}", host::shown(&unpacked)))?;
     }
-    fs::create_dir_all(&unpacked).with_context(|| format!("cannot make {}", paths::shown(&unpacked)))?;
+    fs::create_dir_all(&unpacked).with_context(|| format!("cannot make {}", host::shown(&unpacked)))?;
     let mut test = console::cargo("test");
     for name in PACKAGES {
         let folder = format!("{name}-{VERSION}");
@@ -148,15 +148,11 @@ pub fn package(console: &mut Console) -> Result<()> {
         console.run(&mut unpack)?;
         test.arg("--config").arg(format!("patch.crates-io.{name}.path={:?}", unpacked.join(folder)));
     }
-    let outside = paths::root().join("host-tests").join("outside");
+    let outside = host::root().join("host-tests").join("outside");
     // The same versions of all else, so that it works offline.
     let lock = outside.join("Cargo.lock");
-    fs::copy(paths::root().join("Cargo.lock"), &lock)
-        .with_context(|| format!("cannot write {}", paths::shown(&lock)))?;
-    test.arg("--manifest-path")
-        .arg(outside.join("Cargo.toml"))
-        .arg("--target-dir")
-        .arg(paths::target().join("outside"));
+    fs::copy(host::root().join("Cargo.lock"), &lock).with_context(|| format!("cannot write {}", host::shown(&lock)))?;
+    test.arg("--manifest-path").arg(outside.join("Cargo.toml")).arg("--target-dir").arg(host::target().join("outside"));
     console.run(&mut test)
 }
 
@@ -175,18 +171,18 @@ const DENY_PACKAGE: Environment = Environment {
 /// Finds or installs the checker.
 pub fn deny(console: &mut Console) -> Result<PathBuf> {
     let (name, version) = DENY;
-    let folder = paths::target().join("tools");
+    let folder = host::target().join("tools");
     let compiled = folder.join("bin").join(name);
     if compiled.is_file() {
         return Ok(compiled);
     }
-    let packed = python::environment(&DENY_PACKAGE, console).map(|python| python.with_file_name(name));
+    let packed = install::environment(&DENY_PACKAGE, console).map(|python| python.with_file_name(name));
     if let Ok(program) = packed
         && program.is_file()
     {
         return Ok(program);
     }
-    console.say(&format!("Installing {name} {version} to {}: it checks the licences.", paths::shown(&folder)));
+    console.say(&format!("Installing {name} {version} to {}: it checks the licences.", host::shown(&folder)));
     // Unoptimised: it compiles in a third of the time, and runs for seconds.
     let mut install = console::cargo("install");
     install.arg(format!("{name}@{version}")).args(["--locked", "--debug", "--no-default-features", "--root"]);

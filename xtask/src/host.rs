@@ -1,9 +1,11 @@
-//! Programs of the workspace that run on this machine: built with a line of progress, then started.
+//! This machine: its paths, and programs of the workspace that run here, built with a line of progress, then started.
 
 use crate::console::{self, Console, EMULATOR, HOST, Slow};
-use crate::paths;
-use anyhow::Result;
+use anyhow::{Context, Result};
+use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::OnceLock;
+use std::{env, fs};
 
 /// Profile of all programs that run here; see `Cargo.toml`.
 pub const PROFILE: &str = "host";
@@ -57,7 +59,7 @@ impl Program {
         let mut command = cargo("build", self.package);
         command.args(["--bin", self.name]).args(self.with);
         console.build(&mut command, self.name, slow(self.package))?;
-        Ok(Command::new(paths::target().join(PROFILE).join(self.name)))
+        Ok(Command::new(target().join(PROFILE).join(self.name)))
     }
 }
 
@@ -87,4 +89,40 @@ pub fn test(command: &mut Command, console: &mut Console) -> Result<()> {
     let package = command.get_args().find(|word| *word == BOARD.package);
     console.build(&mut build, "the tests", slow(package.and_then(|word| word.to_str()).unwrap_or_default()))?;
     console.run(command)
+}
+
+/// The repository's root, wherever it lies now: as cargo says, or else around the folder that the user is in.
+pub fn root() -> &'static Path {
+    static ROOT: OnceLock<PathBuf> = OnceLock::new();
+    ROOT.get_or_init(|| {
+        let package = env::var_os("CARGO_MANIFEST_DIR").map(PathBuf::from);
+        let here = env::current_dir().unwrap_or_default();
+        let around = here.ancestors().find(|folder| folder.join("xtask").join("Cargo.toml").is_file());
+        let root = package.as_deref().and_then(Path::parent).or(around);
+        root.unwrap_or(Path::new(".")).to_path_buf()
+    })
+}
+
+/// Cargo's build folder; everything that the commands write or install lies in it.
+pub fn target() -> PathBuf {
+    let named = env::var_os("CARGO_TARGET_DIR").map(PathBuf::from);
+    // The commands run in the root; the user may be elsewhere.
+    named.and_then(|folder| std::path::absolute(folder).ok()).unwrap_or_else(|| root().join("target"))
+}
+
+/// A folder of that name in the build folder, made where it is not there; as the system calls it.
+pub fn made(name: &str) -> Result<PathBuf> {
+    let folder = target().join(name);
+    fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", shown(&folder)))?;
+    fs::canonicalize(&folder).with_context(|| shown(&folder))
+}
+
+/// A path as the user would type it: relative to the root where it lies below.
+pub fn shown(path: &Path) -> String {
+    path.strip_prefix(root()).unwrap_or(path).display().to_string()
+}
+
+/// Looks a program up in `PATH`.
+pub fn find_program(name: &str) -> Option<PathBuf> {
+    env::split_paths(&env::var_os("PATH")?).map(|folder| folder.join(name)).find(|path| path.is_file())
 }

@@ -1,13 +1,16 @@
-//! Images for the microcontroller: built, and laid out as the bytes that the flash gets.
+//! Images for the microcontroller: built, laid out as the bytes that the flash gets, and held against their limits of flash
+//! and static RAM.
 
 use crate::console::{Console, IMAGE};
-use crate::paths;
+use crate::host;
 use crate::toolchain::{self, Choice, Toolchain};
 use anyhow::{Context, Result, bail};
-use object::LittleEndian;
-use object::elf::{FileHeader32, PT_LOAD};
+use object::elf::{FileHeader32, PT_LOAD, SHF_ALLOC};
 use object::read::elf::{ElfFile, ProgramHeader};
+use object::{LittleEndian, Object, ObjectSection, ObjectSymbol, SectionFlags};
 use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -35,9 +38,9 @@ impl Image {
     /// # Errors
     /// The file is missing, no image for the target, loads nothing, or names a folder of this machine.
     pub fn read(elf: &Path) -> Result<Self> {
-        let data = fs::read(elf).with_context(|| format!("cannot read the image {}", paths::shown(elf)))?;
+        let data = fs::read(elf).with_context(|| format!("cannot read the image {}", host::shown(elf)))?;
         let file = ElfFile::<FileHeader32<LittleEndian>>::parse(&*data)
-            .with_context(|| format!("{} is no image for a 32-bit microcontroller", paths::shown(elf)))?;
+            .with_context(|| format!("{} is no image for a 32-bit microcontroller", host::shown(elf)))?;
         let mut segments = Vec::new();
         for header in file.elf_program_headers() {
             if header.p_type(LittleEndian) == PT_LOAD && header.p_filesz(LittleEndian) > 0 {
@@ -45,7 +48,7 @@ impl Image {
                 segments.push((header.p_paddr(LittleEndian), bytes));
             }
         }
-        let (base, bytes) = lay_out(&segments).with_context(|| paths::shown(elf))?;
+        let (base, bytes) = lay_out(&segments).with_context(|| host::shown(elf))?;
         let image = Self { elf: elf.into(), bin: elf.with_extension("bin"), bytes, base };
         image.names_no_folder()?;
         Ok(image)
@@ -62,10 +65,10 @@ impl Image {
     /// Names the path: where the sources of the core lie, or those of other crates.
     fn names_no_folder(&self) -> Result<()> {
         // With its subfolder: that of a checkout in `/src` alone is part of most paths.
-        for folder in toolchain::sources().into_iter().chain([paths::root().join("src")]) {
+        for folder in toolchain::sources().into_iter().chain([host::root().join("src")]) {
             let name = folder.as_os_str().as_encoded_bytes();
             if self.bytes.windows(name.len()).any(|bytes| bytes == name) {
-                bail!("{} names {}: it would be other bytes elsewhere", paths::shown(&self.elf), folder.display());
+                bail!("{} names {}: it would be other bytes elsewhere", host::shown(&self.elf), folder.display());
             }
         }
         Ok(())
@@ -75,7 +78,7 @@ impl Image {
     pub fn summary(&self) -> String {
         format!(
             "image    {}\nflashed  {} bytes from {:#010x}\nsha-256  {}",
-            paths::shown(&self.elf),
+            host::shown(&self.elf),
             self.bytes.len(),
             self.base,
             self.sha256()
@@ -123,7 +126,7 @@ pub fn checking(toolchain: Toolchain, name: &str, console: &mut Console) -> Resu
 /// Builds an image, with the flashable bytes beside it.
 fn with_bytes(command: &mut Command, toolchain: Toolchain, name: &str, console: &mut Console) -> Result<Image> {
     let image = Image::read(&built(command.arg("--release"), toolchain, name, console)?)?;
-    fs::write(&image.bin, &image.bytes).with_context(|| format!("cannot write {}", paths::shown(&image.bin)))?;
+    fs::write(&image.bin, &image.bytes).with_context(|| format!("cannot write {}", host::shown(&image.bin)))?;
     Ok(image)
 }
 
@@ -154,6 +157,201 @@ pub fn apart(toolchain: Toolchain, subcommand: &str, folder: &str, target: &str,
     command
 }
 
+/// Flash that the image may take.
+pub const FLASH_MAX_BYTES: u64 = 128 << 10;
+/// RAM that statics may take, 44 KiB of it the memory for captures; the stack comes on top.
+pub const RAM_MAX_BYTES: u64 = 76 << 10;
+/// First address of the microcontroller's RAM.
+const RAM_BASE: u64 = 0x2000_0000;
+/// Lines of the table of crates.
+const CRATES_SHOWN: usize = 12;
+
+/// Sizes of an image.
+pub struct Sizes {
+    /// Bytes of flash, gaps and initial values included.
+    pub flash: u64,
+    /// Bytes of RAM with a fixed address.
+    pub ram: u64,
+    /// Bytes reserved for the stack.
+    pub stack: u64,
+    /// Name, address, bytes of flash and bytes of RAM of each section.
+    sections: Vec<(String, u64, u64, u64)>,
+    /// Bytes of flash and of RAM, by crate.
+    crates: BTreeMap<String, (u64, u64)>,
+}
+
+/// Builds the flash image and measures it.
+pub fn sizes(choice: Choice, console: &mut Console) -> Result<()> {
+    let image = firmware(choice, console)?;
+    let sizes = Sizes::of(&image)?;
+    console.print(&format!("{}\n\n{}\n{}", image.summary(), sizes.table(), sizes.verdict()));
+    sizes.check()
+}
+
+impl Sizes {
+    /// Measures a linked image.
+    pub fn of(image: &Image) -> Result<Self> {
+        let data = fs::read(&image.elf)?;
+        let file = object::File::parse(&*data)?;
+        let mut sections = Vec::new();
+        for section in file.sections() {
+            let SectionFlags::Elf { sh_flags } = section.flags() else { continue };
+            if sh_flags & u64::from(SHF_ALLOC) == 0 || section.size() == 0 {
+                continue;
+            }
+            let in_ram = section.address() >= RAM_BASE;
+            let stored = section.kind() != object::SectionKind::UninitializedData && section.file_range().is_some();
+            let bytes = |counts: bool| if counts { section.size() } else { 0 };
+            sections.push((section.name()?.to_owned(), section.address(), bytes(stored), bytes(in_ram)));
+        }
+        let mut crates = BTreeMap::<String, (u64, u64)>::new();
+        for symbol in file.symbols().filter(|symbol| symbol.size() > 0 && symbol.is_definition()) {
+            let (flash, ram) = crates.entry(crate_of(symbol.name()?)).or_default();
+            *if symbol.address() >= RAM_BASE { ram } else { flash } += symbol.size();
+        }
+        let address = |name: &str| {
+            let symbol = file.symbol_by_name(name).with_context(|| format!("the image has no symbol {name}"));
+            symbol.map(|symbol| symbol.address())
+        };
+        Ok(Self {
+            flash: image.bytes.len() as u64,
+            ram: sections.iter().map(|(_, _, _, ram)| ram).sum(),
+            stack: address("_stack_start")?.saturating_sub(address("_stack_end")?),
+            sections,
+            crates,
+        })
+    }
+
+    /// Fails beyond the limits.
+    pub fn check(&self) -> Result<()> {
+        for (what, bytes, limit) in [("flash", self.flash, FLASH_MAX_BYTES), ("static RAM", self.ram, RAM_MAX_BYTES)] {
+            if bytes > limit {
+                bail!("{what}: {bytes} bytes are {} more than the limit of {limit}", bytes - limit);
+            }
+        }
+        Ok(())
+    }
+
+    /// Flash, static RAM and stack, a line each.
+    pub fn verdict(&self) -> String {
+        let share = |bytes: u64, limit: u64| 100.0 * bytes as f64 / limit as f64;
+        format!(
+            "flash       {:6} of {FLASH_MAX_BYTES} bytes ({:.0} %)\n\
+             static RAM  {:6} of {RAM_MAX_BYTES} bytes ({:.0} %)\n\
+             stack       {:6} bytes reserved",
+            self.flash,
+            share(self.flash, FLASH_MAX_BYTES),
+            self.ram,
+            share(self.ram, RAM_MAX_BYTES),
+            self.stack
+        )
+    }
+
+    /// Sections and crates, a line each.
+    fn table(&self) -> String {
+        let mut text = format!("{:<24} {:>10} {:>8} {:>8}\n", "section", "address", "flash", "RAM");
+        for (name, address, flash, ram) in &self.sections {
+            let _ = writeln!(text, "{name:<24} {address:#010x} {flash:>8} {ram:>8}");
+        }
+        let mut crates: Vec<_> = self.crates.iter().collect();
+        crates.sort_by_key(|(_, (flash, ram))| std::cmp::Reverse(flash + ram));
+        let _ = writeln!(text, "\n{:<35} {:>8} {:>8}", "crate (named symbols only)", "flash", "RAM");
+        for (name, (flash, ram)) in crates.into_iter().take(CRATES_SHOWN) {
+            let _ = writeln!(text, "{name:<35} {flash:>8} {ram:>8}");
+        }
+        text
+    }
+}
+
+/// The crate that a symbol comes from, by its name.
+fn crate_of(symbol: &str) -> String {
+    let Ok(name) = rustc_demangle::try_demangle(symbol) else { return "(no Rust name)".into() };
+    let name = format!("{name:#}");
+    // `<crate::Type as other::Trait>::method` belongs to the type's crate.
+    let path = name.trim_start_matches(['<', '&', '*', '(', '[']);
+    path.split([':', ' ', '<', '>']).next().unwrap_or(path).to_owned()
+}
+
+// The panic-free proof: an image of the control step alone, which a reachable panic keeps from linking.
+
+/// The image.
+const NAME: &str = "panic-free";
+/// Undefined symbol that the proof's panic handler calls.
+const UNDEFINED: &str = "fingertip_step_can_panic";
+
+/// Builds the proof and its two controls.
+pub fn prove_panic_free(choice: Choice, console: &mut Console) -> Result<()> {
+    let toolchain = toolchain::ensure(choice, console)?;
+    let elf = link(toolchain, console)?;
+    console.print("The control step links without a panic handler: no panic is reachable.");
+    let calls = float_calls(&elf)?;
+    if !calls.is_empty() {
+        bail!("the control step calls floating-point routines: {}", calls.join(", "));
+    }
+    console.print("It calls no floating-point routine.");
+    controls(toolchain, console)?;
+    console.print("The controls, a step that can panic and one that computes in f64, are caught.");
+    Ok(())
+}
+
+/// Links the proof.
+fn link(toolchain: Toolchain, console: &mut Console) -> Result<std::path::PathBuf> {
+    build(toolchain, NAME, "proof", console).map_err(|error| {
+        error.context(format!("the proof does not link; if {UNDEFINED} is missing above, the step can panic"))
+    })
+}
+
+/// Shows that the proof can fail.
+fn controls(toolchain: Toolchain, console: &mut Console) -> Result<()> {
+    let output = console.run_to_failure(emulated(toolchain, NAME, "proof-control-panic").arg("--release"))?;
+    if !output.contains(UNDEFINED) {
+        bail!("the control that panics fails for another reason:\n{output}");
+    }
+    let elf = build(toolchain, NAME, "proof-control-float", console)?;
+    if float_calls(&elf)?.is_empty() {
+        bail!("the control that computes in f64 shows no floating-point routine in {}", host::shown(&elf));
+    }
+    Ok(())
+}
+
+/// The floating-point routines in an image.
+fn float_calls(elf: &Path) -> Result<Vec<String>> {
+    let data = fs::read(elf)?;
+    let file = object::File::parse(&*data)?;
+    let names = file.symbols().filter_map(|symbol| symbol.name().ok().map(str::to_owned));
+    let mut calls: Vec<_> = names.filter(|name| is_float_routine(name)).collect();
+    calls.sort();
+    calls.dedup();
+    Ok(calls)
+}
+
+/// True if a symbol is a routine of soft floating point or of libm.
+fn is_float_routine(symbol: &str) -> bool {
+    let demangled = format!("{:#}", rustc_demangle::demangle(symbol));
+    if demangled.starts_with("libm::") || demangled.contains("compiler_builtins::float::") {
+        return true;
+    }
+    let name = demangled.rsplit("::").next().unwrap_or(&demangled);
+    if let Some(routine) = name.strip_prefix("__aeabi_") {
+        // fadd, dmul, cdcmple, f2iz, d2f ..., and the conversions from integers: i2f, ui2d, l2f, ul2d.
+        let from_integer = ["i2f", "i2d", "ui2f", "ui2d", "l2f", "l2d", "ul2f", "ul2d"];
+        return routine.starts_with(['f', 'd', 'h'])
+            || routine.starts_with("cf")
+            || routine.starts_with("cd")
+            || from_integer.contains(&routine);
+    }
+    // __addsf3, __muldf3, __extendsfdf2, __fixdfsi, __floatsisf, __powisf2, ...
+    if let Some(routine) = name.strip_prefix("__") {
+        let operand = ["sf2", "sf3", "df2", "df3", "hf2", "tf2", "tf3"].iter().any(|end| routine.ends_with(end));
+        return operand || routine.starts_with("fix") || routine.starts_with("float");
+    }
+    const LIBM: [&str; 24] = [
+        "acos", "asin", "atan", "atan2", "cbrt", "ceil", "copysign", "cos", "exp", "exp2", "fabs", "floor", "fma",
+        "fmax", "fmin", "fmod", "hypot", "log", "pow", "rint", "round", "sin", "sqrt", "tan",
+    ];
+    LIBM.contains(&name) || name.strip_suffix('f').is_some_and(|name| LIBM.contains(&name))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -168,5 +366,35 @@ mod tests {
     fn an_image_without_bytes_and_one_in_two_memories_are_refused() {
         assert!(lay_out(&[]).is_err());
         assert!(lay_out(&[(0x0800_0000, &[1]), (0x2000_0000, &[1])]).is_err());
+    }
+
+    #[test]
+    fn symbols_are_counted_for_the_crate_that_wrote_them() {
+        assert_eq!(crate_of("_ZN9fingertip8pipeline8Pipeline4step17h0123456789abcdefE"), "fingertip");
+        assert_eq!(crate_of("_RNvMs_NtCs1234_9fingertip8pipelineNtB4_8Pipeline4step"), "fingertip");
+        assert_eq!(crate_of("__aeabi_memcpy"), "(no Rust name)");
+    }
+
+    #[test]
+    fn a_byte_beyond_a_limit_fails() {
+        let sizes = |flash, ram| Sizes { flash, ram, stack: 0, sections: Vec::new(), crates: BTreeMap::new() };
+        assert!(sizes(FLASH_MAX_BYTES, RAM_MAX_BYTES).check().is_ok());
+        assert!(
+            sizes(FLASH_MAX_BYTES + 1, 0).check().unwrap_err().to_string().contains("flash: 131073 bytes are 1 more")
+        );
+        assert!(sizes(0, RAM_MAX_BYTES + 1).check().unwrap_err().to_string().contains("static RAM"));
+    }
+
+    #[test]
+    fn floating_point_routines_are_told_from_the_rest() {
+        for symbol in ["__aeabi_dmul", "__aeabi_fadd", "__aeabi_ul2d", "__aeabi_cdcmple", "__adddf3", "__extendsfdf2"] {
+            assert!(is_float_routine(symbol), "{symbol}");
+        }
+        for symbol in ["sqrtf", "sqrt", "__fixdfsi", "_ZN17compiler_builtins5float3add8__adddf317h0123456789abcdefE"] {
+            assert!(is_float_routine(symbol), "{symbol}");
+        }
+        for symbol in ["__aeabi_memcpy", "__aeabi_uldivmod", "__aeabi_lmul", "__udivmoddi4", "main", "Reset", "_exp"] {
+            assert!(!is_float_routine(symbol), "{symbol}");
+        }
     }
 }

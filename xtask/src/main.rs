@@ -1,7 +1,5 @@
 //! The project's commands. `cargo xtask --help` lists them; each does its own set-up.
 
-mod apt;
-mod bringup;
 mod cluster;
 mod console;
 mod cores;
@@ -9,11 +7,9 @@ mod docs;
 mod flash;
 mod host;
 mod image;
+mod install;
 mod option_bytes;
-mod paths;
-mod python;
 mod sim;
-mod size;
 mod test;
 mod timing;
 mod toolchain;
@@ -83,7 +79,7 @@ enum Command {
     /// Build the flash image and write it to a board with probe-rs
     Flash(flash::Args),
     /// Check a bare NUCLEO-F446RE, or the emulated board: clocks, watchdogs, flash, converters, scan, the loop, cycles
-    Bringup(bringup::Args),
+    Bringup(flash::BringupArgs),
     /// Run the core on an emulated Cortex-M4F and compare it bit for bit with the host
     Qemu(cores::QemuArgs),
     /// Run the loop on every core that QEMU emulates, compare with the host, and renew the table of docs/porting.md
@@ -151,23 +147,23 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Sweep(args) => sim::native("sweep", args, console),
         Command::Population(args) => sim::on_board("population", args, toolchain, console),
         Command::Budget(args) => sim::native("budget", args, console),
-        Command::Sensor(args) => python::sensor(args, console),
+        Command::Sensor(args) => install::sensor(args, console),
         Command::Serve(args) => sim::serve(args, toolchain, console),
         Command::Replay(args) => sim::replay(args, console),
         Command::Test(args) => test::run(args, toolchain),
         Command::Build => image::firmware(toolchain, console).map(|image| console.print(&image.summary())),
         Command::Flash(args) => flash::run(args, toolchain, console),
-        Command::Bringup(args) => bringup::run(args, toolchain, console),
+        Command::Bringup(args) => flash::bringup(args, toolchain, console),
         Command::Qemu(args) => cores::run_m4(args, toolchain, console),
         Command::Cores => cores::run_all(toolchain, console),
         Command::Timing(args) => timing::run(args, toolchain, console),
         Command::Study(args) => timing::study(args, toolchain, console),
-        Command::Size => size::run(toolchain, console),
+        Command::Size => image::sizes(toolchain, console),
         Command::Model => host::run_tool("model", &[], console),
         Command::Prove(args) => host::run_tool("prove", &args.words(), console),
         Command::Fit(args) => host::run_tool("fit", &args.words(), console),
         Command::Figures(args) => docs::figures(args, console),
-        Command::PanicFree => size::prove_panic_free(toolchain, console),
+        Command::PanicFree => image::prove_panic_free(toolchain, console),
         Command::Lint => test::lint(toolchain),
         Command::Docs(args) => docs::run(args, toolchain, console),
         Command::Package => docs::package(console),
@@ -181,10 +177,10 @@ fn setup(choice: Choice, console: &mut Console) -> anyhow::Result<()> {
     toolchain::ensure(choice, console)?;
     timing::ensure(console)?;
     cores::ensure(console)?;
-    python::ensure(console)?;
-    python::script("fit.py", console)?;
+    install::bus_python(console)?;
+    install::script("fit.py", console)?;
     cluster::ensure(console)?;
-    apt::browser(console)?;
+    install::browser(console)?;
     docs::deny(console)?;
     console.run(console::cargo("fetch").arg("--locked"))?;
     console.say(

@@ -2,7 +2,7 @@
 
 use crate::console::{self, Console};
 use crate::toolchain::Choice;
-use crate::{host, image, paths};
+use crate::{host, image};
 use anyhow::{Context, Result, ensure};
 use std::path::PathBuf;
 use std::process::{Command, exit};
@@ -92,7 +92,7 @@ fn native_demo(args: &DemoArgs, console: &mut Console) -> Result<()> {
     let mut command = host::NATIVE_DEMO.build(console)?;
     console.say("First on the native core: the same script and plant, no microcontroller in between.");
     // As it is to be read: programs are started in the root.
-    let out = paths::shown(&paths::target().join("demo").join("native"));
+    let out = host::shown(&host::target().join("demo").join("native"));
     console.run(command.arg("--out").arg(out).args(args.quick.then_some("--quick")))?;
     console.say("Now on the flash image: the emulator is compiled for some minutes, the first time.");
     Ok(())
@@ -176,6 +176,6 @@ pub struct ReplayArgs {
 
 /// Replays all captures in a folder: a line for each.
 pub fn replay(args: &ReplayArgs, console: &mut Console) -> Result<()> {
-    let place = args.place.clone().unwrap_or_else(|| paths::root().join("captures"));
+    let place = args.place.clone().unwrap_or_else(|| host::root().join("captures"));
     start(host::TOOL.build(console)?.arg("replay").arg(place))
 }

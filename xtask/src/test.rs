@@ -1,9 +1,9 @@
 //! Tests and checks, one stage each.
 
 use crate::console::{self, Console, clear_line, cpu_s};
-use crate::size::{self, Sizes};
+use crate::image::Sizes;
 use crate::toolchain::{self, Choice, TARGET, Toolchain};
-use crate::{apt, bringup, cores, docs, host, image, python, timing};
+use crate::{cores, docs, flash, host, image, install, timing};
 use anyhow::{Context, Result, bail, ensure};
 use std::process::Command;
 use std::time::Instant;
@@ -31,7 +31,7 @@ pub fn run(args: &Args, choice: Choice) -> Result<()> {
     }
     stages.stage("core and host tests", |console| host::test(console::cargo("test").arg("--no-fail-fast"), console));
     stages.stage("fit of a sensor to recordings", |console| {
-        let mut command = python::script("test_fit.py", console)?;
+        let mut command = install::script("test_fit.py", console)?;
         console.run(&mut command)
     });
     let image = stages.stage("flash image", |console| {
@@ -45,29 +45,29 @@ pub fn run(args: &Args, choice: Choice) -> Result<()> {
         console.print(&sizes.verdict());
         sizes.check()
     });
-    stages.stage("panic-free proof", |console| size::prove_panic_free(choice, console));
+    stages.stage("panic-free proof", |console| image::prove_panic_free(choice, console));
     stages.stage("emulated Cortex-M4F against this machine", |console| cores::test_m4(choice, console));
     stages.stage("example for another board", |console| cores::example(choice, console));
     stages.stage("timing model against published measurements", |console| timing::check(choice, console));
     stages.stage("virtual board", |console| {
-        let python = python::ensure(console)?;
+        let python = install::bus_python(console)?;
         let mut command = on_a_board(&["--lib", "--test", "board"]);
-        let checking = image::checking(toolchain::ensure(choice, console)?, bringup::NAME, console)?;
+        let checking = image::checking(toolchain::ensure(choice, console)?, flash::BRINGUP, console)?;
         command.env("FINGERTIP_IMAGE", &image()?.elf).env("FINGERTIP_PYTHON", &python);
         command.env("FINGERTIP_BRINGUP", &checking.elf);
         host::test(&mut command, console)
     });
     stages.stage("Python package on a served finger", |console| {
-        let python = python::ensure(console)?;
+        let python = install::bus_python(console)?;
         // The wheel's builder reads the sources of every platform, also those that no build here needs.
         console.prepare(console::cargo("fetch").args(["--locked", "--quiet"]))?;
-        let mut command = on_a_board(&["--test", "python"]);
+        let mut command = on_a_board(&["--test", "served"]);
         command.env("FINGERTIP_PYTHON", &python).args(["--", "--ignored"]);
         host::test(&mut command, console)
     });
     stages.stage("stream to Foxglove", |console| host::test(&mut on_a_board(&["--test", "stream"]), console));
     stages.stage("reports in a browser", |console| {
-        let program = apt::browser(console)?;
+        let program = install::browser(console)?;
         host::test(on_a_board(&["--test", "report"]).env("FINGERTIP_CHROMIUM", &program), console)
     });
     stages.finish("test")

@@ -4,9 +4,9 @@
 use crate::console::{self, Console, IMAGE};
 use crate::host::{self, Program};
 use crate::toolchain::{self, Choice, Toolchain};
-use crate::{apt, image, paths};
+use crate::{image, install};
 use anyhow::{Context, Result, bail};
-use m4_timing::report::{Measured, parse};
+use m4_timing::meter::{Measured, parse};
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::fmt::Write as _;
 use std::fs;
@@ -74,14 +74,14 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     }
     let run = match &args.image {
         Some(image) => {
-            let image = fs::canonicalize(image).with_context(|| paths::shown(image))?;
+            let image = fs::canonicalize(image).with_context(|| host::shown(image))?;
             measure(&image, None, console)?
         }
         None => kernels(choice, console)?,
     };
     console.print(&table(&run));
     match &args.json {
-        Some(path) => fs::write(path, run.json_lines()).with_context(|| format!("cannot write {}", paths::shown(path))),
+        Some(path) => fs::write(path, run.json_lines()).with_context(|| format!("cannot write {}", host::shown(path))),
         None => Ok(()),
     }
 }
@@ -105,7 +105,7 @@ pub fn check(choice: Choice, console: &mut Console) -> Result<()> {
 /// Something does not build, or the image fails.
 pub fn kernels(choice: Choice, console: &mut Console) -> Result<Run> {
     let image = image::build(toolchain::ensure(choice, console)?, "timing", "timing", console)?;
-    let recording = paths::made("timing")?.join("recording.bin");
+    let recording = host::made("timing")?.join("recording.bin");
     let mut command = console::cargo("run");
     command.args(["--quiet", "--example", "recording", "--"]);
     console.run(command.arg(&recording))?;
@@ -119,7 +119,7 @@ pub fn kernels(choice: Choice, console: &mut Console) -> Result<Run> {
 pub fn measure(image: &Path, argument: Option<&Path>, console: &mut Console) -> Result<Run> {
     ensure(console)?;
     let plugin = plugin(console)?;
-    let file = paths::made("timing")?.join(format!(
+    let file = host::made("timing")?.join(format!(
         "{}.{}.json",
         image.file_stem().unwrap_or_default().display(),
         std::process::id()
@@ -136,7 +136,7 @@ pub fn measure(image: &Path, argument: Option<&Path>, console: &mut Console) -> 
         let errors = String::from_utf8_lossy(&ended.stderr);
         bail!("{}: {}\n{output}{errors}", ended.status, console::show(&command));
     }
-    let json_lines = fs::read_to_string(&file).with_context(|| format!("{} wrote no figures", paths::shown(&file)))?;
+    let json_lines = fs::read_to_string(&file).with_context(|| format!("{} wrote no figures", host::shown(&file)))?;
     // Only a copy of what is returned.
     let _ = fs::remove_file(&file);
     let regions = parse(&json_lines).context("the plugin's figures cannot be read")?;
@@ -151,7 +151,7 @@ pub fn ensure(console: &mut Console) -> Result<()> {
     if version().is_some_and(|version| version >= VERSION_MIN) {
         return Ok(());
     }
-    apt::newest(&[PROGRAM], WHY, console)?;
+    install::newest(&[PROGRAM], WHY, console)?;
     match version() {
         Some(version) if version >= VERSION_MIN => Ok(()),
         found => {
@@ -171,8 +171,8 @@ fn version() -> Option<u32> {
 fn plugin(console: &mut Console) -> Result<PathBuf> {
     let mut command = host::cargo("build", "m4-timing");
     console.build(command.args(["--features", "plugin"]), "the timing plugin", console::HOST)?;
-    let file = paths::target().join(host::PROFILE).join(format!("{DLL_PREFIX}m4_timing{DLL_SUFFIX}"));
-    fs::canonicalize(&file).with_context(|| paths::shown(&file))
+    let file = host::target().join(host::PROFILE).join(format!("{DLL_PREFIX}m4_timing{DLL_SUFFIX}"));
+    fs::canonicalize(&file).with_context(|| host::shown(&file))
 }
 
 /// A line for each region: cycles of a pass.
@@ -227,7 +227,7 @@ pub struct StudyArgs {
 /// Runs the study and renews or checks its page, its table in the README and its pictures.
 pub fn study(args: &StudyArgs, choice: Choice, console: &mut Console) -> Result<()> {
     let toolchain = toolchain::ensure(choice, console)?;
-    let folder = paths::made("study")?;
+    let folder = host::made("study")?;
     let inputs = folder.join("inputs.bin");
     let judge = Program::tool("study");
     let mut command = judge.build(console)?;
@@ -238,12 +238,12 @@ pub fn study(args: &StudyArgs, choice: Choice, console: &mut Console) -> Result<
     let mut fingers = Program::sim("budget").build(console)?;
     let held = console::output(fingers.args(["--whole-loop", "--fingers", FINGERS]))?;
     let whole_loop = folder.join("whole-loop.txt");
-    fs::write(&whole_loop, held).with_context(|| format!("cannot write {}", paths::shown(&whole_loop)))?;
+    fs::write(&whole_loop, held).with_context(|| format!("cannot write {}", host::shown(&whole_loop)))?;
     let mut command = judge.build(console)?;
     command.arg("report").arg(&shipped).arg(&quick).arg(&whole_loop).args(args.check.then_some("--check"));
     for (flag, path) in [("--json", &args.json), ("--out", &args.out)] {
         if let Some(path) = path {
-            command.arg(flag).arg(std::path::absolute(path).with_context(|| paths::shown(path))?);
+            command.arg(flag).arg(std::path::absolute(path).with_context(|| host::shown(path))?);
         }
     }
     console.run(&mut command)
@@ -273,6 +273,6 @@ fn measured(image: &Path, inputs: &Path, file: &Path, console: &mut Console) -> 
         }
         text.push('\n');
     }
-    fs::write(file, text).with_context(|| format!("cannot write {}", paths::shown(file)))?;
+    fs::write(file, text).with_context(|| format!("cannot write {}", host::shown(file)))?;
     Ok(file.into())
 }

@@ -1,7 +1,7 @@
 //! The compiler for the firmware: rustup's bare-metal target, or Debian's Rust where rustup's server is out of reach.
 
 use crate::console::{self, Console};
-use crate::{apt, paths};
+use crate::{host, install};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::ValueEnum;
 use std::path::PathBuf;
@@ -79,8 +79,8 @@ impl Toolchain {
     /// Two compilers in one folder would rebuild each other's work.
     fn target_dir(self) -> PathBuf {
         match self {
-            Self::Native => paths::target(),
-            Self::Debian => paths::target().join("debian"),
+            Self::Native => host::target(),
+            Self::Debian => host::target().join("debian"),
         }
     }
 }
@@ -88,7 +88,7 @@ impl Toolchain {
 /// Flags for the compiler that replace the folders of this checkout and of other crates by short names. The path of a
 /// source that can panic is part of the image, and the image must be the same bytes on every machine.
 pub fn short_paths() -> impl Iterator<Item = String> {
-    let checkout = format!("--remap-path-prefix={}=fingertip", paths::root().display());
+    let checkout = format!("--remap-path-prefix={}=fingertip", host::root().display());
     iter::once(checkout).chain(sources().map(|crates| format!("--remap-path-prefix={}=crates", crates.display())))
 }
 
@@ -119,7 +119,7 @@ pub fn ensure_for(choice: Choice, targets: &[&str], why: &str, console: &mut Con
         return Ok(Toolchain::Native);
     }
     // Debian's compiler once taken is taken again: asking an unreachable server each time would cost minutes.
-    if choice == Choice::Auto && Toolchain::Debian.target_dir().is_dir() && apt::all_installed(&DEBIAN_PACKAGES) {
+    if choice == Choice::Auto && Toolchain::Debian.target_dir().is_dir() && install::all_installed(&DEBIAN_PACKAGES) {
         return debian(console);
     }
     let Err(rustup) = add_targets(&missing, why, console) else { return Ok(Toolchain::Native) };
@@ -139,7 +139,7 @@ pub fn ensure_for(choice: Choice, targets: &[&str], why: &str, console: &mut Con
 }
 
 fn debian(console: &mut Console) -> Result<Toolchain> {
-    apt::ensure(&DEBIAN_PACKAGES, "building the firmware without rustup's target", console)?;
+    install::packages(&DEBIAN_PACKAGES, "building the firmware without rustup's target", console)?;
     console.say("Building the firmware with Debian's Rust (rustc-web), with `core` from source.");
     Ok(Toolchain::Debian)
 }
@@ -156,7 +156,7 @@ fn has_target(target: &str) -> bool {
 }
 
 fn add_targets(targets: &[&str], why: &str, console: &mut Console) -> Result<()> {
-    if paths::find_program("rustup").is_none() {
+    if host::find_program("rustup").is_none() {
         bail!("there is no rustup in PATH");
     }
     let list = targets.join(", ");

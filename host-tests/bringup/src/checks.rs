@@ -1,7 +1,7 @@
 //! Table of all checks: figure, expected range, reason, and advice if the figure is outside.
 
-use crate::finger::{COUNTS_PER_RAD, FORCE_PER_MM2, MM_PER_RAD};
 use crate::script::Bench;
+use crate::script::{COUNTS_PER_RAD, FORCE_PER_MM2, MM_PER_RAD};
 use fingertip::params::Params;
 use fingertip::shipped::{Config, Pipeline};
 use serde_json::Value;

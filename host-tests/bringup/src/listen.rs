@@ -1,6 +1,6 @@
 //! The host's side of the report: sends `go`, and reads the lines.
 
-use crate::text::{CHECK, READY, VERSION, checked};
+use crate::{CHECK, READY, VERSION, checked};
 use std::io::{Error, ErrorKind, Read, Write};
 
 /// Report of a board.

@@ -3,10 +3,9 @@
 //! Two processors whose digests are equal agree in every bit of every answer. Each input goes to all functions of the
 //! model ([`model`]) and to the types with a configuration or a state ([`machines`]); about a quarter of the numbers is
 //! outside the functions' domains. Functions of a whole frame, [`machines::FRAMES`], get every 8th input, and costly
-//! constructors, [`made::MADE`], every 1024th.
+//! constructors, [`machines::MADE`], every 1024th.
 
 pub mod machines;
-pub mod made;
 pub mod model;
 
 use core::fmt::{Debug, Write};
@@ -19,7 +18,8 @@ use model::Sample;
 pub const INPUTS: u32 = 1_000_000;
 
 /// Number of functions that are compared.
-pub const FUNCTIONS: usize = model::FUNCTIONS.len() + machines::STEPS.len() + machines::FRAMES.len() + made::MADE.len();
+pub const FUNCTIONS: usize =
+    model::FUNCTIONS.len() + machines::STEPS.len() + machines::FRAMES.len() + machines::MADE.len();
 
 /// A seeded source of inputs: the upper half of a linear congruential generator.
 #[derive(Clone, Debug)]
@@ -132,8 +132,8 @@ impl Comparison {
         for ((_, function), mix) in model::FUNCTIONS.iter().zip(by_model) {
             function(&self.sample, mix);
         }
-        if self.taken.is_multiple_of(made::MADE_EVERY) {
-            for ((_, make), mix) in made::MADE.iter().zip(by_maker) {
+        if self.taken.is_multiple_of(machines::MADE_EVERY) {
+            for ((_, make), mix) in machines::MADE.iter().zip(by_maker) {
                 make(&mut self.machines, &mut self.source, mix);
             }
         }
@@ -157,13 +157,13 @@ impl Comparison {
 
     /// Each function's name and digest, and how many inputs it took.
     pub fn digests(&self) -> impl Iterator<Item = (&'static str, u64, u32)> + '_ {
-        let made_from = FUNCTIONS - made::MADE.len();
+        let made_from = FUNCTIONS - machines::MADE.len();
         let frames_from = made_from - machines::FRAMES.len();
         names().zip(&self.mixes).enumerate().map(move |(place, (name, mix))| {
             let every = match place {
                 place if place < frames_from => 1,
                 place if place < made_from => machines::FRAME_EVERY,
-                _ => made::MADE_EVERY,
+                _ => machines::MADE_EVERY,
             };
             (name, mix.value(), self.taken.div_ceil(every))
         })
@@ -174,5 +174,5 @@ impl Comparison {
 pub fn names() -> impl Iterator<Item = &'static str> {
     let model = model::FUNCTIONS.iter().map(|(name, _)| *name);
     let machines = machines::STEPS.iter().chain(&machines::FRAMES).map(|(name, _)| *name);
-    model.chain(machines).chain(made::MADE.iter().map(|(name, _)| *name))
+    model.chain(machines).chain(machines::MADE.iter().map(|(name, _)| *name))
 }

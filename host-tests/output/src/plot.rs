@@ -1,15 +1,14 @@
 //! Pictures of a run as SVG: charts over time, curves over a quantity and pressure maps. Readable in grey, and the same
-//! bytes for the same run.
+//! bytes for the same run. And error against cost on logarithmic axes, a line along the front of the best.
 
 mod charts;
-mod fronts;
 
 use crate::heatmap::Pressures;
 use charts::Frame;
 pub use charts::{Panel, Sample, overview, steps};
 use core::f64::consts::TAU;
-pub use fronts::{Dot, Front, front};
 use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 /// A picture could not be drawn.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -280,4 +279,256 @@ fn draw_scale(full_kpa: f64, area: &Area<'_>) -> Result<(), PlotError> {
 /// The ink for the largest pressure, more transparent for less.
 fn ink(share: f64) -> RGBAColor {
     INK.mix(share.clamp(0.0, 1.0))
+}
+
+const WIDTH_PX: u32 = 1_000;
+const FRONT_HEIGHT_PX: u32 = 560;
+/// More points than this make the picture higher, by so much each.
+const POINTS_MAX: usize = 12;
+const POINT_PX: u32 = 20;
+/// Width of a letter and height of a line, generously.
+const LETTER_PX: f64 = 0.5 * LABEL_PX as f64;
+const LINE_PX: f64 = 1.1 * LABEL_PX as f64;
+/// Half of a point's width, with a little air.
+const DOT_PX: f64 = 7.0;
+/// Distances at which a label is tried.
+const NEAR_PX: f64 = 10.0;
+const STEP_PX: f64 = 5.0;
+const RINGS: u32 = 50;
+const DIRECTIONS: u32 = 24;
+/// Distance from which a line connects the label to its point, pixels.
+const FAR_PX: f64 = 14.0;
+
+/// A point.
+#[derive(Clone, Debug)]
+pub struct Dot {
+    /// Cost.
+    pub x: f64,
+    /// Error; 0 is drawn on the lower axis.
+    pub y: f64,
+    /// Label.
+    pub label: String,
+    /// True if it is on the front: filled, on the line.
+    pub best: bool,
+    /// True if it is drawn as a square, its label framed.
+    pub own: bool,
+}
+
+/// A picture.
+#[derive(Clone, Debug)]
+pub struct Front<'a> {
+    /// Title.
+    pub title: &'a str,
+    /// The horizontal axis, with its unit.
+    pub x: &'a str,
+    /// The vertical axis, with its unit.
+    pub y: &'a str,
+    /// The points; those of the front in order of their cost.
+    pub dots: Vec<Dot>,
+}
+
+/// Draws it.
+pub fn front(front: &Front<'_>) -> Result<String, PlotError> {
+    let Front { title, x, y, dots } = front;
+    let positive = |of: fn(&Dot) -> f64| dots.iter().map(of).filter(|value| *value > 0.0);
+    let (x_low, x_high) = range(positive(|dot| dot.x))?;
+    let (y_low, y_high) = range(positive(|dot| dot.y))?;
+    let has_zero = dots.iter().any(|dot| dot.y <= 0.0);
+    let y_low = if has_zero { y_low / 10.0 } else { y_low };
+    let more = dots.len().saturating_sub(POINTS_MAX) as u32;
+    picture((WIDTH_PX, FRONT_HEIGHT_PX + POINT_PX * more), |area| {
+        let mut chart = ChartBuilder::on(area)
+            .margin(10)
+            .margin_right(20)
+            .caption(title, (FONT, TITLE_PX))
+            .x_label_area_size(42)
+            .y_label_area_size(66)
+            .build_cartesian_2d((x_low..x_high).log_scale(), (y_low..y_high).log_scale())
+            .map_err(failed)?;
+        chart
+            .configure_mesh()
+            .light_line_style(TRANSPARENT)
+            .bold_line_style(FAINT)
+            .label_style((FONT, LABEL_PX))
+            .x_desc(*x)
+            .y_desc(*y)
+            .x_label_formatter(&power)
+            .y_label_formatter(&|value| if has_zero && *value < 2.0 * y_low { "0".into() } else { power(value) })
+            .draw()
+            .map_err(failed)?;
+        let place = |dot: &Dot| (dot.x.max(x_low), dot.y.max(y_low));
+        let stairs = stairs(dots, place);
+        let line: Vec<_> = stairs.iter().map(|at| chart.backend_coord(at)).collect();
+        chart.draw_series(LineSeries::new(stairs, INK.stroke_width(1))).map_err(failed)?;
+        let places: Vec<_> = dots.iter().map(|dot| chart.backend_coord(&place(dot))).collect();
+        let corners = [chart.backend_coord(&(x_low, y_high)), chart.backend_coord(&(x_high, y_low))];
+        draw_dots(area, dots, &places, &line, corners)
+    })
+}
+
+/// A range around all values, with room for labels.
+fn range(values: impl Iterator<Item = f64>) -> Result<(f64, f64), PlotError> {
+    let (low, high) = values.fold((f64::INFINITY, 0.0_f64), |(low, high), value| (low.min(value), high.max(value)));
+    if low > high {
+        return Err(PlotError("there is no point".into()));
+    }
+    Ok((0.2 * low, 4.0 * high))
+}
+
+/// A power of ten by its exponent where it is long.
+fn power(value: &f64) -> String {
+    let leading = value / 10_f64.powf(value.log10().floor());
+    // Between the decades only 2 and 5 have room.
+    if [1.0, 2.0, 5.0, 10.0].iter().all(|shown| (leading - shown).abs() > 1e-3) {
+        return String::new();
+    }
+    if (0.001..100_000.0).contains(value) { number(value) } else { format!("1e{}", value.log10().round()) }
+}
+
+/// Step line of the front: from each point at constant error to the cost of the next point, then down.
+fn stairs(dots: &[Dot], place: impl Fn(&Dot) -> (f64, f64)) -> Vec<(f64, f64)> {
+    let mut line: Vec<(f64, f64)> = Vec::new();
+    for (x, y) in dots.iter().filter(|dot| dot.best).map(place) {
+        if let Some((_, above)) = line.last().copied() {
+            line.push((x, above));
+        }
+        line.push((x, y));
+    }
+    line
+}
+
+type Pixel = (i32, i32);
+
+/// Left, upper, right and lower side.
+#[derive(Clone, Copy)]
+struct Box4([f64; 4]);
+
+impl Box4 {
+    fn around(x: f64, y: f64, half_width: f64, half_height: f64) -> Self {
+        Self([x - half_width, y - half_height, x + half_width, y + half_height])
+    }
+
+    fn meets(&self, other: &Self) -> bool {
+        let (Self([l, u, r, d]), Self([ol, ou, or, od])) = (self, other);
+        l < or && ol < r && u < od && ou < d
+    }
+
+    /// True if a straight line meets it.
+    fn is_crossed(&self, from: (f64, f64), to: (f64, f64)) -> bool {
+        // Enough places along the line to miss nothing of a label's size.
+        (0..=40).map(|n| f64::from(n) / 40.0).any(|t| {
+            let (x, y) = (from.0 + t * (to.0 - from.0), from.1 + t * (to.1 - from.1));
+            self.meets(&Self::around(x, y, 1.0, 1.0))
+        })
+    }
+
+    /// Point of the box nearest to another point.
+    fn nearest(&self, (x, y): (f64, f64)) -> (f64, f64) {
+        let Self([left, up, right, down]) = *self;
+        (x.max(left).min(right), y.max(up).min(down))
+    }
+
+    fn lies_in(&self, other: &Self) -> bool {
+        let (Self([l, u, r, d]), Self([ol, ou, or, od])) = (self, other);
+        l >= ol && r <= or && u >= ou && d <= od
+    }
+}
+
+fn draw_dots(
+    area: &Area<'_>,
+    dots: &[Dot],
+    places: &[Pixel],
+    line: &[Pixel],
+    [upper, lower]: [Pixel; 2],
+) -> Result<(), PlotError> {
+    let frame = Box4([upper.0, upper.1, lower.0, lower.1].map(f64::from));
+    let mut taken: Vec<_> =
+        places.iter().map(|(x, y)| Box4::around(f64::from(*x), f64::from(*y), DOT_PX, DOT_PX)).collect();
+    taken.extend(line.windows(2).map(|ends| {
+        let [(ax, ay), (bx, by)] = [ends[0], ends[1]].map(|(x, y)| (f64::from(x), f64::from(y)));
+        Box4([ax.min(bx) - 1.0, ay.min(by) - 1.0, ax.max(bx) + 1.0, ay.max(by) + 1.0])
+    }));
+    let style = TextStyle::from((FONT, LABEL_PX).into_font()).pos(Pos::new(HPos::Center, VPos::Center));
+    // Points of the front choose first.
+    let order = (0..dots.len()).filter(|n| dots[*n].best).chain((0..dots.len()).filter(|n| !dots[*n].best));
+    let mut leaders = Vec::new();
+    for n in order {
+        let dot = &dots[n];
+        let at = (f64::from(places[n].0), f64::from(places[n].1));
+        let half = (0.5 * LETTER_PX * dot.label.chars().count() as f64 + 3.0, 0.5 * LINE_PX + 2.0);
+        // Where points crowd, a line to a label may cross what a label may not.
+        let others: Vec<_> =
+            places.iter().map(|(x, y)| (f64::from(*x), f64::from(*y))).filter(|other| *other != at).collect();
+        let found = [(&others[..], Some(&leaders[..])), (&[], Some(&leaders)), (&[], None)]
+            .into_iter()
+            .find_map(|(others, lines)| free_place(at, half, &taken, lines, others, &frame));
+        let (far, middle) = found.ok_or_else(|| PlotError(format!("no room for the label {}", dot.label)))?;
+        let label = Box4::around(middle.0, middle.1, half.0, half.1);
+        if far > FAR_PX {
+            let end = label.nearest(at);
+            let line = vec![places[n], (end.0 as i32, end.1 as i32)];
+            area.draw(&PathElement::new(line, BLACK.mix(0.5).stroke_width(1))).map_err(failed)?;
+            leaders.push((at, end));
+        }
+        if dot.own {
+            let Box4([left, up, right, down]) = label;
+            let corners = [(left as i32, up as i32), (right as i32, down as i32)];
+            area.draw(&Rectangle::new(corners, BLACK.stroke_width(1))).map_err(failed)?;
+        }
+        let text = Text::new(dot.label.clone(), (middle.0 as i32, middle.1 as i32), style.clone());
+        area.draw(&text).map_err(failed)?;
+        taken.push(label);
+    }
+    for (dot, (x, y)) in dots.iter().zip(places) {
+        let fill = if dot.best { INK.filled() } else { WHITE.filled() };
+        if dot.own {
+            let corners = [(x - 5, y - 5), (x + 5, y + 5)];
+            area.draw(&Rectangle::new(corners, fill)).map_err(failed)?;
+            area.draw(&Rectangle::new(corners, INK.stroke_width(2))).map_err(failed)?;
+        } else {
+            area.draw(&Circle::new((*x, *y), 4, fill)).map_err(failed)?;
+            area.draw(&Circle::new((*x, *y), 4, INK.stroke_width(1))).map_err(failed)?;
+        }
+    }
+    Ok(())
+}
+
+type Place = (f64, f64);
+
+fn apart(a: Place, b: Place) -> f64 {
+    (a.0 - b.0).hypot(a.1 - b.1)
+}
+
+/// The nearest place for a label where it and the line to it cover nothing, nearer to its point than to another: its
+/// distance from the point, and its middle.
+fn free_place(
+    at: Place,
+    half: (f64, f64),
+    taken: &[Box4],
+    leaders: Option<&[(Place, Place)]>,
+    others: &[Place],
+    frame: &Box4,
+) -> Option<(f64, Place)> {
+    let own = Box4::around(at.0, at.1, 1.0, 1.0);
+    for ring in 0..RINGS {
+        let far = NEAR_PX + STEP_PX * f64::from(ring);
+        for n in 0..DIRECTIONS {
+            // Beside first, then around.
+            let turn = f64::from(n / 2) * if n % 2 == 0 { 1.0 } else { -1.0 };
+            let (sin, cos) = (core::f64::consts::TAU * turn / f64::from(DIRECTIONS)).sin_cos();
+            let middle = (at.0 + cos * (far + half.0), at.1 - sin * (far + half.1));
+            let label = Box4::around(middle.0, middle.1, half.0, half.1);
+            let end = label.nearest(at);
+            let covers = taken.iter().any(|other| label.meets(other))
+                || leaders.into_iter().flatten().any(|(from, to)| label.is_crossed(*from, *to))
+                || others.iter().any(|other| apart(label.nearest(*other), *other) < 1.5 * apart(end, at))
+                || (leaders.is_some()
+                    && far > FAR_PX
+                    && taken.iter().any(|other| !other.meets(&own) && other.is_crossed(at, end)));
+            if label.lies_in(frame) && !covers {
+                return Some((far, middle));
+            }
+        }
+    }
+    None
 }

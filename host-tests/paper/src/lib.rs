@@ -25,15 +25,12 @@
 
 pub mod units;
 
-mod angle;
-mod friction;
 mod relaxation;
 mod tilt;
 mod touching;
 
-pub use friction::{LimitSurface, friction_shape, limit_surface};
 pub use relaxation::{PERIODS_MAX, Relaxation, RelaxationError, RelaxationState, RelaxationTerm};
-pub use tilt::{Displacement, Load, energy, free_shift, load};
+pub use tilt::{Displacement, LimitSurface, Load, energy, free_shift, friction_shape, limit_surface, load};
 pub use touching::{
     area_density, compression_at, distance_at, distance_slope, height_at, touching_angle, touching_angle_max,
 };

@@ -6,14 +6,13 @@
 
 #[cfg(feature = "native")]
 pub mod native;
-mod pace;
 mod port;
 
-pub use pace::{Pace, Served};
 pub use port::{Place, Port, Stop};
 
 use output::say;
 use port::Event;
+use std::fmt::Write as _;
 use std::time::{Duration, Instant};
 
 /// Interval at which an idle finger is advanced: the time that it must catch up at most when a request arrives.
@@ -110,4 +109,152 @@ pub fn serve<F: Finger>(finger: &mut F, port: &mut Port, late: Duration, always:
 fn advance<F: Finger>(finger: &mut F, pace: &mut Pace) -> Result<(), F::Error> {
     let (now_s, clock_s) = (finger.now_s(), pace.clock_s(finger.now_s()));
     if clock_s > now_s { finger.run_until(clock_s.min(now_s + 2.0 * TICK.as_secs_f64())) } else { Ok(()) }
+}
+
+/// A finger that is farther behind does not try to catch up.
+const BEHIND_MAX_S: f64 = 0.1;
+/// Share of real time below which a finger is reported to be behind.
+const KEEPS_UP: f64 = 0.98;
+/// Interval of the checks, and of the reports while nothing changes.
+const LOOK: Duration = Duration::from_secs(1);
+const LOOKS_BETWEEN: u32 = 5;
+
+/// Statistics of a served finger.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Served {
+    /// Time of the finger, s.
+    pub virtual_s: f64,
+    /// Real time.
+    pub wall_s: f64,
+    /// Bytes from clients.
+    pub received: u64,
+    /// Bytes to them.
+    pub sent: u64,
+    /// Answers, and how many of them were late.
+    pub answers: u64,
+    /// See there.
+    pub late: u64,
+    /// The longest time between a request and its answer, less the answer's own delay.
+    pub longest_s: f64,
+}
+
+/// A finger's time against the clock.
+#[derive(Debug)]
+pub struct Pace {
+    begun: Instant,
+    begun_s: f64,
+    /// Time skipped because the finger was too far behind, s.
+    lost_s: f64,
+    late: Duration,
+    always: bool,
+    asked: Option<Instant>,
+    all: Served,
+    look: Look,
+    /// Number of checks until the next report; 0 while it keeps up.
+    silent: u32,
+}
+
+/// Statistics since the last report.
+#[derive(Debug)]
+struct Look {
+    at: Instant,
+    virtual_s: f64,
+    late: u64,
+    longest_s: f64,
+}
+
+impl Look {
+    fn at(virtual_s: f64) -> Self {
+        Self { at: Instant::now(), virtual_s, late: 0, longest_s: 0.0 }
+    }
+}
+
+impl Pace {
+    /// Begins now, at this time of the finger.
+    pub fn new(begun_s: f64, late: Duration, always: bool) -> Self {
+        let begun = Instant::now();
+        let look = Look::at(begun_s);
+        Self { begun, begun_s, lost_s: 0.0, late, always, asked: None, all: Served::default(), look, silent: 0 }
+    }
+
+    /// Time of a finger that keeps up, s.
+    pub fn clock_s(&mut self, now_s: f64) -> f64 {
+        let clock_s = self.begun_s + self.begun.elapsed().as_secs_f64() - self.lost_s;
+        let beyond_s = clock_s - now_s - BEHIND_MAX_S;
+        if beyond_s > 0.0 {
+            self.lost_s += beyond_s;
+            return clock_s - beyond_s;
+        }
+        clock_s
+    }
+
+    /// Instant at which the clock reaches a time of the finger.
+    pub fn until(&self, time_s: Option<f64>) -> Option<Instant> {
+        time_s.map(|time_s| self.begun + Duration::from_secs_f64((time_s - self.begun_s + self.lost_s).max(0.0)))
+    }
+
+    /// Bytes came in.
+    pub fn asked(&mut self, bytes: usize) {
+        self.all.received += bytes as u64;
+        self.asked = Some(Instant::now());
+    }
+
+    /// An answer left.
+    pub fn answered(&mut self, bytes: usize) {
+        self.all.sent += bytes as u64;
+        // An answer in pieces counts by its first piece.
+        let Some(asked) = self.asked.take() else { return };
+        self.all.answers += 1;
+        let took = asked.elapsed();
+        self.look.longest_s = self.look.longest_s.max(took.as_secs_f64());
+        self.all.longest_s = self.all.longest_s.max(took.as_secs_f64());
+        if took > self.late {
+            self.all.late += 1;
+            self.look.late += 1;
+        }
+    }
+
+    /// Returns the report on the time since the last one, if one is due.
+    pub fn tell(&mut self, now_s: f64) -> Option<String> {
+        let wall_s = self.look.at.elapsed();
+        if wall_s < LOOK {
+            return None;
+        }
+        let look = std::mem::replace(&mut self.look, Look::at(now_s));
+        let ratio = (now_s - look.virtual_s) / wall_s.as_secs_f64();
+        let well = ratio >= KEEPS_UP && look.late == 0;
+        if well && !self.always {
+            let was_behind = std::mem::take(&mut self.silent) > 0;
+            return was_behind.then(|| format!("pace     {ratio:.2} of real time again"));
+        }
+        self.silent = self.silent.checked_sub(1).unwrap_or(LOOKS_BETWEEN);
+        if self.silent != LOOKS_BETWEEN {
+            return None;
+        }
+        let mut text = format!("pace     {ratio:.2} of real time");
+        if look.late > 0 {
+            let (late, allowed_ms, longest_ms) = (look.late, self.late.as_secs_f64() * 1e3, look.longest_s * 1e3);
+            // Writing to a string does not fail.
+            let _ = write!(text, "; {late} answers later than {allowed_ms:.1} ms, the longest took {longest_ms:.1} ms");
+        }
+        Some(text)
+    }
+
+    /// All of it.
+    pub fn end(&self, now_s: f64) -> Served {
+        Served { virtual_s: now_s - self.begun_s, wall_s: self.begun.elapsed().as_secs_f64(), ..self.all }
+    }
+}
+
+impl Served {
+    /// Text for people.
+    pub fn text(&self) -> String {
+        let Self { virtual_s, wall_s, received, sent, answers, late, longest_s } = self;
+        format!(
+            "served   {virtual_s:.1} s of virtual time in {wall_s:.1} s: {:.2} of real time\n         \
+             {received} bytes in, {sent} out, {answers} answers, {late} of them late, the longest after {:.1} ms",
+            virtual_s / wall_s,
+            longest_s * 1e3
+        )
+    }
 }

@@ -7,11 +7,11 @@ mod strokes;
 
 use crate::finger::{Draw, Finger, Part, Place, plan, presses};
 use fingertip::measure::series::{Head, check, step_bytes};
-use solve::drift::{HeldSeries, NoDrift};
 use solve::gains::Condition;
 use solve::press::{Branch, Press};
 use solve::record::{Ended, Reason};
 use solve::scale::Held;
+use solve::scale::{HeldSeries, NoDrift};
 use solve::strokes::NoDrive;
 use solve::{Value, creep, gains, scale, temperature};
 use std::f64::consts::TAU;

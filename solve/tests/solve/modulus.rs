@@ -2,8 +2,8 @@
 
 use crate::finger::{Draw, FRAME_NS, Finger, Part, Place, cycle, plan, presses, stairs};
 use fingertip::params::Params;
+use solve::gains::Verdict;
 use solve::gains::{Condition, NoGains};
-use solve::judge::Verdict;
 use solve::modulus::{Modulus, NoModulus};
 use solve::press::Press;
 use solve::{gains, modulus, record};

@@ -1,11 +1,13 @@
-//! `fingertip calibrate`.
+//! The guided procedures: `fingertip calibrate`, `identify` and `commission`.
 
-use super::guided::hold::{HOLDS, WEIGHT};
-use super::guided::motion::press_name;
-use super::guided::{Options, Presses, Procedure};
+use super::guided::motion::{HOLDS, WEIGHT, press_name};
+use super::guided::{Options, Presses, Procedure, yes_or_no};
+use super::params;
 use super::press::direction_confirmed;
-use crate::{Client, Error, numbers};
+use crate::{Client, Error, numbers, table};
+use fingertip::measure::Task;
 use serde_json::json;
+use solve::Value;
 use solve::modulus::Modulus;
 use std::time::Duration;
 
@@ -21,7 +23,7 @@ const WARM: &str = "warm.fts";
     fingertip calibrate --scale-n 1,2.5,4 --save            (the scale shows three forces)\n  \
     fingertip calibrate --no-scale --no-wait --apply --json (no questions, for programs)\n  \
     fingertip calibrate --scale-n 1,2 --shown-n 1.04,2.07 --session finger-1 --no-wait --json")]
-pub struct Args {
+pub struct Calibrate {
     /// Number of presses; finger or plate are moved between them
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=9))]
     presses: u32,
@@ -49,7 +51,7 @@ pub struct Args {
     options: Options,
 }
 
-impl Args {
+impl Calibrate {
     /// Goals to hold, mN.
     fn goals_mn(&self) -> Vec<i64> {
         match (self.no_scale, self.scale_n.is_empty()) {
@@ -75,7 +77,7 @@ impl Args {
 }
 
 /// Measures gains and modulus by presses, the scale of forces by a kitchen scale, and on request creep and temperature.
-pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
+pub fn calibrate(args: &Calibrate, client: &mut Client, json: bool) -> Result<(), Error> {
     args.check(json)?;
     direction_confirmed(client)?;
     let mut procedure = Procedure::begin("calibrate", &args.options, json, client)?;
@@ -94,7 +96,7 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
 
 /// Modulus, and with a scale the array's sensitivity: a press measures the product of modulus and common gain, a scale the
 /// common gain by itself.
-fn scale(args: &Args, modulus: &Modulus, procedure: &mut Procedure<'_>) -> Result<(), Error> {
+fn scale(args: &Calibrate, modulus: &Modulus, procedure: &mut Procedure<'_>) -> Result<(), Error> {
     let goals_mn = args.goals_mn();
     let share = modulus.sigma_kpa / modulus.kpa;
     if goals_mn.is_empty() {
@@ -140,7 +142,7 @@ fn scale(args: &Args, modulus: &Modulus, procedure: &mut Procedure<'_>) -> Resul
     Ok(())
 }
 
-fn creep(seconds: f64, args: &Args, procedure: &mut Procedure<'_>) -> Result<(), Error> {
+fn creep(seconds: f64, args: &Calibrate, procedure: &mut Procedure<'_>) -> Result<(), Error> {
     if !procedure.session.steps.contains_key(WEIGHT) {
         procedure.tare_after(args.how.pause_s)?;
     }
@@ -159,7 +161,7 @@ fn creep(seconds: f64, args: &Args, procedure: &mut Procedure<'_>) -> Result<(),
     Ok(())
 }
 
-fn temperature(args: &Args, procedure: &mut Procedure<'_>) -> Result<(), Error> {
+fn temperature(args: &Calibrate, procedure: &mut Procedure<'_>) -> Result<(), Error> {
     let cold = procedure.pressed(&press_name(args.presses))?;
     if !procedure.session.records.contains_key(WARM) {
         let chip_c = cold.steps.iter().find_map(|step| step.chip_c);
@@ -178,5 +180,133 @@ fn temperature(args: &Args, procedure: &mut Procedure<'_>) -> Result<(), Error> 
             procedure.found.block(format!("the temperature coefficient was not measured: {why}"));
         }
     }
+    Ok(())
+}
+
+/// Options of the presses.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    fingertip identify                                      (asks before it writes)\n  \
+    fingertip identify --presses 3 --session tip-1\n  \
+    fingertip identify --no-wait --apply --save --json      (no questions, for programs)")]
+pub struct Identify {
+    /// Number of presses; more show how much the modulus scatters
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=9))]
+    presses: u32,
+    #[command(flatten)]
+    how: Presses,
+    #[command(flatten)]
+    options: Options,
+}
+
+/// Measures Young's modulus of the tip by presses onto a hard plate.
+pub fn identify(args: &Identify, client: &mut Client, json: bool) -> Result<(), Error> {
+    args.how.check(json)?;
+    direction_confirmed(client)?;
+    let mut procedure = Procedure::begin("identify", &args.options, json, client)?;
+    procedure.press_all(args.presses, &args.how)?;
+    let modulus = procedure.modulus(args.presses)?;
+    let found = &mut procedure.found;
+    found.row("modulus_pa", 1e3 * modulus.kpa, Some(1e3 * modulus.sigma_kpa));
+    found.more.insert("remaining".into(), json!({ "modulus_percent": 100.0 * modulus.sigma_kpa / modulus.kpa }));
+    procedure.finish()
+}
+
+/// Relative standard uncertainty of a resistance that an ohmmeter shows.
+const OHMMETER: f64 = 0.01;
+/// Steps of the session.
+const JOG: &str = "jog";
+const STROKES: &str = "strokes.fts";
+const DIRECTION: &str = "direction_confirmed";
+
+/// Options of the commissioning.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    fingertip commission                                    (watch the tip; asks before it writes)\n  \
+    fingertip commission --resistance-ohm 3.53 --save\n  \
+    fingertip commission --forward yes --apply --json       (no questions, for programs)")]
+pub struct Commission {
+    /// Resistance of motor and bridge together, Ohm, by an ohmmeter; resistance_mohm without it
+    #[arg(long, value_name = "OHM", value_parser = ohm)]
+    resistance_ohm: Option<f64>,
+    /// Answer to whether the jog first moves the tip towards the object: without it the command asks
+    #[arg(long, value_name = "yes|no", value_parser = yes_or_no)]
+    forward: Option<bool>,
+    #[command(flatten)]
+    options: Options,
+}
+
+fn ohm(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|number| (0.05..=200.0).contains(number));
+    number.ok_or_else(|| "a number from 0.05 to 200 is expected".into())
+}
+
+/// Proves the motor's direction, then measures the drive by strokes in the air.
+pub fn commission(args: &Commission, client: &mut Client, json: bool) -> Result<(), Error> {
+    if json && args.forward.is_none() {
+        return Err(Error::NotUnderstood("--json asks no questions: give --forward yes or --forward no".into()));
+    }
+    let mut procedure = Procedure::begin("commission", &args.options, json, client)?;
+    // A controller that restarted does not know it any more.
+    if !procedure.session.steps.contains_key(JOG) || direction_confirmed(procedure.client).is_err() {
+        direction(args, &mut procedure)?;
+    }
+    if !procedure.session.records.contains_key(STROKES) {
+        procedure.tare()?;
+        procedure.run.report("strokes: 1 mm to both sides, some 10 s");
+        let bytes = procedure.motion(Task::Strokes)?;
+        solve::record::strokes(&bytes, &procedure.session.before.params).map_err(|why| why.to_string())?;
+        procedure.session.recorded(STROKES, bytes)?;
+    }
+    solve_strokes(args, &mut procedure)?;
+    procedure.finish()
+}
+
+/// The jog shows which way the motor goes; a person says whether that is towards the object.
+fn direction(args: &Commission, procedure: &mut Procedure<'_>) -> Result<(), Error> {
+    procedure.tare()?;
+    procedure.run.report("jog: watch the tip. It moves by 0.8 mm and back, with 8 % of duty at most");
+    procedure.motion(Task::Jog)?;
+    let forward = match args.forward {
+        Some(forward) => forward,
+        None => procedure.run.yes("did the tip first move towards the object?", "--forward yes or --forward no")?,
+    };
+    params::set(&[(table::find(DIRECTION)?, forward.into())], procedure.client)?;
+    if !forward {
+        return Err(
+            "the tip first moved away from the object: swap the motor's leads and the encoder's channels, both, \
+                    then run it again. Torque is refused until then"
+                .into(),
+        );
+    }
+    procedure.session.done(JOG, json!({ "forward": true }))
+}
+
+fn solve_strokes(args: &Commission, procedure: &mut Procedure<'_>) -> Result<(), Error> {
+    let (session, found) = (&mut procedure.session, &mut procedure.found);
+    let bytes = session.records.get(STROKES).map(Vec::as_slice).unwrap_or_default();
+    let mut record = solve::record::strokes(bytes, &session.before.params).map_err(|why| why.to_string())?;
+    found.row(DIRECTION, 1.0, None);
+    if let Some(ohm) = args.resistance_ohm {
+        record.resistance = Value { value: ohm, sigma: OHMMETER * ohm };
+        found.row("resistance_mohm", 1e3 * ohm, Some(1e3 * OHMMETER * ohm));
+    }
+    let drive = match solve::strokes::solve(&record) {
+        Ok(drive) => drive,
+        Err(why) => {
+            session.forget(STROKES)?;
+            return Err(format!("the strokes give no drive: {why}. The next run makes them again").into());
+        }
+    };
+    let mut row = |name, unit: f64, value: Value| found.row(name, unit * value.value, Some(unit * value.sigma));
+    row("torque_constant_unm_per_a", 1e6, drive.torque_constant);
+    row("inertia_ug_m2", 1e9, drive.inertia_kg_m2);
+    let [forward, back] = drive.friction_nm;
+    let mean = Value { value: (forward.value + back.value) / 2.0, sigma: forward.sigma.max(back.sigma) };
+    row("friction_unm", 1e6, mean);
+    let (tau, force) = (drive.time_constant_s, drive.force_n);
+    found.more.insert("time_constant_s".into(), json!({ "value": tau.value, "sigma": tau.sigma }));
+    found.more.insert("friction_each_unm".into(), json!({ "forward": 1e6 * forward.value, "back": 1e6 * back.value }));
+    found.notes.push(format!("time constant {tau} s; force that depends on the place {force} N"));
     Ok(())
 }

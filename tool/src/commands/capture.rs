@@ -1,17 +1,18 @@
-//! `fingertip capture`.
+//! `fingertip capture`, and `fingertip replay` of what it wrote.
 
-use super::moving::Moving;
+use super::stop::Moving;
 use super::{Interrupt, TOUCHED, aside, no_fault_nor_motion, press, say, say_json, stopped, wait_for};
-use crate::captured::{self, About, ENDED};
-use crate::messages::device;
+
+use crate::recordings::{self, About, ENDED, device};
 use crate::state::unix_ns;
 use crate::whole::Part;
 use crate::{Client, Error, numbers, table};
 use fingertip::capture::CaptureState;
 use fingertip::shipped::address;
 use fingertip::state::Limits;
-use serde_json::json;
-use std::path::PathBuf;
+use serde_json::{Value, json};
+use std::fs;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// Interval of the checks.
@@ -98,11 +99,12 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     let ended_ns = unix_ns();
     let bytes = fetch(client, count, &say_on)?;
     let mut touched = false;
-    let replayed = captured::through_the_core(&bytes, |_, status| touched |= status.limits.has(Limits::TARED_TOUCHING))
-        .map_err(|why| format!("what the board kept is of no use here: {why}"))?;
+    let replayed =
+        recordings::through_the_core(&bytes, |_, status| touched |= status.limits.has(Limits::TARED_TOUCHING))
+            .map_err(|why| format!("what the board kept is of no use here: {why}"))?;
     let about = about(args, ended_ns, client)?;
     let file = |why: &dyn std::fmt::Display| Error::file("write", &args.out, why);
-    captured::write(part.file().map_err(|why| file(&why))?, &bytes, &about).map_err(|why| file(&why))?;
+    recordings::write(part.file().map_err(|why| file(&why))?, &bytes, &about).map_err(|why| file(&why))?;
     part.place()?;
     let ended = table::meaning(address::CAPTURE_ENDED, replayed.head.ended as i64);
     let (frames, seconds) =
@@ -221,4 +223,85 @@ fn about(args: &Args, ended_ns: u64, client: &mut Client) -> Result<About, Error
     let mut about = device(client)?;
     about.extend(entries.map(|(name, value)| (name.to_owned(), value)));
     Ok(about)
+}
+
+/// Options of a replay.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  fingertip replay press.mcap\n  fingertip replay captures")]
+pub struct Replay {
+    /// Captures, or folders: all that ends with .mcap in them
+    #[arg(required = true)]
+    paths: Vec<PathBuf>,
+}
+
+/// Feeds captures through the core on this machine; a line for each.
+pub fn replay_all(args: &Replay, json: bool) -> Result<(), Error> {
+    let mut files = Vec::new();
+    for path in &args.paths {
+        find(path, &mut files).map_err(|why| Error::file("read", path, why))?;
+    }
+    let (mut told, mut wrong) = (Vec::new(), 0);
+    for file in &files {
+        let (verdict, text, good) = replay(file);
+        wrong += usize::from(!good);
+        if json {
+            told.push(verdict);
+        } else {
+            say(format_args!("{}: {}", file.display(), text));
+        }
+    }
+    if json {
+        say_json(&Value::Array(told));
+    }
+    match (files.len(), wrong) {
+        (0, _) => Err("no capture there: nothing was replayed".into()),
+        (_, 0) => Ok(()),
+        (all, wrong) => Err(format!("{wrong} of {all} captures do not replay").into()),
+    }
+}
+
+/// Files that end with `.mcap`, in the order of the names; a file that is named counts whatever its name. A link to a
+/// folder is not followed: it may lead back.
+fn find(path: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
+    if !fs::metadata(path)?.is_dir() {
+        files.push(path.into());
+        return Ok(());
+    }
+    let mut inside: Vec<PathBuf> =
+        fs::read_dir(path)?.map(|entry| Ok(entry?.path())).collect::<std::io::Result<_>>()?;
+    inside.sort();
+    for path in inside {
+        let folder = fs::symlink_metadata(&path)?.is_dir();
+        if folder || path.is_file() && path.extension().is_some_and(|ending| ending == "mcap") {
+            find(&path, files)?;
+        }
+    }
+    Ok(())
+}
+
+/// Result of a file in JSON and in words, and whether it is as expected.
+fn replay(file: &Path) -> (Value, String, bool) {
+    let kept = match recordings::open(file) {
+        Ok(kept) => kept,
+        Err(why) => return (json!({ "file": file, "refused": why }), format!("refused: {why}"), false),
+    };
+    let firmware = kept.about.get("firmware").cloned().unwrap_or_default();
+    match recordings::through_the_core(&kept.bytes, |_, _| {}) {
+        Err(why) => {
+            let why = why.to_string();
+            let of = if firmware.is_empty() { String::new() } else { format!(" (firmware {firmware})") };
+            let text = format!("refused: {why}{of}");
+            (json!({ "file": file, "firmware": firmware, "refused": why }), text, false)
+        }
+        Ok(replayed) => {
+            let frames = replayed.head.frames;
+            let at = replayed.difference;
+            let difference = at.map(|at| {
+                json!({ "frame": at.frame, "field": at.field.name(), "captured": at.captured, "replayed": at.replayed })
+            });
+            let text = at.map_or("the same to the bit".into(), |at| at.to_string());
+            let verdict = json!({ "file": file, "firmware": firmware, "frames": frames, "difference": difference });
+            (verdict, format!("{frames} frames, {text}"), at.is_none())
+        }
+    }
 }

@@ -1,19 +1,21 @@
-//! `fingertip params`: what outlives a reset.
-
-pub(super) mod file;
+//! `fingertip params`: what outlives a reset. A backup of it is TOML, a line each with its meaning.
 
 use super::{say, say_json};
 use crate::state::RESTARTED;
 use crate::table::{self, name};
-use crate::{Client, Error};
+use crate::{Client, Error, whole};
 use fingertip::link::table::Register;
 use fingertip::params::Params;
 use fingertip::pressure::GAIN_ONE;
-use fingertip::shipped::{Config, address};
+use fingertip::shipped::{Config, Gains, address};
 use fingertip::store::BAUD_RATES;
 use serde_json::{Map, json};
-use std::path::PathBuf;
+use std::fmt::Write as _;
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+use toml_edit::Document;
 
 /// Values of `SAVED_STATE`.
 const SAME: i64 = 0;
@@ -85,14 +87,14 @@ pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Err
             }
         }),
         Command::Backup { file, force } => {
-            let kept = file::Kept { values: read_all(client)?, gains: Some(file::read_gains(client)?) };
-            file::write(file, *force, client, &kept)?;
+            let kept = Backup { values: read_all(client)?, gains: Some(read_gains(client)?) };
+            write_backup(file, *force, client, &kept)?;
             let count = kept.values.len();
             told(json, &kept.values, &format!("{count} parameters and the taxels' gains in {}", file.display()));
             Ok(())
         }
         Command::Restore { file, save } => {
-            let file::Kept { mut values, gains } = file::read(file)?;
+            let Backup { mut values, gains } = read_backup(file)?;
             // Who moves a device to another address or speed means it, and says so by `set`.
             values.retain(|(register, _)| !is_bus(register));
             torque_is_off(client)?;
@@ -142,8 +144,8 @@ pub(super) fn with_gains(
     client: &mut Client,
     set: impl FnOnce(&mut Client, bool) -> Result<(), Error>,
 ) -> Result<(), Error> {
-    let before = gains.map_or(Ok(None), |gains| file::set_gains(gains, client))?;
-    set(client, before.is_some()).map_err(|why| match before.map(|before| file::set_gains(&before, client)) {
+    let before = gains.map_or(Ok(None), |gains| set_gains(gains, client))?;
+    set(client, before.is_some()).map_err(|why| match before.map(|before| set_gains(&before, client)) {
         None => why,
         Some(Ok(_)) => Error::Other(format!("{why}; the taxels' gains are put back")),
         Some(Err(second)) => Error::Other(format!("{why}; and the taxels' gains could not be put back: {second}")),
@@ -198,10 +200,10 @@ pub(super) fn save(client: &mut Client, json: bool) -> Result<(), Error> {
 }
 
 fn diff(file: Option<&std::path::Path>, client: &mut Client, json: bool) -> Result<(), Error> {
-    let (now, gains_now) = (read_all(client)?, file::read_gains(client)?);
+    let (now, gains_now) = (read_all(client)?, read_gains(client)?);
     let (other, other_gains, what) = match file {
         Some(path) => {
-            let file::Kept { values, gains } = file::read(path)?;
+            let Backup { values, gains } = read_backup(path)?;
             (values, gains, path.display().to_string())
         }
         None => {
@@ -279,7 +281,7 @@ pub(in crate::commands) type Changed = (&'static Register, i64, i64);
 
 /// Sets parameters; returns those that changed. Where a value is wrong or torque is on, nothing was changed; where the
 /// controller refused, the error says what was changed nevertheless.
-pub(in crate::commands) fn set(values: &[Value], client: &mut Client) -> Result<Vec<Changed>, Error> {
+pub(super) fn set(values: &[Value], client: &mut Client) -> Result<Vec<Changed>, Error> {
     let wrong: Vec<String> = values.iter().filter_map(wrong).chain(twice(values)).collect();
     if !wrong.is_empty() {
         return Err(format!("{}; nothing was changed", wrong.join("; ")).into());
@@ -403,4 +405,126 @@ fn put_back(params: &[u8], changed: &[Changed], client: &mut Client, why: &Error
             ))
         }
     }
+}
+
+const PARAMETERS: &str = "parameters";
+/// The taxels', in rows.
+const GAINS: &str = "gains";
+/// Number of entries: a file that was cut has fewer, or a last line without an end.
+const ENTRIES: &str = "entries";
+
+/// Content of a backup.
+struct Backup {
+    /// Values of registers with a name.
+    values: Vec<Value>,
+    /// The taxels' gains, in rows; `None` if the file has none.
+    gains: Option<Vec<Vec<u16>>>,
+}
+
+/// Writes it, whole or not at all.
+fn write_backup(path: &Path, force: bool, client: &mut Client, kept: &Backup) -> Result<(), Error> {
+    let Backup { values, gains } = kept;
+    let gains = gains.as_deref().unwrap_or_default();
+    let information = client.number(address::MODEL_INFORMATION)?;
+    let pong = client.ping()?;
+    let mut text = format!(
+        "# A fingertip's stored parameters, by `fingertip params backup`; `restore` sets them again.\n\
+         # Units stand in the names; what is left out stays as it is.\nfirmware_version = {}\ntable_version = {}\n\
+         {ENTRIES} = {}\n\n[{PARAMETERS}]\n",
+        pong.firmware,
+        information >> 16,
+        values.len() + gains.len()
+    );
+    for (register, value) in values {
+        let doc = register.doc.trim();
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "{} = {value}  # {doc} {} to {}.", name(register), register.min, register.max);
+    }
+    if !gains.is_empty() {
+        let _ = writeln!(text, "\n# What each taxel's reading is multiplied by, in 16384ths.\n[{GAINS}]");
+    }
+    for (row, gains) in gains.iter().enumerate() {
+        let _ = writeln!(text, "row_{row} = {gains:?}");
+    }
+    whole::write(path, force, text.as_bytes())
+}
+
+/// Reads it.
+fn read_backup(path: &Path) -> Result<Backup, Error> {
+    let text = fs::read_to_string(path).map_err(|why| match why.kind() {
+        ErrorKind::InvalidData => Error::file("read", path, "it is no text"),
+        _ => Error::file("read", path, why),
+    })?;
+    let document = Document::parse(text.as_str()).map_err(|why| Error::file("read", path, why))?;
+    let table = document.get(PARAMETERS).and_then(|item| item.as_table());
+    let table = table.ok_or_else(|| Error::file("read", path, format_args!("it has no table [{PARAMETERS}]")))?;
+    let rows = document.get(GAINS).and_then(|item| item.as_table());
+    let entries = table.len() + rows.map_or(0, |rows| rows.len());
+    if let Some(count) = document.get(ENTRIES).and_then(|item| item.as_integer())
+        && (count != entries as i64 || !text.ends_with('\n'))
+    {
+        let why = format!(
+            "it was cut, or changed: it has {} of {count} entries, and its last line may not be whole. \
+             Where that is meant, take out the line `{ENTRIES}`",
+            entries
+        );
+        return Err(Error::file("read", path, why));
+    }
+    let (mut values, mut wrong) = (Vec::new(), Vec::new());
+    for (key, item) in table.iter() {
+        match (table::find(key), item.as_integer()) {
+            (Ok(register), Some(value)) => values.push((register, value)),
+            (Ok(_), None) => wrong.push(format!("{key} is no whole number")),
+            (Err(why), _) => wrong.push(why),
+        }
+    }
+    wrong.extend(twice(&values));
+    let mut gains = rows.map(|_| Vec::new());
+    for (row, key) in (0..).map(|row| (row, format!("row_{row}"))).take(rows.map_or(0, |rows| rows.len())) {
+        let numbers = rows.and_then(|rows| rows.get(&key)).and_then(|item| item.as_array());
+        let gain = |value: &toml_edit::Value| {
+            value
+                .as_integer()
+                .and_then(|gain| u16::try_from(gain).ok())
+                .filter(|gain| (Gains::MIN..=Gains::MAX).contains(gain))
+        };
+        match (numbers.map(|numbers| numbers.iter().map(gain).collect::<Option<Vec<u16>>>()), &mut gains) {
+            (Some(Some(row)), Some(gains)) => gains.push(row),
+            (None, _) => wrong.push(format!("[{GAINS}] lacks {key}: rows count from 0")),
+            _ => wrong.push(format!(
+                "[{GAINS}] row_{row}: a gain is a whole number from {} to {}",
+                Gains::MIN,
+                Gains::MAX
+            )),
+        }
+    }
+    if wrong.is_empty() { Ok(Backup { values, gains }) } else { Err(Error::file("read", path, wrong.join("; "))) }
+}
+
+// The taxels' gains, which outlive a reset beside the parameters.
+
+/// All of them, in rows.
+pub(super) fn read_gains(client: &mut Client) -> Result<Vec<Vec<u16>>, Error> {
+    let columns = (client.number(address::MODEL_INFORMATION)? >> 8 & 0xFF).max(1) as usize;
+    let gains = client.block(address::GAINS, address::GAINS)?.numbers(address::GAINS);
+    // The registers have 16 bits.
+    Ok(gains.chunks(columns).map(|row| row.iter().map(|gain| *gain as u16).collect()).collect())
+}
+
+/// Sets them, all or none, with torque off. What they were, where that is something else: a tare is needed then.
+fn set_gains(gains: &[Vec<u16>], client: &mut Client) -> Result<Option<Vec<Vec<u16>>>, Error> {
+    let before = read_gains(client)?;
+    let shape = |rows: &[Vec<u16>]| rows.iter().map(Vec::len).collect::<Vec<_>>();
+    if shape(gains) != shape(&before) {
+        let [rows, columns] = [before.len(), before.first().map_or(0, Vec::len)];
+        return Err(
+            format!("the array has {rows} rows of {columns} gains, the file others; nothing was changed").into()
+        );
+    }
+    if before == gains {
+        return Ok(None);
+    }
+    let bytes: Vec<u8> = gains.iter().flatten().flat_map(|gain| gain.to_le_bytes()).collect();
+    client.again(|client| client.write(address::GAINS, &bytes))?;
+    Ok(Some(before))
 }

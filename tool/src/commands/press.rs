@@ -1,6 +1,6 @@
 //! `fingertip press`.
 
-use super::moving::Moving;
+use super::stop::Moving;
 use super::{Interrupt, aside, no_fault, say, say_json, stopped};
 use crate::state::{Clock, RESTARTED, State};
 use crate::{Client, Error, numbers, table};

@@ -1,8 +1,7 @@
 //! `fingertip record`.
 
 use super::{Interrupt, aside, say_json};
-use crate::captured::{in_words, write_options};
-use crate::messages::{Topic, device};
+use crate::recordings::{Topic, device, in_words, write_options};
 use crate::state::{RESTARTED, SHAPE, Stamp, Stamps, State};
 use crate::whole::Part;
 use crate::{Client, Error, numbers};

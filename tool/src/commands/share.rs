@@ -5,7 +5,7 @@
 //! off, it stops the finger and takes the command from that client. Packets of the commander, and writes, go before reads
 //! of others: they wait for one exchange at most.
 
-use super::{Interrupt, aside, moving, say};
+use super::{Interrupt, aside, say, stop};
 use crate::client::Reach;
 use crate::{Client, Error};
 use fingertip::link::Reply;
@@ -224,11 +224,11 @@ impl Bus {
 /// Stops a device that is driven. Returns whether it was.
 fn stop(client: &mut Client) -> Result<bool, Error> {
     if client.again(Client::ping)?.is_fingertip() {
-        if moving::is_idle(client.again(|client| client.number(address::PRESENT_MODE))?) {
+        if stop::is_idle(client.again(|client| client.number(address::PRESENT_MODE))?) {
             return Ok(false);
         }
-        let released = moving::release(RELEASE_S, client);
-        moving::halt(client)?;
+        let released = stop::release(RELEASE_S, client);
+        stop::halt(client)?;
         return released.map(|_| true);
     }
     let drives = client.again(|client| client.number(address::TORQUE_ENABLE))? != 0;

@@ -1,16 +1,124 @@
-//! `fingertip stop`.
+//! Commands at whose end the finger is at rest: [`Moving`] guards those that move it; `fingertip stop`, `recover` and `tare`
+//! begin or end there.
 
-use super::moving::{self, REST_UM_PER_S};
-use super::{say, say_json, wait_for};
+use super::{Interrupt, TOUCHED, aside, no_fault_nor_motion, say, say_json, wait_for};
 use crate::client::Reach;
-use crate::state::State;
-use crate::{Client, Error};
+use crate::state::{Clock, State};
+use crate::{Client, Error, numbers, table};
+use fingertip::measure::Task;
 use fingertip::shipped::address;
+use fingertip::state::{Limits, Mode};
 use serde_json::{Value, json};
-use std::time::Duration;
+use std::time::{Duration, Instant};
+
+/// Bus watchdog while a command moves the finger: the controller stops the motor after this silence.
+const WATCHDOG_MS: i64 = 500;
+/// The same in steps of the register `bus_watchdog`.
+const WATCHDOG: i64 = WATCHDOG_MS / 20;
+/// Longest release at the end of a command, in seconds of the controller's clock.
+const RELEASE_S: f64 = 10.0;
+/// Longest wait for the controller, for example if no frames come and its clock does not advance.
+const PATIENCE: Duration = Duration::from_secs(10);
+/// `MEASURE`: stops the motion.
+const STOP_MOTION: i64 = Task::Stop as i64;
+/// Time between two reads of the state.
+const LOOK: Duration = Duration::from_millis(10);
+/// A released tip below this speed and this force is clear of the object.
+pub(super) const REST_UM_PER_S: i64 = 1_000;
+const CLEAR_MN: i64 = 10;
+
+/// A finger that this program moves. The bus watchdog runs from the beginning on, and the reads of the command feed it:
+/// a killed program or a lost cable ends in fault 7. Every other end releases the object and turns torque off.
+#[derive(Debug)]
+pub struct Moving<'a> {
+    pub client: &'a mut Client,
+    /// Watchdog to put back at the end; none once the finger was stopped.
+    watchdog: Option<i64>,
+}
+
+impl<'a> Moving<'a> {
+    /// Sets the bus watchdog. `_interrupt` proves that a signal no longer ends the program on the spot.
+    pub fn begin(client: &'a mut Client, _interrupt: &Interrupt) -> Result<Self, Error> {
+        let watchdog = client.number(address::BUS_WATCHDOG)?.max(0);
+        client.set(address::BUS_WATCHDOG, WATCHDOG)?;
+        Ok(Self { client, watchdog: Some(watchdog) })
+    }
+
+    /// Stops the finger, whatever the command came to, and puts the watchdog back.
+    pub fn finish<T>(mut self, done: Result<T, Error>) -> Result<T, Error> {
+        let Err(second) = self.stop() else { return done };
+        let why = done.err().map_or(String::new(), |why| format!("{why}; "));
+        Err(format!(
+            "{why}stopping the finger failed: {second}. The controller stops the motor after {WATCHDOG_MS} ms of \
+             silence, with fault 7; `fingertip stop` turns torque off"
+        )
+        .into())
+    }
+
+    fn stop(&mut self) -> Result<(), Error> {
+        let Some(watchdog) = self.watchdog.take() else { return Ok(()) };
+        let released = release(RELEASE_S, self.client).map(drop);
+        if matches!(released, Err(Error::Silent(_))) {
+            // A line that stalled would deliver torque off together with the goal 0, and friction would keep most of the
+            // force. The bus watchdog releases the object, then turns torque off.
+            return released;
+        }
+        halt(self.client)?;
+        // Only with torque off: until then nothing else stops the motor once this program has ended. A watchdog that
+        // has tripped stays so, for `fingertip recover`.
+        if self.client.again(|client| client.number(address::BUS_WATCHDOG))? >= 0 {
+            self.client.again(|client| client.set(address::BUS_WATCHDOG, watchdog))?;
+        }
+        released
+    }
+}
+
+impl Drop for Moving<'_> {
+    fn drop(&mut self) {
+        if let Err(why) = self.stop() {
+            aside(format_args!("fingertip: stopping the finger failed: {why}"));
+        }
+    }
+}
+
+/// Ends a motion that measures by `MEASURE` 0 and a grip by the goal 0, then waits until the tip is clear of the object, at
+/// most for this time. Returns the last state, which in other modes is the first. A press that was ended is a grip.
+pub(super) fn release(within_s: f64, client: &mut Client) -> Result<State, Error> {
+    let (begun, mut clock) = (Instant::now(), Clock::default());
+    loop {
+        let state = client.again(State::read)?;
+        let is = |mode: Mode| mode as i64 == state.mode;
+        let measures = is(Mode::Press) || is(Mode::Strokes);
+        let grips = measures || is(Mode::Approach) || is(Mode::Force) || is(Mode::Release);
+        let rests = state.speed_um_per_s.abs() < REST_UM_PER_S && state.force_mn < CLEAR_MN;
+        let late = clock.time_s(&state).is_none_or(|time_s| time_s > within_s) || begun.elapsed() > PATIENCE;
+        if !grips || late || is(Mode::Release) && rests {
+            return Ok(state);
+        }
+        if measures {
+            client.again(|client| client.set(address::MEASURE, STOP_MOTION))?;
+        }
+        if state.goal_mn != 0 {
+            client.again(|client| client.set(address::GOAL_FORCE_MN, 0))?;
+        }
+        std::thread::sleep(LOOK);
+    }
+}
+
+/// Turns torque off, which also aborts measurements, and waits until the motor is no longer driven.
+pub(super) fn halt(client: &mut Client) -> Result<(), Error> {
+    client.again(|client| client.set(address::TORQUE_ENABLE, 0))?;
+    let mode = wait_for(client, address::PRESENT_MODE, PATIENCE, is_idle)?;
+    if is_idle(mode) { Ok(()) } else { Err(format!("the controller is still in mode {mode}").into()) }
+}
+
+/// True for the modes in which the motor is not driven.
+pub(super) fn is_idle(mode: i64) -> bool {
+    [Mode::Off, Mode::Tare, Mode::Fault].iter().any(|idle| *idle as i64 == mode)
+}
 
 /// Longest release before torque goes off, in seconds of the controller's clock.
-const RELEASE_S: f64 = 0.5;
+const QUICK_RELEASE_S: f64 = 0.5;
 /// Longest wait for a tip that rolls out behind the shorted motor.
 const ROLL_OUT: Duration = Duration::from_secs(2);
 /// A tip that still presses with more force gets a hint.
@@ -22,14 +130,14 @@ const RESIDUAL_MN: i64 = 50;
     fingertip stop\n  \
     fingertip --id 2,3 stop\n  \
     fingertip stop --all    (torque off for every device on the bus, in one packet and without a release)")]
-pub struct Args {
+pub struct Stop {
     /// Stop all devices on the bus by the broadcast ID, servos included
     #[arg(long)]
     all: bool,
 }
 
 /// Turns torque off, which aborts measurements, sets the bus watchdog to 0, and reports what was found and changed.
-pub fn run(args: &Args, reach: &Reach, json: bool) -> Result<(), Error> {
+pub fn stop_all(args: &Stop, reach: &Reach, json: bool) -> Result<(), Error> {
     if !args.all {
         return super::each(reach, false, |client| {
             let stopped = stop(client, true, json)?;
@@ -68,8 +176,8 @@ pub fn run(args: &Args, reach: &Reach, json: bool) -> Result<(), Error> {
 fn stop(client: &mut Client, releases: bool, json: bool) -> Result<Value, Error> {
     let before = client
         .again(State::read)
-        .and_then(|before| if releases { moving::release(RELEASE_S, client).map(|_| before) } else { Ok(before) });
-    let halted = moving::halt(client);
+        .and_then(|before| if releases { release(QUICK_RELEASE_S, client).map(|_| before) } else { Ok(before) });
+    let halted = halt(client);
     let before = before?;
     halted?;
     let watchdog = client.again(|client| client.number(address::BUS_WATCHDOG))?;
@@ -101,4 +209,109 @@ fn stop(client: &mut Client, releases: bool, json: bool) -> Result<Value, Error>
         "force_mn": after.force_mn, "fault": after.fault, "fault_name": after.fault_name(),
         "watchdog_before": watchdog, "at_rest": true,
     }))
+}
+
+/// The controller takes a frame or two.
+const RECOVERED_WITHIN: Duration = Duration::from_secs(2);
+/// Error number of a status packet if something prevents the request.
+const PREVENTED: u8 = 1;
+
+/// Clears what stopped the motor: one register does it.
+pub fn recover(client: &mut Client, json: bool) -> Result<(), Error> {
+    let fault = client.number(address::FAULT)?;
+    let tripped = client.number(address::BUS_WATCHDOG)? < 0;
+    let words = (fault != 0).then(|| table::meaning(address::FAULT, fault));
+    if let Err(why) = client.set(address::RECOVER, 1) {
+        let hindrance = client.number(address::RECOVER_HINDRANCE)?;
+        if why.refused_with(PREVENTED) && hindrance != 0 {
+            let hindrance = table::meaning(address::RECOVER_HINDRANCE, hindrance);
+            return Err(format!("fault {fault} ({}) cannot be cleared: {hindrance}", words.unwrap_or_default()).into());
+        }
+        return Err(why);
+    }
+    let left = wait_for(client, address::FAULT, RECOVERED_WITHIN, |fault| fault == 0)?;
+    if left != 0 {
+        let words = table::meaning(address::FAULT, left);
+        return Err(format!("fault {left} ({words}) is back: what causes it is still there").into());
+    }
+    let untared = client.number(address::LIMITS)? as u16 & fingertip::state::Limits::NOT_TARED != 0;
+    let on = client.number(address::TORQUE_ENABLE)? != 0;
+    if json {
+        say_json(&json!({
+            "id": client.id, "fault": fault, "fault_name": words, "watchdog_tripped": tripped, "tared": !untared,
+            "torque": on,
+        }));
+        return Ok(());
+    }
+    match words {
+        Some(words) => say(format_args!("fault {fault} ({words}) is cleared; torque is off, the goal is 0")),
+        None if tripped => say("the bus watchdog had tripped: it is reset, torque is off, the goal is 0"),
+        None if on => {
+            say("there was nothing to recover from; torque is on, and stays so: `fingertip stop` turns it off");
+            return Ok(());
+        }
+        None => say("there was nothing to recover from; torque is off, the goal is 0"),
+    }
+    say(if untared {
+        "next: `fingertip tare`, with nothing at the tip"
+    } else {
+        "next: `fingertip press`, or torque_enable"
+    });
+    Ok(())
+}
+
+/// Values of `TARE_STATE`.
+const TARE_RUNNING: i64 = 1;
+const TARE_DONE: i64 = 2;
+
+/// Options of the tare.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  fingertip tare")]
+pub struct Tare {
+    /// Longest time that it may take; a real controller needs 20 ms
+    #[arg(long, default_value_t = 5.0, value_parser = numbers::seconds)]
+    within_s: f64,
+}
+
+/// Tares, and reports the result.
+pub fn tare(args: &Tare, client: &mut Client, json: bool) -> Result<(), Error> {
+    no_fault_nor_motion(client)?;
+    if client.number(address::TORQUE_ENABLE)? != 0 {
+        return Err("torque is on: the tip may be pressing on something. Turn it off first: `fingertip stop`".into());
+    }
+    let Tared { touched, least, most } = measure_tare(Duration::from_secs_f64(args.within_s), client)?;
+    if json {
+        let id = client.id;
+        say_json(&json!({ "id": id, "tared": true, "touched": touched, "least_codes": least, "most_codes": most }));
+    } else {
+        say(format_args!("tared: zeros of {least} to {most} codes"));
+    }
+    if touched { Err(TOUCHED.into()) } else { Ok(()) }
+}
+
+/// Result of a tare.
+pub(super) struct Tared {
+    /// Something seemed to touch the tip meanwhile.
+    pub touched: bool,
+    /// Lowest and highest zero, codes.
+    least: i64,
+    most: i64,
+}
+
+/// Measures the zeros, with torque off.
+pub(super) fn measure_tare(within: Duration, client: &mut Client) -> Result<Tared, Error> {
+    client.set(address::TARE, 1)?;
+    let state = wait_for(client, address::TARE_STATE, within, |state| state != TARE_RUNNING)?;
+    match state {
+        TARE_DONE => {}
+        TARE_RUNNING => {
+            let within_s = within.as_secs_f64();
+            return Err(format!("the tare is still running after {within_s} s: do frames come in?").into());
+        }
+        _ => return Err(format!("the tare came to nothing: {}", table::meaning(address::TARE_STATE, state)).into()),
+    }
+    let touched = Limits(client.number(address::LIMITS)? as u16).has(Limits::TARED_TOUCHING);
+    let codes = client.block(address::TARE_CODES, address::TARE_CODES)?.numbers(address::TARE_CODES);
+    let (least, most) = (codes.iter().min().copied().unwrap_or(0), codes.iter().max().copied().unwrap_or(0));
+    Ok(Tared { touched, least, most })
 }

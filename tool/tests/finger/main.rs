@@ -1,11 +1,8 @@
 //! Every command against a served finger: the native core and link behind a pseudo-terminal. Judged by words, bytes and
 //! counts, never by the clock.
 
-mod attacked;
-mod captured;
-mod exits;
+mod failed;
 mod guided;
-mod killed;
 mod recorded;
 #[path = "../served/mod.rs"]
 mod served;

@@ -1,9 +1,21 @@
-//! Recordings: their times, their owners, and the rest of one whose program was killed.
+//! Recordings: their times, their owners, and the rest of one whose program was killed. Captures: taken, kept as files,
+//! replayed; and files that are not as they were written. And what the program shows on a screen.
 
 use crate::served::{Served, ended};
+use fingertip::shipped::address;
+use fingertip_cli::commands::view::{Seen, draw};
+use fingertip_cli::recordings::{Topic, of_bytes, through_the_core};
+use fingertip_cli::state::{Stamp, State};
+use fingertip_cli::{Error, recordings};
 use mcap::read::Options;
 use mcap::{MessageStream, Summary};
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use serde_json::Value;
+use sim::recording::{SCALARS, schemas};
 use std::fs;
+use std::path::Path;
+use std::process::Command;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Host's time, s since 1970.
@@ -193,4 +205,221 @@ fn no_file_is_written_over_without_force() {
     assert!(code == Some(1) && said.contains(&part), "{said}");
     assert_eq!(fs::read(&file).expect("it is there"), b"mine");
     assert!(fs::read_to_string(&part).expect("it is there").starts_with("time_s,"));
+}
+
+#[test]
+fn a_capture_is_taken_and_replays() {
+    let finger = Served::begin("wall");
+    let file = finger.file("press.mcap");
+    let taken = finger.json(&["capture", "--press", "0.5", "--out", &file, "--board", "a served one", "--contribute"]);
+    assert_eq!(
+        (taken["replays"].as_bool(), taken["ended"].as_str()),
+        (Some(true), Some("its memory is full")),
+        "{taken}"
+    );
+    let frames = taken["frames"].as_u64().expect("a number");
+    assert!(frames > 600 && taken["bytes"].as_u64() <= Some(44 << 10), "{taken}");
+    let kept = recordings::open(file.as_ref()).expect("a capture");
+    let about = |name: &str| kept.about.get(name).map(String::as_str).unwrap_or_default();
+    assert_eq!((about("board"), about("firmware"), about("frames")), ("a served one", "0.1", &*frames.to_string()));
+    assert!(about("licence").contains("contributed") && about("params").contains("\"modulus_pa\":"), "{kept:?}");
+
+    let told = finger.done(&["replay", &file]);
+    assert_eq!(told, format!("{file}: {frames} frames, the same to the bit\n"));
+    let told = finger.json(&["replay", &file]);
+    assert_eq!((told[0]["frames"].as_u64(), told[0]["difference"].is_null()), (Some(frames), true));
+    // The finger released.
+    assert_eq!(finger.client().number(address::TORQUE_ENABLE).expect("it answers"), 0);
+    let full = fs::OpenOptions::new().write(true).open("/dev/full").expect("Linux has it");
+    let why = recordings::write(full, &kept.bytes, &kept.about).expect_err("it is full");
+    assert!(why.contains("No space left"), "{why}");
+    // A tare alone, ended early.
+    let file = finger.file("tare.mcap");
+    let told = finger.done(&["capture", "--frames", "30", "--out", &file]);
+    assert!(told.contains("ended: the host ended it; replays here to the bit"), "{told}");
+}
+
+#[test]
+fn a_press_from_a_tip_that_touches_is_told_and_ends() {
+    let finger = Served::begin("wall");
+    finger.done(&["tare"]);
+    // Torque goes off while it presses: the tip rests on the wall.
+    finger.set(&[(address::TORQUE_ENABLE, 1), (address::GOAL_FORCE_MN, 1_000)]);
+    while finger.true_force_n() < 0.9 {
+        finger.command("state");
+    }
+    finger.set(&[(address::TORQUE_ENABLE, 0)]);
+    let file = finger.file("touching.mcap");
+    finger.refuses(&["capture", "--press", "1", "--out", &file], &["something seemed to touch"]);
+    assert!(fs::metadata(&file).is_err(), "nothing was written");
+    assert_eq!(finger.client().number(address::TORQUE_ENABLE).expect("it answers"), 0);
+}
+
+#[test]
+fn what_cannot_be_captured_is_told() {
+    let finger = Served::begin("wall");
+    assert!(Served::not_understood(&["capture", "--out", "press.csv"]).contains(".mcap"));
+    let file = finger.file("press.mcap");
+    finger.done(&["params", "set", "direction_confirmed=0"]);
+    finger.refuses(&["capture", "--press", "0.5", "--out", &file], &["`fingertip commission`"]);
+    finger.done(&["params", "set", "direction_confirmed=1"]);
+    finger.done(&["tare"]);
+    finger.set(&[(address::TORQUE_ENABLE, 1)]);
+    finger.refuses(&["capture", "--out", &file], &["torque is on"]);
+    finger.set(&[(address::TORQUE_ENABLE, 0)]);
+    finger.command("fault supply-low");
+    finger.set(&[(address::TORQUE_ENABLE, 1)]);
+    finger.command("state");
+    finger.refuses(&["capture", "--out", &file], &["fault 9", "`fingertip recover`"]);
+    assert!(fs::metadata(&file).is_err(), "nothing was written");
+}
+
+#[test]
+fn a_file_that_is_not_as_it_was_written_is_refused() {
+    let finger = Served::begin("wall");
+    let file = finger.file("short.mcap");
+    finger.done(&["capture", "--frames", "10", "--out", &file]);
+    let whole = fs::read(&file).expect("it was written");
+    assert!(of_bytes(&whole).is_ok());
+    let mut bytes = whole.clone();
+    for place in 0..bytes.len() {
+        for change in [0x01, 0x80, 0xFF] {
+            bytes[place] ^= change;
+            assert!(of_bytes(&bytes).is_err(), "byte {place} of {}, changed by {change:#x}", bytes.len());
+            bytes[place] ^= change;
+        }
+    }
+    for length in 0..whole.len() {
+        assert!(of_bytes(&whole[..length]).is_err(), "cut at {length}");
+    }
+    assert!(of_bytes(&[&whole[..], &[0]].concat()).is_err());
+
+    fs::write(&file, &whole[..whole.len() / 2]).expect("it can be written");
+    finger.refuses(&["replay", &file], &["1 of 1 captures do not replay"]);
+    // A whole file about a capture that is cut short.
+    let kept = of_bytes(&whole).expect("a capture");
+    let cut = &kept.bytes[..kept.bytes.len() - 1];
+    let why = through_the_core(cut, |_, _| {}).expect_err("it is cut");
+    assert_eq!(why.to_string(), "the capture is cut off");
+    assert!(recordings::write(std::io::Cursor::new(Vec::new()), cut, &kept.about).is_err());
+    finger.refuses(&["replay", &finger.file("nowhere")], &["cannot read"]);
+    fs::remove_file(&file).expect("it is there");
+    let folder = std::path::Path::new(&file).parent().expect("a folder");
+    // Links that lead back are not followed.
+    for link in ["one", "two"] {
+        std::os::unix::fs::symlink(folder, folder.join(link)).expect("a link");
+    }
+    finger.refuses(&["replay", folder.to_str().expect("text")], &["no capture there"]);
+}
+
+/// A schema that both have.
+fn both(topic: Topic) -> [Value; 2] {
+    let name = topic.schema_name();
+    let scenes = schemas().into_iter().find(|(_, known, _)| *known == name);
+    let (kind, _, scenes) = scenes.unwrap_or_else(|| panic!("the scenes have no {name}"));
+    assert_eq!(topic.name(1), format!("/finger0/{kind}"));
+    [scenes.into_bytes(), topic.schema()].map(|schema| serde_json::from_slice(&schema).expect("JSON"))
+}
+
+fn names(schema: &Value) -> Vec<&str> {
+    schema["properties"].as_object().expect("a map").keys().map(String::as_str).collect()
+}
+
+#[test]
+fn the_scalars_are_those_of_the_scenes_that_a_controller_knows() {
+    let [scenes, own] = both(Topic::Scalars);
+    let own = names(&own);
+    assert_eq!(names(&scenes), SCALARS.map(|(name, ..)| name));
+    let known: Vec<&str> = names(&scenes).into_iter().filter(|name| own.contains(name)).collect();
+    assert_eq!(known, own, "by the same names, in the same order");
+    let message: Value =
+        serde_json::from_slice(&Topic::Scalars.message(&Stamp::default(), &State::default())).expect("JSON");
+    assert_eq!(message.as_object().expect("a map").keys().collect::<Vec<_>>(), own);
+}
+
+#[test]
+fn the_picture_is_that_of_the_scenes() {
+    let [scenes, own] = both(Topic::Image);
+    assert_eq!(scenes, own);
+    let message: Value =
+        serde_json::from_slice(&Topic::Image.message(&Stamp::default(), &State::default())).expect("JSON");
+    assert_eq!(message.as_object().expect("a map").keys().collect::<Vec<_>>(), names(&own));
+}
+
+// What `view` shows, by the characters on a screen of 80 x 24.
+
+fn screen(seen: &Seen, width: u16, height: u16) -> Vec<String> {
+    let mut buffer = Buffer::empty(Rect::new(0, 0, width, height));
+    draw(seen, buffer.area, &mut buffer);
+    let cells = buffer.content().chunks(usize::from(width));
+    cells.map(|line| line.iter().map(ratatui::buffer::Cell::symbol).collect::<String>().trim_end().to_owned()).collect()
+}
+
+fn pressed(time_us: u32) -> State {
+    let mut pressures_pa = vec![0; 100];
+    // Row 0 is the lowest line, and column 9 the last.
+    (pressures_pa[0], pressures_pa[9], pressures_pa[45]) = (12_499, 1_500, 60_000);
+    State {
+        time_us,
+        goal_mn: 1_500,
+        force_mn: 1_498,
+        indentation_um: 1_381,
+        centre_x_um: -740,
+        mode: 3,
+        limits: 1 << 8,
+        pressures_pa,
+        ..State::default()
+    }
+}
+
+#[test]
+fn all_fits_eighty_by_twenty_four() {
+    let mut seen = Seen { name: "ID 1 on /dev/ttyACM0".into(), rate_hz: 30.0, ..Seen::default() };
+    (0..300).for_each(|n| seen.take(Ok(pressed(n * 33_333))));
+    let lines = screen(&seen, 80, 24);
+    println!("{}", lines.join("\n"));
+    assert_eq!(lines[0], "fingertip ID 1 on /dev/ttyACM0  30 updates a second");
+    assert_eq!(lines[10], " 12   0   0   0   0   0   0   0   0   2");
+    assert!(lines[6].starts_with("  0   0   0   0   0  60 "), "{}", lines[6]);
+    assert_eq!(lines[11].trim_end(), "kPa; the lightest is 60");
+    let right: Vec<&str> = lines[1..10].iter().map(|line| line.get(41..).unwrap_or_default().trim_end()).collect();
+    assert_eq!(right[0], "force      1.498 N");
+    assert_eq!(right[1], "goal       1.500 N");
+    assert_eq!(right[2], "mode      force");
+    assert_eq!(right[3], "fault     none");
+    assert_eq!(right[8], "limits    slew");
+    assert!(lines[12..23].iter().any(|line| line.contains("1.5 N")) && lines[22].contains("now"));
+    assert_eq!(lines[23], "q ends");
+}
+
+#[test]
+fn a_fault_and_a_lost_line_are_shown() {
+    let mut seen = Seen::default();
+    assert!(screen(&seen, 80, 24).iter().any(|line| line.contains("waiting for the first state")));
+    seen.take(Ok(State { fault: 9, mode: 5, ..pressed(0) }));
+    assert!(screen(&seen, 80, 24)[4].contains("fault     9 supply low"));
+    seen.take(Err(Error::Other("no answer of ID 1".into())));
+    let lines = screen(&seen, 80, 24);
+    assert_eq!(lines[23], "no answer of ID 1");
+    assert!(lines[4].contains("supply low"), "the last state stays");
+}
+
+#[test]
+fn any_size_of_a_terminal_will_do() {
+    let mut seen = Seen::default();
+    seen.take(Ok(pressed(0)));
+    for (width, height) in [(1, 1), (20, 5), (41, 12), (79, 23), (300, 100)] {
+        screen(&seen, width, height);
+    }
+}
+
+// The captures of the repository: the core answers as the boards did.
+
+#[test]
+fn every_capture_replays_to_the_bit() {
+    let captures = Path::new(env!("CARGO_MANIFEST_DIR")).join("../captures");
+    let output = Command::new(env!("CARGO_BIN_EXE_fingertip")).arg("replay").arg(captures).output().expect("it starts");
+    let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{out}{err}");
+    assert!(out.contains("press.mcap") && out.lines().all(|line| line.ends_with("the same to the bit")), "{out}");
 }

@@ -9,24 +9,16 @@
 #[allow(dead_code, reason = "the image takes a part of the firmware's board layer")]
 mod board;
 
-#[path = "../image/converters.rs"]
-mod converters;
-#[path = "../image/flash_times.rs"]
-mod flash_times;
-#[path = "../image/host.rs"]
-mod host;
+#[path = "../image/array.rs"]
+mod array;
 #[path = "../image/kernels.rs"]
 mod kernels;
-#[path = "../image/loopback.rs"]
-mod loopback;
 #[path = "../image/on_chip.rs"]
 mod on_chip;
-#[path = "../image/oscillators.rs"]
-mod oscillators;
+#[path = "../image/part.rs"]
+mod part;
 #[path = "../image/report.rs"]
 mod report;
-#[path = "../image/rows.rs"]
-mod rows;
 #[path = "../image/stages.rs"]
 mod stages;
 
@@ -41,6 +33,7 @@ use fingertip::control::Winding;
 use fingertip::link::snapshot::CrashCause;
 use fingertip::pipeline::AcknowledgedRequests;
 use fingertip::shipped::{Config, Pipeline};
+use kernels::host;
 use stages::{Kept, Stage};
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -56,7 +49,7 @@ fn main() -> ! {
     stack::guard_foot();
     let boot = crash::boot();
     let clocked = clocks::start_external();
-    let external_hz = oscillators::external_by_internal();
+    let external_hz = part::external_by_internal();
     let p = clocks::init(clocked);
     // Asleep, should there be one after all.
     let _bridge = Bridge::new(p.TIM1, p.PA8, p.PA9, p.PB12, p.PC9);
@@ -91,28 +84,28 @@ fn main() -> ! {
     if let Some(hz) = external_hz {
         report::figure("hse_mhz", hz * 1e-6);
     }
-    if let Some(hz) = oscillators::low_speed() {
+    if let Some(hz) = part::low_speed() {
         report::figure("lsi_khz", hz * 1e-3);
     }
-    report::figure("core_per_stopwatch", oscillators::core_per_stopwatch());
+    report::figure("core_per_stopwatch", part::core_per_stopwatch());
     report::figure("brown_out_bits", (flash::option_bytes() >> 2 & 0b11) as f32);
     let [window, independent] = kept.cycles.map(|cycles| cycles as f32 / CYCLES_PER_US as f32);
     report::figure("window_watchdog_us", window);
     report::figure("independent_watchdog_ms", independent * 1e-3);
     report::figure("stack_foot", f32::from(u8::from(boot.crashed && boot.crash.cause == CrashCause::HardFault)));
-    loopback::run();
-    flash_times::run(p.FLASH);
-    converters::means(Analogue::new(p.ADC1, p.PA0));
+    part::loopback();
+    part::flash_times(p.FLASH);
+    array::means(Analogue::new(p.ADC1, p.PA0));
 
     let mut scan = Scan::new(p.TIM8, (p.ADC3, p.ADC2), (p.DMA2_CH0, p.DMA2_CH1, p.DMA2_CH2), pins::of_scan!(p));
     scan.start(config.timing);
-    rows::run(kept.frames);
-    converters::sample_instant(&mut scan, config.timing);
+    array::rows(kept.frames);
+    array::sample_instant(&mut scan, config.timing);
 
     let (bench, pipeline) = (BENCH.take(), make_pipeline(config));
     bench.finger.make_table();
     on_chip::run(bench, pipeline);
-    converters::noise(&mut scan, bench, pipeline);
+    array::noise(&mut scan, bench, pipeline);
     scan.stop();
     pipeline.renew(AcknowledgedRequests::default(), 0, Winding::new());
     report::number("loop_bits", bench.digest(pipeline));

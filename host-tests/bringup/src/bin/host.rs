@@ -2,7 +2,7 @@
 
 use bringup::judge::{Board, estimates, judge};
 use bringup::listen::listen;
-use bringup::text::{BAUD, FRAMES};
+use bringup::{BAUD, FRAMES};
 use clap::Parser;
 use serial2::SerialPort;
 use std::error::Error;

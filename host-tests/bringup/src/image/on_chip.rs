@@ -1,4 +1,4 @@
-//! The whole loop in real time: the finger of `bringup::finger` in place of array, motor and wall, at the scan's pace.
+//! The whole loop in real time: the finger of `bringup::script` in place of array, motor and wall, at the scan's pace.
 
 use bringup::script::{Bench, STEPS};
 use cortex_m::peripheral::DWT;

@@ -11,11 +11,11 @@ use embassy_stm32::usart::{self, Uart};
 use embassy_stm32::{Peri, pac, uid};
 
 use crate::{CYCLES_PER_US, host, passed};
-use bringup::text::{self, BAUD};
+use bringup::BAUD;
 
 const APB1_HZ: u32 = 42_000_000;
 
-static CHECK: AtomicU32 = AtomicU32::new(text::CHECK);
+static CHECK: AtomicU32 = AtomicU32::new(bringup::CHECK);
 
 /// Takes the port.
 pub fn start(port: Peri<'static, USART2>, tx: Peri<'static, PA2>, rx: Peri<'static, PA3>) {
@@ -52,8 +52,8 @@ fn line(words: Arguments) {
 
 /// The report begins.
 pub fn begin() {
-    CHECK.store(text::CHECK, Ordering::Relaxed);
-    line(format_args!("bringup {} {}", text::VERSION, uid::uid_hex()));
+    CHECK.store(bringup::CHECK, Ordering::Relaxed);
+    line(format_args!("bringup {} {}", bringup::VERSION, uid::uid_hex()));
 }
 
 /// A figure of the report.
@@ -85,7 +85,7 @@ pub fn wait_for_go() -> u32 {
         let now = DWT::cycle_count();
         if said.is_none_or(|at| passed(at, 500_000 * CYCLES_PER_US)) {
             said = Some(now);
-            say(format_args!("{}", text::READY));
+            say(format_args!("{}", bringup::READY));
         }
         let Some(byte) = received() else { continue };
         if byte != b'\n' && byte != b'\r' {
@@ -93,7 +93,7 @@ pub fn wait_for_go() -> u32 {
             let _ = word.push(char::from(byte));
             continue;
         }
-        if let Some(frames) = text::asked_frames(&word) {
+        if let Some(frames) = bringup::asked_frames(&word) {
             return frames;
         }
         word.clear();
@@ -134,7 +134,7 @@ struct Checked;
 
 impl Write for Checked {
     fn write_str(&mut self, words: &str) -> core::fmt::Result {
-        let check = words.bytes().fold(CHECK.load(Ordering::Relaxed), text::checked);
+        let check = words.bytes().fold(CHECK.load(Ordering::Relaxed), bringup::checked);
         CHECK.store(check, Ordering::Relaxed);
         Port.write_str(words)
     }

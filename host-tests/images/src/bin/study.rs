@@ -8,15 +8,55 @@
 #[path = "../study/call.rs"]
 mod call;
 mod host;
-#[path = "../study/inputs.rs"]
-mod inputs;
 #[path = "../study/kernels.rs"]
 mod kernels;
 
-use cortex_m_semihosting::debug;
+use cortex_m_semihosting::{debug, syscall};
 use fingertip::shipped::Config;
-use host::fail;
-use inputs::Inputs;
+use host::{File, command_line, fail};
+
+/// The file of inputs: little-endian words.
+pub struct Inputs {
+    file: File,
+    /// Bytes read so far.
+    place: usize,
+}
+
+impl Inputs {
+    /// Opens the file that the command line names.
+    pub fn open() -> Self {
+        Self { file: File::open(command_line(&mut [0; 256])), place: 0 }
+    }
+
+    /// The next bytes.
+    pub fn read(&mut self, bytes: &mut [u8]) {
+        self.file.read(bytes);
+        self.place += bytes.len();
+    }
+
+    /// The next words.
+    pub fn words<const N: usize>(&mut self) -> [i32; N] {
+        core::array::from_fn(|_| {
+            let mut bytes = [0; 4];
+            self.read(&mut bytes);
+            i32::from_le_bytes(bytes)
+        })
+    }
+
+    /// Position of the next byte.
+    pub fn place(&self) -> usize {
+        self.place
+    }
+
+    /// Seeks to a position.
+    pub fn seek(&mut self, place: usize) {
+        // SAFETY: takes two numbers.
+        if unsafe { syscall!(SEEK, self.file.handle, place) } as isize != 0 {
+            fail("cannot seek in the inputs")
+        }
+        self.place = place;
+    }
+}
 
 #[cortex_m_rt::entry]
 fn main() -> ! {

@@ -6,19 +6,19 @@
 #![no_std]
 #![no_main]
 
-#[path = "../study/call.rs"]
-mod call;
 mod host;
-#[path = "../study/parts.rs"]
-mod parts;
-#[path = "../timing/press.rs"]
-mod press;
 
+use When::{Always, Driving, Edge};
 use call::pass_on;
 use cortex_m_semihosting::debug;
+use fingertip::config::newtons;
 use fingertip::contact::Contact;
 use fingertip::control::{Reference, SpeedLoop, TemperatureDrift, Winding};
+use fingertip::fixed::types::I8F24;
 use fingertip::grip::Grip;
+use fingertip::measure::press::{PARTS, Press as Motion, PressInputs, Step};
+use fingertip::measure::series::{CHECK, Out, step_bytes};
+use fingertip::measure::{BuiltIn, MeasureStatus, Row, Task};
 use fingertip::shipped::{Array, COLUMNS, Config, Fit, Pipeline, ROWS, TactileImage};
 use fingertip::state::{Limits, Mode};
 use fingertip::touch::Touch;
@@ -27,8 +27,12 @@ use host::{File, command_line, fail, say};
 use images::CORRECTED;
 use images::record::{MAGIC, Record};
 use images::single::{self, Refined};
-use press::Press;
 use static_cell::StaticCell;
+
+#[path = "../study/call.rs"]
+mod call;
+#[path = "../study/parts.rs"]
+mod parts;
 
 /// Too large for the stack.
 static PIPELINE: StaticCell<Pipeline> = StaticCell::new();
@@ -73,7 +77,6 @@ enum When {
     /// While the loop drives the motor.
     Driving,
 }
-use When::{Always, Driving, Edge};
 
 const STEP: usize = 1;
 const KERNELS: [(&str, Kernel, When); 24] = [
@@ -99,8 +102,8 @@ const KERNELS: [(&str, Kernel, When); 24] = [
     ("contact, over the edge, one", read_one, Edge),
     ("contact, over the edge, two", read_two, Edge),
     ("contact, over the edge, full", read_full, Edge),
-    ("press, a frame added to a step", press::add, Always),
-    ("press, a step's row written", press::write, Always),
+    ("press, a frame added to a step", add_to_press, Always),
+    ("press, a step's row written", write_press, Always),
 ];
 
 extern "C" fn nothing(_: &mut Bench) {}
@@ -239,4 +242,49 @@ fn pushed_over_the_edge(picture: &TactileImage) -> TactileImage {
 #[panic_handler]
 fn panic(info: &core::panic::PanicInfo) -> ! {
     fail(info.message())
+}
+
+/// A press that holds the tip, and the memory of a row.
+struct Press {
+    motion: Option<Motion>,
+    step: Step<ROWS, COLUMNS>,
+    standing: MeasureStatus,
+    bytes: [u8; step_bytes(ROWS * COLUMNS)],
+    part: u8,
+    frames: u32,
+}
+
+impl Press {
+    /// Press that has not begun.
+    fn new() -> Self {
+        let standing = MeasureStatus::running(Task::Press);
+        Self { motion: None, step: Step::NONE, standing, bytes: [0; step_bytes(ROWS * COLUMNS)], part: 0, frames: 0 }
+    }
+}
+
+/// A frame of the press. The first frames find the touch and the place before it; every later one belongs to a step.
+extern "C" fn add_to_press(bench: &mut Bench) {
+    let Bench { press, picture, contact, motion, record, config, .. } = bench;
+    let Press { motion: press, step, standing, frames, .. } = &mut **press;
+    let press = press.get_or_insert_with(|| Motion::begin(motion, BuiltIn::PROOF.expect("it is built in")));
+    *frames += 1;
+    contact.force = newtons(if *frames == 1 { 0 } else { 1_000 });
+    motion.observer.travel = Millimetres(I8F24::from_num(if *frames == 3 { -3 } else { 0 }));
+    let (sequence, encoder) = (record.frame.sequence, motion.observer.origin());
+    let chip = record.sense.chip;
+    press.observe(
+        &PressInputs { sequence, picture, contact, encoder, motion, applied_mv: 900, chip },
+        step,
+        standing,
+        config,
+    );
+}
+
+extern "C" fn write_press(bench: &mut Bench) {
+    let Press { step, bytes, part, .. } = &mut *bench.press;
+    // Each part in turn, at its place in the row.
+    *part = (*part + 1) % PARTS;
+    let part = *part;
+    let begun = [0, bytes.len() / 3, bytes.len() / 3 * 2, bytes.len() / 5 * 4][usize::from(part % PARTS)];
+    Out::new(bytes, begun, CHECK).row(&Row::Step(step, part));
 }

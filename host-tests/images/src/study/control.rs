@@ -3,8 +3,8 @@
 //! y = y1 + (k_p + k_i) e - k_p e1, within 1 either way and within `SLEW` of y1. The cut part never enters y1, so
 //! nothing winds up.
 
+use super::Inputs;
 use super::call::pass_on;
-use super::inputs::Inputs;
 use crate::host::say;
 use dsp_process::SplitProcess;
 use fixed::types::I16F16;

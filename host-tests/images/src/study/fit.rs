@@ -1,7 +1,7 @@
 //! From a tactile image to a contact: from a single image, and followed from frame to frame at each fit level.
 
+use super::Inputs;
 use super::call::pass_on;
-use super::inputs::Inputs;
 use crate::host::{fail, say};
 use fingertip::contact::{Contact, FitLevel};
 use fingertip::params::Params;

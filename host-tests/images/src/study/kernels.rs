@@ -3,19 +3,14 @@
 mod control;
 mod fit;
 mod force;
-mod formats;
 mod frame;
-mod number;
 mod packed;
-mod pressure;
-mod rings;
-mod root;
 mod scalar;
 mod sparse;
 mod step;
 
+use super::Inputs;
 use super::call;
-use super::inputs::{self, Inputs};
 use crate::host::say;
 use fingertip::shipped::Config;
 use scalar::Tools;
@@ -35,11 +30,11 @@ pub fn run(config: &Config, inputs: &mut Inputs) {
     let tools = Tools::new(config);
     let region = &mut 1;
     for (kernel, variants) in [
-        ("root", root::VARIANTS),
+        ("root", scalar::ROOT),
         ("force", force::FORCE),
         ("indentation", force::INDENTATION),
-        ("pressure", pressure::VARIANTS),
-        ("rings", rings::VARIANTS),
+        ("pressure", force::PRESSURE),
+        ("rings", force::RINGS),
     ] {
         scalar::run(kernel, variants, region, &tools, inputs);
     }

@@ -3,8 +3,8 @@
 #[path = "parts.rs"]
 mod parts;
 
+use super::Inputs;
 use super::call::pass_on;
-use super::inputs::Inputs;
 use crate::host::{fail, say};
 use fingertip::command::Command;
 use fingertip::contact::{Contact, FitLevel};

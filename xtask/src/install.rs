@@ -1,10 +1,11 @@
-//! Debian packages, installed where they are missing.
+//! What the commands install: Debian packages where they are missing, and Python environments.
 //!
-//! Package lists and downloads are kept in the build folder, so apt's own lists, caches and sources stay as they are.
+//! Apt's package lists and downloads are kept in the build folder, so its own lists, caches and sources stay as they are. The
+//! environments have clients of the bus, readers of a sweep's files, and the fit of a real sensor.
 
 use crate::console::Console;
-use crate::paths;
-use anyhow::{Context, Result, bail};
+use crate::{host, sim};
+use anyhow::{Context, Result, bail, ensure};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -17,13 +18,13 @@ const KEYRING: &str = "/usr/share/keyrings/debian-archive-keyring.gpg";
 ///
 /// # Errors
 /// No Debian, no root, or apt-get cannot get them; the text says what to install by hand.
-pub fn ensure(packages: &[&str], why: &str, console: &mut Console) -> Result<()> {
-    let missing: Vec<&str> = packages.iter().copied().filter(|package| !installed(package)).collect();
+pub fn packages(names: &[&str], why: &str, console: &mut Console) -> Result<()> {
+    let missing: Vec<&str> = names.iter().copied().filter(|name| !installed(name)).collect();
     if missing.is_empty() {
         return Ok(());
     }
     let list = missing.join(" ");
-    if paths::find_program("apt-get").is_none() {
+    if host::find_program("apt-get").is_none() {
         bail!("{why} needs the Debian packages `{list}`, and there is no apt-get here: install their like by hand");
     }
     if !is_root() {
@@ -52,7 +53,7 @@ pub fn newest(packages: &[&str], why: &str, console: &mut Console) -> Result<()>
     let release = fs::read_to_string("/etc/os-release").unwrap_or_default();
     let field = |name| release.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix('='));
     let codename = field("VERSION_CODENAME").filter(|_| field("ID") == Some("debian"));
-    let Some(codename) = codename.filter(|_| paths::find_program("apt-get").is_some()) else {
+    let Some(codename) = codename.filter(|_| host::find_program("apt-get").is_some()) else {
         bail!("{why} needs a recent `{list}`, and this is no Debian: install it by hand");
     };
     let suite = format!("{codename}-backports");
@@ -78,16 +79,16 @@ struct Apt {
 
 impl Apt {
     fn new(suite: Option<&str>) -> Result<Self> {
-        let folder = paths::target().join("apt");
+        let folder = host::target().join("apt");
         for part in ["lists/partial", "cache/archives/partial"] {
-            fs::create_dir_all(folder.join(part)).with_context(|| format!("cannot make {}", paths::shown(&folder)))?;
+            fs::create_dir_all(folder.join(part)).with_context(|| format!("cannot make {}", host::shown(&folder)))?;
         }
         let sources = suite.map(|suite| {
             let file = folder.join(format!("{suite}.list"));
             // It replaces the system's own list, which it repeats.
             let own = fs::read_to_string("/etc/apt/sources.list").unwrap_or_default();
             let line = format!("deb [signed-by={KEYRING}] {} {suite} main\n", mirror());
-            fs::write(&file, own + "\n" + &line).with_context(|| format!("cannot write {}", paths::shown(&file)))?;
+            fs::write(&file, own + "\n" + &line).with_context(|| format!("cannot write {}", host::shown(&file)))?;
             anyhow::Ok(file)
         });
         Ok(Self { folder, sources: sources.transpose()? })
@@ -148,17 +149,96 @@ const BROWSERS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "g
 /// # Errors
 /// The browser is missing and cannot be installed; the text says what to install by hand.
 pub fn browser(console: &mut Console) -> Result<PathBuf> {
-    let find = || BROWSERS.into_iter().find_map(paths::find_program);
+    let find = || BROWSERS.into_iter().find_map(host::find_program);
     if let Some(program) = find() {
         return Ok(program);
     }
-    ensure(&["chromium", "fonts-dejavu-core"], "the test that opens reports in a browser", console)?;
+    packages(&["chromium", "fonts-dejavu-core"], "the test that opens reports in a browser", console)?;
     find().context("Debian's package `chromium` is installed, but no `chromium` is in PATH")
+}
+
+/// A virtual environment in the build folder.
+pub struct Environment {
+    /// Folder of the environment.
+    pub folder: &'static str,
+    /// Installed packages, with their versions.
+    pub packages: &'static [&'static str],
+    /// The names by which a program imports that, with commas between.
+    pub imports: &'static str,
+    /// Purpose.
+    pub does: &'static str,
+}
+
+const BUS: Environment = Environment {
+    folder: "venv",
+    packages: &["dynamixel-sdk==4.1.0", "rustypot==1.13.1", "mypy==2.4.1", "maturin==1.9.4"],
+    imports: "dynamixel_sdk, rustypot, mypy, maturin",
+    does: "tests talk to the board by the first two, and check and build the Python package by the others",
+};
+
+/// Finds or makes the environment with the bus client, and returns its interpreter.
+pub fn bus_python(console: &mut Console) -> Result<PathBuf> {
+    environment(&BUS, console)
+}
+
+/// Finds or makes a virtual environment, and returns its interpreter.
+///
+/// # Errors
+/// No Python, no `venv`, or no package; the text says what to install.
+pub fn environment(environment: &Environment, console: &mut Console) -> Result<PathBuf> {
+    let Environment { folder, packages, imports, does } = environment;
+    let folder = host::target().join(folder);
+    let python = folder.join("bin").join("python");
+    if has(&python, imports) {
+        return Ok(python);
+    }
+    let list = packages.join(" ");
+    console.say(&format!("Making a Python environment with `{list}`: {does}."));
+    let make = || Command::new("python3").args(["-m", "venv", "--clear"]).arg(&folder).output();
+    // Debian splits `venv` off Python, and may lack Python altogether.
+    if !make().is_ok_and(|output| output.status.success()) {
+        self::packages(&["python3", "python3-venv"], "a Python environment", console)?;
+        let output = make().context("cannot start python3")?;
+        ensure!(output.status.success(), "python3 -m venv: {}", String::from_utf8_lossy(&output.stderr));
+    }
+    let mut install = Command::new(&python);
+    install.args(["-m", "pip", "install", "--quiet", "--no-cache-dir", "--disable-pip-version-check"]).args(*packages);
+    console
+        .prepare(&mut install)
+        .with_context(|| format!("pip cannot install {list}: is a package index in reach?"))?;
+    ensure!(has(&python, imports), "{list} is installed in {}, but does not import", host::shown(&folder));
+    Ok(python)
+}
+
+fn has(python: &Path, imports: &str) -> bool {
+    Command::new(python).args(["-c", &format!("import {imports}")]).output().is_ok_and(|output| output.status.success())
+}
+
+// The fit of a real sensor to recordings: a script on NumPy and SciPy.
+
+const LEAST_SQUARES: Environment = Environment {
+    folder: "venv-sensor",
+    packages: &["numpy==2.4.6", "scipy==1.17.1"],
+    imports: "numpy, scipy.optimize",
+    does: "`cargo xtask sensor` solves its least squares with them",
+};
+
+/// Returns the command that starts a script of the fit, in an environment with what it imports.
+pub fn script(name: &str, console: &mut Console) -> Result<Command> {
+    let mut command = Command::new(environment(&LEAST_SQUARES, console)?);
+    // -B leaves no compiled files among the sources.
+    command.arg("-B").arg(host::root().join("host-tests/sensor").join(name));
+    Ok(command)
+}
+
+/// Fits a sensor to recordings.
+pub fn sensor(args: &sim::Args, console: &mut Console) -> Result<()> {
+    sim::start(script("fit.py", console)?.args(&args.arguments))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::is_main;
+    use super::*;
 
     #[test]
     fn backports_come_from_where_the_release_comes_from() {

@@ -129,6 +129,11 @@ impl Readout {
         Self { events: ArrayEvents::of(scene, finger), ..self }
     }
 
+    /// True if the codes of a slot follow from the pressures alone.
+    pub fn ideal(&self, stages: &impl Stages) -> bool {
+        stages.none() && self.events.is_none()
+    }
+
     /// Returns the codes of a slot sampled at a time, for the pressures on its row (unused where no row is driven).
     #[inline]
     pub fn codes(&mut self, stages: &mut impl Stages, slot: usize, time_s: f64, kpa: &Row) -> [u16; COLUMNS] {

@@ -5,7 +5,7 @@ use crate::mechanics::normal::{Elastic, Law};
 use crate::mechanics::pressures::{Between, Pressures};
 use crate::mechanics::shape;
 use crate::setup::Setup;
-use fingertip::shipped::COLUMNS;
+use fingertip::shipped::{COLUMNS, ROWS};
 
 /// Contact of one finger, with its effects.
 pub struct Contact {
@@ -15,6 +15,8 @@ pub struct Contact {
     /// Indentations, each with the centre of pressure; empty on a plane.
     centres: Vec<[f64; 3]>,
     pressures: Pressures,
+    /// Contact at the last sample of each row, and its pressures.
+    rows: [(Place, [f64; COLUMNS]); ROWS],
     mm_per_n: f64,
     /// Stiffness along the surface; 0 without friction.
     pub n_per_mm_along: f64,
@@ -24,7 +26,7 @@ pub struct Contact {
 }
 
 /// Contact at an instant: what its rows have in common.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
     between: Between,
     /// Share of the pressures of the indentation alone.
@@ -66,6 +68,7 @@ impl Contact {
             elastic,
             centres,
             pressures,
+            rows: [(Place::NOWHERE, [0.0; COLUMNS]); ROWS],
             mm_per_n,
             forgotten_n: 0.0,
             free_mm: 0.0,
@@ -116,8 +119,15 @@ impl Contact {
 
     #[inline]
     pub fn row_kpa(&mut self, place: &Place, row: usize) -> [f64; COLUMNS] {
-        let kpa = self.pressures.row_kpa(&self.effects, &place.between, row);
-        if place.share == 1.0 { kpa } else { kpa.map(|kpa| kpa * place.share) }
+        let (before, kpa) = &mut self.rows[row];
+        if before != place {
+            *before = *place;
+            *kpa = self.pressures.row_kpa(&self.effects, &place.between, row);
+            if place.share != 1.0 {
+                *kpa = kpa.map(|kpa| kpa * place.share);
+            }
+        }
+        *kpa
     }
 
     /// Returns the centre of pressure at an indentation, from where the axis of the tip meets the surface.

@@ -476,8 +476,14 @@ impl Digest {
         self.0.write(frame.codes.rows.map(|codes| codes.map(u16::to_le_bytes)).as_flattened().as_flattened());
         self.0.write(frame.codes.undriven.map(u16::to_le_bytes).as_flattened());
         self.0.write(inputs.map(u32::to_le_bytes).as_flattened());
+        // One call for all words: each call of the hash costs as much as 50 bytes.
+        let (mut words, mut count) = ([[0; 4]; 64], 0);
         // The effect of the temperature is in the other fields.
-        Status { chip: None, ..*status }.words(duty, |word| self.0.write(&word.to_le_bytes()));
+        Status { chip: None, ..*status }.words(duty, |word| {
+            words[count] = word.to_le_bytes();
+            count += 1;
+        });
+        self.0.write(words[..count].as_flattened());
     }
 
     /// Returns the digest in hexadecimal.

@@ -178,9 +178,18 @@ pub const EFFECTS: &[Description] = &[
         zero: &[("hold_ohm", 0.0)],
         build: |build: &Build| {
             let hold_ohm = build.values.number("hold_ohm");
+            let (mut above, mut next) = ([Row::default(); COLUMNS], 0);
             Part::Network(Box::new(move |row, array, seen| {
                 if hold_ohm > 0.0 {
-                    *seen = short_circuit(row, array, 1.0 / hold_ohm);
+                    let hold = 1.0 / hold_ohm;
+                    // The rows above do not change within a scan: each is added once.
+                    if row != next {
+                        above = [Row::default(); COLUMNS];
+                        array[..row].iter().for_each(|siemens| float(&mut above, siemens, hold));
+                    }
+                    *seen = short_circuit(above, row, array, hold);
+                    float(&mut above, &array[row], hold);
+                    next = row + 1;
                 }
             }))
         },
@@ -305,17 +314,10 @@ pub const EFFECTS: &[Description] = &[
 ///
 /// With the floating rows eliminated the columns form a network A = D - sum g g' / line, symmetric and positive definite.
 /// Column j alone at the virtual ground sees (A^-1 g)_j / (A^-1)_jj, g the driven row. By A = L L' (Cholesky) and M =
-/// L^-1, A^-1 = M' M.
-fn short_circuit(driven: usize, array: &[Row; ROWS], hold: f64) -> Row {
-    let mut a = [[0.0; COLUMNS]; COLUMNS];
-    for (row, siemens) in array.iter().enumerate() {
-        let per_line = if row == driven { 0.0 } else { 1.0 / (hold + siemens.iter().sum::<f64>()) };
-        for (c, g) in siemens.iter().enumerate() {
-            let share = g * per_line;
-            a[c].iter_mut().zip(&siemens[..=c]).for_each(|(a, other)| *a -= share * other);
-            a[c][c] += g;
-        }
-    }
+/// L^-1, A^-1 = M' M. `a` already holds the rows above the driven one.
+fn short_circuit(mut a: [Row; COLUMNS], driven: usize, array: &[Row; ROWS], hold: f64) -> Row {
+    array[driven].iter().enumerate().for_each(|(c, g)| a[c][c] += g);
+    array[driven + 1..].iter().for_each(|siemens| float(&mut a, siemens, hold));
     // L replaces the lower half of A and M that of the identity, line by line.
     let mut m = [[0.0; COLUMNS]; COLUMNS];
     for i in 0..COLUMNS {
@@ -342,6 +344,16 @@ fn short_circuit(driven: usize, array: &[Row; ROWS], hold: f64) -> Row {
         }
     }
     core::array::from_fn(|j| (open[j] / diagonal[j]).max(0.0))
+}
+
+/// Adds a floating row to the lower half of A.
+fn float(a: &mut [Row; COLUMNS], siemens: &Row, hold: f64) {
+    let per_line = 1.0 / (hold + siemens.iter().sum::<f64>());
+    for (c, g) in siemens.iter().enumerate() {
+        let share = g * per_line;
+        a[c].iter_mut().zip(&siemens[..=c]).for_each(|(a, other)| *a -= share * other);
+        a[c][c] += g;
+    }
 }
 
 pub struct Settling {

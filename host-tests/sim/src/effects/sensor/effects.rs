@@ -49,11 +49,14 @@ pub const EFFECTS: &[Description] = &[
         build: |build: &Build| {
             let share = build.values.number("rate_percent_per_decade") / 100.0;
             let (mut since, mut crept_kpa) = (Since::default(), [[[0.0; COLUMNS]; TERMS]; ROWS]);
+            let (mut last_s, mut shares) = (0.0, [0.0; TERMS]);
             Part::Pressure(Box::new(move |row: usize, time_s: f64, kpa: &mut Row| {
                 let step_s = since.step_s(row, time_s);
+                if step_s != last_s {
+                    (last_s, shares) = (step_s, TAUS_S.map(|tau_s| gone(step_s / tau_s)));
+                }
                 let mut sum = [0.0; COLUMNS];
-                for (crept, tau_s) in crept_kpa[row].iter_mut().zip(TAUS_S) {
-                    let taken = gone(step_s / tau_s);
+                for (crept, taken) in crept_kpa[row].iter_mut().zip(shares) {
                     for ((crept, kpa), sum) in crept.iter_mut().zip(&*kpa).zip(&mut sum) {
                         *crept += taken * (*kpa - *crept);
                         *sum += *crept;
@@ -303,7 +306,10 @@ pub const EFFECTS: &[Description] = &[
             Part::Codes(Box::new(move |_, _, codes| {
                 for code in codes {
                     let x = (*code / Array::CODES).clamp(0.0, 1.0);
-                    *code = ((*code + inl_codes * 4.0 * x * (1.0 - x)) / step).floor() * step;
+                    let steps = (*code + inl_codes * 4.0 * x * (1.0 - x)) / step;
+                    // The same as floor(), which is a call on most machines.
+                    let whole = f64::from(steps as i32);
+                    *code = if whole > steps { whole - 1.0 } else { whole } * step;
                 }
             }))
         },

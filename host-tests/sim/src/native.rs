@@ -377,7 +377,7 @@ impl<E: Set> Board<E> {
             for slot in slots.clone() {
                 self.clock.go_on(slot_s);
                 let place = &places[slot];
-                if unit.shown[slot].replace(*place) == Some(*place) && ideal {
+                if ideal && unit.shown[slot].replace(*place) == Some(*place) {
                     continue;
                 }
                 let kpa = if slot < ROWS { self.world.placed_kpa(finger, place, slot) } else { [0.0; COLUMNS] };

@@ -330,21 +330,6 @@ impl<E: Set> World<E> {
         let place = self.place(index, since_s);
         self.placed_kpa(index, &place, row)
     }
-
-    /// Mean pressures on a row before the end of the last step (negative) or after it, at constant acceleration.
-    pub fn row_off_kpa(&mut self, index: usize, off_s: f64, row: usize) -> [f64; COLUMNS] {
-        if off_s < 0.0 {
-            return self.row_kpa(index, (self.dt_s + off_s).max(0.0), row);
-        }
-        let mut body = self.body;
-        if self.dt_s > 0.0 {
-            let (v0, v1) = (self.body_before.speed_mm_per_s[0], body.speed_mm_per_s[0]);
-            body.place_mm[0] += off_s * (v1 + 0.5 * (v1 - v0) * off_s / self.dt_s);
-        }
-        let finger = &self.fingers[index];
-        let place = finger.contact.place(finger.flank_ahead_mm(off_s) - surface_mm(finger.setup(), index, &body));
-        self.placed_kpa(index, &place, row)
-    }
 }
 
 /// Standard gravity, mm/s^2.

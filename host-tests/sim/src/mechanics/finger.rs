@@ -216,18 +216,10 @@ impl<D: drive::Stages> Finger<D> {
         angle * self.mm_per_rad
     }
 
-    fn angle_ahead_rad(&self, ahead_s: f64) -> f64 {
-        self.now.shaft.angle_rad + ahead_s * (self.now.shaft.speed_rad_per_s + 0.5 * self.now.rad_per_s2 * ahead_s)
-    }
-
-    /// Travel of the pressing flank at a time after the last step, at constant acceleration.
-    pub fn flank_ahead_mm(&self, ahead_s: f64) -> f64 {
-        self.angle_ahead_rad(ahead_s) * self.mm_per_rad
-    }
-
     /// Count of the encoder at a time after the last step, at constant acceleration.
     pub fn count_ahead(&mut self, ahead_s: f64) -> i32 {
-        let turns = self.angle_ahead_rad(ahead_s) / TAU;
+        let Shaft { angle_rad, speed_rad_per_s } = self.now.shaft;
+        let turns = (angle_rad + ahead_s * (speed_rad_per_s + 0.5 * self.now.rad_per_s2 * ahead_s)) / TAU;
         let count = (turns * self.setup.motor.encoder_counts_per_turn).floor() as i32;
         let count = count + self.slipped_counts;
         if self.drive.none() { count } else { self.drive.count(count) }

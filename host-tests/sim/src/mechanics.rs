@@ -217,6 +217,11 @@ impl<D: drive::Stages> Finger<D> {
         self.now = *motion;
     }
 
+    /// True if the shaft did not move in the last step.
+    pub fn rests(&self) -> bool {
+        self.now.before == self.now.shaft && self.now.shaft.speed_rad_per_s == 0.0
+    }
+
     /// Puts the finger at rest at a travel.
     pub fn place(&mut self, travel_mm: f64) {
         self.now.shaft = Shaft { angle_rad: travel_mm / self.mm_per_rad, speed_rad_per_s: 0.0 };

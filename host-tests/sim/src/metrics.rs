@@ -61,9 +61,8 @@ impl Meter {
         Measured(scene.chain(fingers).collect())
     }
 
-    pub fn verdicts(&self, bounds: &[Bound]) -> Vec<Verdict> {
-        let measured = self.measured();
-        bounds.iter().map(|bound| self.verdict(&measured, bound)).collect()
+    pub fn verdicts(&self, measured: &Measured, bounds: &[Bound]) -> Vec<Verdict> {
+        bounds.iter().map(|bound| self.verdict(measured, bound)).collect()
     }
 
     fn verdict(&self, measured: &Measured, bound: &Bound) -> Verdict {

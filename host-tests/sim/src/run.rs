@@ -28,7 +28,7 @@ pub fn run(scene: &Scene, board: Run, watchers: &mut [&mut dyn Watch]) -> Result
     let mut meter = Meter::default();
     let summary = board(scene, &mut All { meter: &mut meter, others: watchers })?;
     let measured = meter.measured();
-    Ok(Outcome { verdicts: meter.verdicts(&scene.bounds), holds: meter.holds(), measured, summary })
+    Ok(Outcome { verdicts: meter.verdicts(&measured, &scene.bounds), holds: meter.holds(), measured, summary })
 }
 
 impl Outcome {

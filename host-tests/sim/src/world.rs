@@ -185,32 +185,30 @@ impl<E: Set> World<E> {
     fn advance_together(&mut self, mass_kg: f64, time_s: f64) {
         let (dt_s, body) = (self.dt_s, self.body);
         let lifted_mm = self.around.hand_mm(time_s + dt_s) - self.around.hand_mm(time_s);
-        let grips: Vec<_> = self.fingers.iter_mut().map(|finger| finger.contact.effects.grip()).collect();
-        let mut flanks: Vec<f64> =
-            self.fingers.iter().map(|finger| finger.flank_mm() + dt_s * finger.speed_mm_per_s()).collect();
-        let mut ends = Vec::with_capacity(flanks.len());
-        let mut along = Vec::with_capacity(flanks.len());
+        let (mut grips, mut flanks, mut along, mut ends) = ([None; 2], [0.0; 2], [None; 2], [None; 2]);
+        for (index, finger) in self.fingers.iter_mut().enumerate() {
+            grips[index] = finger.contact.effects.grip();
+            flanks[index] = finger.flank_mm() + dt_s * finger.speed_mm_per_s();
+        }
         let mut next = body.moved(mass_kg, [0.0; 2], &self.around, time_s, dt_s);
         for _ in 0..ROUNDS {
             let (mut force_n, mut changed_mm) = ([0.0; 2], 0.0_f64);
-            ends.clear();
-            along.clear();
             for (index, finger) in self.fingers.iter_mut().enumerate() {
                 let [from, to] = [&body, &next].map(|body| surface_mm(finger.setup(), index, body));
                 let law = finger.contact.law();
                 let mean_n = law.mean_n(finger.flank_mm() - from, flanks[index] - to);
-                let normal_n = law.force_n(flanks[index] - to);
                 force_n[0] += side(index) * mean_n;
                 if let Some(grip) = &grips[index] {
+                    let normal_n = law.force_n(flanks[index] - to);
                     let way_mm = next.place_mm[1] - body.place_mm[1] - lifted_mm;
                     let (up_n, state) = finger.contact.along.moved(grip, normal_n, way_mm, dt_s);
                     force_n[1] += up_n;
-                    along.push(state);
+                    along[index] = Some(state);
                 }
                 let end = finger.solve(|_, _, _| mean_n);
                 changed_mm = changed_mm.max((end.flank_mm - flanks[index]).abs());
                 flanks[index] = end.flank_mm;
-                ends.push(end);
+                ends[index] = Some(end);
             }
             let moved = body.moved(mass_kg, force_n, &self.around, time_s, dt_s);
             for axis in 0..2 {
@@ -222,11 +220,9 @@ impl<E: Set> World<E> {
             }
         }
         self.body = next;
-        for (index, (finger, end)) in self.fingers.iter_mut().zip(&ends).enumerate() {
+        for (index, (finger, end)) in self.fingers.iter_mut().zip(ends.iter().flatten()).enumerate() {
             finger.finish(end, surface_mm(finger.setup(), index, &next));
-            if let Some(state) = along.get(index) {
-                finger.contact.along = *state;
-            }
+            finger.contact.along = along[index].unwrap_or(finger.contact.along);
         }
     }
 
@@ -300,6 +296,11 @@ fn surface_mm(setup: &Setup, finger: usize, body: &Body) -> f64 {
 }
 
 impl<E: Set> World<E> {
+    /// True if neither a finger nor the object moved in the last step.
+    pub fn rests(&self, index: usize) -> bool {
+        self.fingers[index].rests() && self.body == self.body_before && self.body.speed_mm_per_s == [0.0; 2]
+    }
+
     /// Returns the contact of a finger at a time within the last step, apart from its rows: several go in parallel.
     #[inline]
     pub fn place(&self, index: usize, since_s: f64) -> Place {

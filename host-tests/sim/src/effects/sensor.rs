@@ -127,6 +127,11 @@ impl Readout {
         Self { events: ArrayEvents::of(scene, finger), ..self }
     }
 
+    /// True if the codes of a slot follow from the pressures alone.
+    pub fn ideal(&self, stages: &impl Stages) -> bool {
+        stages.none() && self.events.is_none()
+    }
+
     /// Returns the codes of a slot sampled at a time, for the pressures on its row (unused where no row is driven).
     #[inline]
     pub fn codes(&mut self, stages: &mut impl Stages, slot: usize, time_s: f64, kpa: &Row) -> [u16; COLUMNS] {
@@ -214,11 +219,14 @@ pub const EFFECTS: &[Description] = &[
         build: |build: &Build| {
             let share = build.number("rate_percent_per_decade") / 100.0;
             let (mut since, mut crept_kpa) = (Since::default(), [[[0.0; COLUMNS]; TERMS]; ROWS]);
+            let (mut last_s, mut shares) = (0.0, [0.0; TERMS]);
             Part::Pressure(Box::new(move |row: usize, time_s: f64, kpa: &mut Row| {
                 let step_s = since.step_s(row, time_s);
+                if step_s != last_s {
+                    (last_s, shares) = (step_s, TAUS_S.map(|tau_s| gone(step_s / tau_s)));
+                }
                 let mut sum = [0.0; COLUMNS];
-                for (crept, tau_s) in crept_kpa[row].iter_mut().zip(TAUS_S) {
-                    let taken = gone(step_s / tau_s);
+                for (crept, taken) in crept_kpa[row].iter_mut().zip(shares) {
                     for ((crept, kpa), sum) in crept.iter_mut().zip(&*kpa).zip(&mut sum) {
                         *crept += taken * (*kpa - *crept);
                         *sum += *crept;
@@ -341,9 +349,18 @@ pub const EFFECTS: &[Description] = &[
         zero: &[("hold_ohm", 0.0)],
         build: |build: &Build| {
             let hold_ohm = build.number("hold_ohm");
+            let (mut above, mut next) = ([Row::default(); COLUMNS], 0);
             Part::Network(Box::new(move |row, array, seen| {
                 if hold_ohm > 0.0 {
-                    *seen = short_circuit(row, array, 1.0 / hold_ohm);
+                    let hold = 1.0 / hold_ohm;
+                    // The rows above do not change within a scan: each is added once.
+                    if row != next {
+                        above = [Row::default(); COLUMNS];
+                        array[..row].iter().for_each(|siemens| float(&mut above, siemens, hold));
+                    }
+                    *seen = short_circuit(above, row, array, hold);
+                    float(&mut above, &array[row], hold);
+                    next = row + 1;
                 }
             }))
         },
@@ -457,7 +474,10 @@ pub const EFFECTS: &[Description] = &[
             Part::Codes(Box::new(move |_, _, codes| {
                 for code in codes {
                     let x = (*code / Array::CODES).clamp(0.0, 1.0);
-                    *code = ((*code + inl_codes * 4.0 * x * (1.0 - x)) / step).floor() * step;
+                    let steps = (*code + inl_codes * 4.0 * x * (1.0 - x)) / step;
+                    // The same as floor(), which is a call on most machines.
+                    let whole = f64::from(steps as i32);
+                    *code = if whole > steps { whole - 1.0 } else { whole } * step;
                 }
             }))
         },
@@ -468,17 +488,10 @@ pub const EFFECTS: &[Description] = &[
 ///
 /// With the floating rows eliminated the columns form a network A = D - sum g g' / line, symmetric and positive definite.
 /// Column j alone at the virtual ground sees (A^-1 g)_j / (A^-1)_jj, g the driven row. By A = L L' (Cholesky) and M =
-/// L^-1, A^-1 = M' M.
-fn short_circuit(driven: usize, array: &[Row; ROWS], hold: f64) -> Row {
-    let mut a = [[0.0; COLUMNS]; COLUMNS];
-    for (row, siemens) in array.iter().enumerate() {
-        let per_line = if row == driven { 0.0 } else { 1.0 / (hold + siemens.iter().sum::<f64>()) };
-        for (c, g) in siemens.iter().enumerate() {
-            let share = g * per_line;
-            a[c].iter_mut().zip(&siemens[..=c]).for_each(|(a, other)| *a -= share * other);
-            a[c][c] += g;
-        }
-    }
+/// L^-1, A^-1 = M' M. `a` already holds the rows above the driven one.
+fn short_circuit(mut a: [Row; COLUMNS], driven: usize, array: &[Row; ROWS], hold: f64) -> Row {
+    array[driven].iter().enumerate().for_each(|(c, g)| a[c][c] += g);
+    array[driven + 1..].iter().for_each(|siemens| float(&mut a, siemens, hold));
     // L replaces the lower half of A and M that of the identity, line by line.
     let mut m = [[0.0; COLUMNS]; COLUMNS];
     for i in 0..COLUMNS {
@@ -505,6 +518,16 @@ fn short_circuit(driven: usize, array: &[Row; ROWS], hold: f64) -> Row {
         }
     }
     core::array::from_fn(|j| (open[j] / diagonal[j]).max(0.0))
+}
+
+/// Adds a floating row to the lower half of A.
+fn float(a: &mut [Row; COLUMNS], siemens: &Row, hold: f64) {
+    let per_line = 1.0 / (hold + siemens.iter().sum::<f64>());
+    for (c, g) in siemens.iter().enumerate() {
+        let share = g * per_line;
+        a[c].iter_mut().zip(&siemens[..=c]).for_each(|(a, other)| *a -= share * other);
+        a[c][c] += g;
+    }
 }
 
 pub struct Settling {

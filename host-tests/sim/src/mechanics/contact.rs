@@ -4,8 +4,9 @@ use crate::effects::contact::{Grip, Named};
 use crate::mechanics::pressures::{Between, Pressures};
 use crate::mechanics::rotor::mean_square;
 use crate::setup::{Setup, Tip};
+use core::cell::Cell;
 use core::f64::consts::TAU;
-use fingertip::shipped::COLUMNS;
+use fingertip::shipped::{COLUMNS, ROWS};
 
 /// Contact of one finger, with its effects.
 pub struct Contact {
@@ -15,6 +16,8 @@ pub struct Contact {
     /// Indentations, each with the centre of pressure; empty on a plane.
     centres: Vec<[f64; 3]>,
     pressures: Pressures,
+    /// Contact at the last sample of each row, and its pressures.
+    rows: [(Place, [f64; COLUMNS]); ROWS],
     mm_per_n: f64,
     /// Stiffness along the surface; 0 without friction.
     pub n_per_mm_along: f64,
@@ -24,7 +27,7 @@ pub struct Contact {
 }
 
 /// Contact at an instant: what its rows have in common.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
     between: Between,
     /// Share of the pressures of the indentation alone.
@@ -65,6 +68,7 @@ impl Contact {
             elastic,
             centres,
             pressures,
+            rows: [(Place::NOWHERE, [0.0; COLUMNS]); ROWS],
             mm_per_n,
             forgotten_n: 0.0,
             free_mm: 0.0,
@@ -115,8 +119,15 @@ impl Contact {
 
     #[inline]
     pub fn row_kpa(&mut self, place: &Place, row: usize) -> [f64; COLUMNS] {
-        let kpa = self.pressures.row_kpa(&self.effects, &place.between, row);
-        if place.share == 1.0 { kpa } else { kpa.map(|kpa| kpa * place.share) }
+        let (before, kpa) = &mut self.rows[row];
+        if before != place {
+            *before = *place;
+            *kpa = self.pressures.row_kpa(&self.effects, &place.between, row);
+            if place.share != 1.0 {
+                *kpa = kpa.map(|kpa| kpa * place.share);
+            }
+        }
+        *kpa
     }
 
     /// Returns the centre of pressure at an indentation, from where the axis of the tip meets the surface.
@@ -274,22 +285,36 @@ pub struct Table {
     d_mm: Vec<f64>,
     force_n: Vec<f64>,
     energy_mj: Vec<f64>,
+    /// Slope of the force from each knot to the next, N/mm.
+    n_per_mm: Vec<f64>,
+    /// Segment of the last indentation: the next one is near.
+    last: Cell<usize>,
 }
 
 impl Table {
     /// Creates a table of knots from d = 0 on: at least two, evenly spaced in the root of d, force not falling.
     pub fn new(d_mm: Vec<f64>, force_n: Vec<f64>) -> Self {
         let last = d_mm.len() - 1;
-        let mut energy_mj = vec![0.0; d_mm.len()];
+        let (mut energy_mj, mut n_per_mm) = (vec![0.0; d_mm.len()], Vec::with_capacity(last));
         for knot in 1..d_mm.len() {
             let mean = 0.5 * (force_n[knot] + force_n[knot - 1]);
             energy_mj[knot] = energy_mj[knot - 1] + mean * (d_mm[knot] - d_mm[knot - 1]);
+            n_per_mm.push((force_n[knot] - force_n[knot - 1]) / (d_mm[knot] - d_mm[knot - 1]));
         }
-        Self { per_root: last as f64 / d_mm[last].sqrt(), d_mm, force_n, energy_mj }
+        Self { per_root: last as f64 / d_mm[last].sqrt(), d_mm, force_n, energy_mj, n_per_mm, last: Cell::new(0) }
+    }
+
+    /// True if an indentation lies in a segment. The first and the last one have no outer end.
+    #[inline]
+    fn holds(&self, line: usize, d_mm: f64) -> bool {
+        (line == 0 || self.d_mm[line] <= d_mm) && (line + 2 == self.d_mm.len() || d_mm < self.d_mm[line + 1])
     }
 
     /// Returns the segment of an indentation, by its lower knot.
     fn line(&self, d_mm: f64) -> usize {
+        if self.holds(self.last.get(), d_mm) {
+            return self.last.get();
+        }
         let last = self.d_mm.len() - 2;
         let mut line = ((d_mm.max(0.0).sqrt() * self.per_root) as usize).min(last);
         // The root may round to the segment beside it.
@@ -299,32 +324,33 @@ impl Table {
         while line < last && self.d_mm[line + 1] <= d_mm {
             line += 1;
         }
+        self.last.set(line);
         line
     }
 
     /// Solves d + c (F(d) - S) = x for d, where d > 0 and F(d) > S. The left side is convex, so each segment's solution
     /// is at most the one before, and the search ends in the segment that contains its own.
     fn yielding_mm(&self, x_mm: f64, mm_per_n: f64, forgotten_n: f64) -> f64 {
-        let mut line = self.line(x_mm);
-        loop {
-            let rise = mm_per_n * self.slope(line);
+        let solved_mm = |line: usize| {
+            let rise = mm_per_n * self.n_per_mm[line];
             let from_mm = self.d_mm[line];
-            let over_mm = (x_mm - from_mm - mm_per_n * (self.force_n[line] - forgotten_n)) / (1.0 + rise);
-            let d_mm = from_mm + over_mm;
-            let next = self.line(d_mm);
-            if next >= line {
-                return d_mm;
+            from_mm + (x_mm - from_mm - mm_per_n * (self.force_n[line] - forgotten_n)) / (1.0 + rise)
+        };
+        // Most often the segment is that of the last solution.
+        let mut d_mm = solved_mm(self.last.get());
+        if !self.holds(self.last.get(), d_mm) {
+            let mut line = self.line(x_mm);
+            d_mm = solved_mm(line);
+            while self.line(d_mm) < line {
+                line = self.line(d_mm);
+                d_mm = solved_mm(line);
             }
-            line = next;
         }
-    }
-
-    fn slope(&self, line: usize) -> f64 {
-        (self.force_n[line + 1] - self.force_n[line]) / (self.d_mm[line + 1] - self.d_mm[line])
+        d_mm
     }
 
     fn on_line(&self, line: usize, d_mm: f64) -> f64 {
-        self.force_n[line] + (d_mm - self.d_mm[line]) * self.slope(line)
+        self.force_n[line] + (d_mm - self.d_mm[line]) * self.n_per_mm[line]
     }
 
     fn force_n(&self, d_mm: f64) -> f64 {
@@ -337,7 +363,7 @@ impl Table {
         }
         let line = self.line(d_mm);
         let over = d_mm - self.d_mm[line];
-        self.energy_mj[line] + over * (self.force_n[line] + 0.5 * over * self.slope(line))
+        self.energy_mj[line] + over * (self.force_n[line] + 0.5 * over * self.n_per_mm[line])
     }
 
     /// Mean force between two indentations. Within a segment it is the mean of the ends, exact at any distance.
@@ -364,7 +390,7 @@ impl Table {
         }
         let knots = self.force_n.partition_point(|knot_n| *knot_n <= force_n);
         let line = knots.clamp(1, self.force_n.len() - 1) - 1;
-        self.d_mm[line] + (force_n - self.force_n[line]) / self.slope(line)
+        self.d_mm[line] + (force_n - self.force_n[line]) / self.n_per_mm[line]
     }
 }
 
@@ -403,7 +429,7 @@ impl Elastic {
     pub fn n_per_mm(&self, d_mm: f64) -> f64 {
         match self {
             Self::Plane { n_per_mm2 } => 2.0 * n_per_mm2 * d_mm.max(0.0),
-            Self::Table(table) => table.slope(table.line(d_mm)),
+            Self::Table(table) => table.n_per_mm[table.line(d_mm)],
         }
     }
 }

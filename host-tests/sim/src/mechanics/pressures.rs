@@ -43,7 +43,7 @@ pub struct Pressures {
 type Knot = Option<Box<[Row; ROWS]>>;
 
 /// Place of a contact between the knots: what its rows have in common.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Between {
     root: usize,
     weights: [f64; 4],

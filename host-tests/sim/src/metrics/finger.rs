@@ -5,6 +5,7 @@ use crate::watch::{Controller, Step};
 use fingertip::pipeline::Status;
 use fingertip::state::{Fault, Mode};
 use fingertip::units::{Duty, Millimetres, Newtons};
+use std::collections::VecDeque;
 
 /// Force from which on errors of the centre count: below it the array sees next to nothing.
 const SEEN_N: f64 = 0.1;
@@ -51,7 +52,7 @@ pub struct Finger {
     responses: Vec<Response>,
     responds: bool,
     /// Times and travels shortly before the touch.
-    approach: Vec<[f64; 2]>,
+    approach: VecDeque<[f64; 2]>,
     missed_before: u32,
     fault: Option<Fault>,
     object_start_mm: f64,
@@ -153,16 +154,16 @@ impl Finger {
         self.touch_s = Some(step.time_s);
         let start = self.approach.iter().rfind(|[time_s, _]| *time_s <= step.time_s - APPROACH_S);
         self.approach_mm_per_s = start
-            .or(self.approach.first())
+            .or(self.approach.front())
             .map(|[time_s, travel_mm]| (step.truth.travel_mm - travel_mm) / (step.time_s - time_s));
-        self.approach = Vec::new();
+        self.approach = VecDeque::new();
     }
 
     fn controller(&mut self, step: &Step, dt_s: f64) {
         let status = step.status;
         if self.touch_s.is_none() {
-            self.approach.retain(|[time_s, _]| *time_s > step.time_s - 2.0 * APPROACH_S);
-            self.approach.push([step.time_s, step.truth.travel_mm]);
+            while self.approach.pop_front_if(|[time_s, _]| *time_s <= step.time_s - 2.0 * APPROACH_S).is_some() {}
+            self.approach.push_back([step.time_s, step.truth.travel_mm]);
         }
         if let Some(fault) = status.fault.filter(|fault| self.fault != Some(*fault)) {
             self.faults += u32::from(!step.truth.defective);

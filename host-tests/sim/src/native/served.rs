@@ -110,6 +110,10 @@ impl<E: Set> Bus<E> {
             unit.frame.sequence = unit.frame.sequence.wrapping_add(1);
             sense.encoder = sense.encoder.wrapping_sub(device.encoder_start);
             let params = &unit.pipeline.config().params;
+            if device.broken.is_some() {
+                // It changes codes in the frame: the next scan samples every slot again.
+                unit.shown.fill(None);
+            }
             let scanned =
                 device.broken.as_mut().is_none_or(|broken| broken.change(&mut unit.frame, &mut sense, params));
             device.supply_mv = sense.supply_mv;

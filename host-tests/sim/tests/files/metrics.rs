@@ -66,7 +66,8 @@ fn broken(change: impl Fn(&mut Made)) -> BTreeSet<String> {
         let status = Status { duty, fault: made.fault, ..Status::default() };
         observe(&mut meter, 0, time_s, &command, &status, &truth);
     }
-    meter.verdicts(&bounds).into_iter().filter(|verdict| !verdict.held).map(|verdict| verdict.bound.metric).collect()
+    let verdicts = meter.verdicts(&meter.measured(), &bounds).into_iter();
+    verdicts.filter(|verdict| !verdict.held).map(|verdict| verdict.bound.metric).collect()
 }
 
 /// A finger that keeps all promises by a little, and one that breaks these by a little.

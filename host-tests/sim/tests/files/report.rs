@@ -101,7 +101,7 @@ fn of_two_fingers_one_without_a_value_breaks_what_grows_with_the_goal() {
     }
     let bound = |metric: &str| Bound { metric: metric.into(), min: None, max: Some(50.0), max_per_goal_n: Some(100.0) };
     let bounds = ["hold_swing_mn", "finger0.hold_swing_mn", "finger1.hold_swing_mn"].map(bound);
-    let verdicts = meter.verdicts(&bounds);
+    let verdicts = meter.verdicts(&meter.measured(), &bounds);
     let values: Vec<_> = verdicts.iter().map(|verdict| (verdict.value, verdict.held)).collect();
     assert_eq!(values, [(None, false), (Some(0.0), true), (None, false)]);
 }

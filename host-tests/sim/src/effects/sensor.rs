@@ -4,6 +4,8 @@
 //! row), volts (at the column amplifiers), codes (before the converter rounds down). Without effects the readout is
 //! ideal: equal taxels, a perfect row switch, a perfect virtual ground, settled at once, 12 bits.
 
+mod floating;
+
 use crate::effects::{Build, Description, Metered, Part, normal_within_3, normals};
 use crate::events::ArrayEvents;
 use crate::mechanics::decay;
@@ -12,6 +14,7 @@ use crate::scene::tables::{Key, Kind};
 use crate::setup::Array;
 use crate::watch::Cost;
 use fingertip::shipped::{COLUMNS, ROWS, SLOTS};
+use floating::Floating;
 
 /// A number for each column.
 pub type Row = [f64; COLUMNS];
@@ -349,18 +352,10 @@ pub const EFFECTS: &[Description] = &[
         zero: &[("hold_ohm", 0.0)],
         build: |build: &Build| {
             let hold_ohm = build.number("hold_ohm");
-            let (mut above, mut next) = ([Row::default(); COLUMNS], 0);
+            let mut floating = Floating::new(1.0 / hold_ohm);
             Part::Network(Box::new(move |row, array, seen| {
                 if hold_ohm > 0.0 {
-                    let hold = 1.0 / hold_ohm;
-                    // The rows above do not change within a scan: each is added once.
-                    if row != next {
-                        above = [Row::default(); COLUMNS];
-                        array[..row].iter().for_each(|siemens| float(&mut above, siemens, hold));
-                    }
-                    *seen = short_circuit(above, row, array, hold);
-                    float(&mut above, &array[row], hold);
-                    next = row + 1;
+                    *seen = floating.seen(row, array);
                 }
             }))
         },
@@ -483,52 +478,6 @@ pub const EFFECTS: &[Description] = &[
         },
     },
 ];
-
-/// Conductances seen from the columns, where all rows but the driven one float.
-///
-/// With the floating rows eliminated the columns form a network A = D - sum g g' / line, symmetric and positive definite.
-/// Column j alone at the virtual ground sees (A^-1 g)_j / (A^-1)_jj, g the driven row. By A = L L' (Cholesky) and M =
-/// L^-1, A^-1 = M' M. `a` already holds the rows above the driven one.
-fn short_circuit(mut a: [Row; COLUMNS], driven: usize, array: &[Row; ROWS], hold: f64) -> Row {
-    array[driven].iter().enumerate().for_each(|(c, g)| a[c][c] += g);
-    array[driven + 1..].iter().for_each(|siemens| float(&mut a, siemens, hold));
-    // L replaces the lower half of A and M that of the identity, line by line.
-    let mut m = [[0.0; COLUMNS]; COLUMNS];
-    for i in 0..COLUMNS {
-        a[i][i] += hold;
-        let mut line = [0.0; COLUMNS];
-        line[i] = 1.0;
-        for j in 0..i {
-            let (above, below) = a.split_at_mut(i);
-            let known: f64 = above[j][..j].iter().zip(&below[0][..j]).map(|(a, b)| a * b).sum();
-            let share = (below[0][j] - known) / above[j][j];
-            below[0][j] = share;
-            line.iter_mut().zip(&m[j]).for_each(|(entry, part)| *entry -= share * part);
-        }
-        let length = (a[i][i] - a[i][..i].iter().map(|l| l * l).sum::<f64>()).sqrt();
-        a[i][i] = length;
-        m[i] = line.map(|entry| entry / length);
-    }
-    let (mut open, mut diagonal) = ([0.0; COLUMNS], [0.0; COLUMNS]);
-    for line in &m {
-        let along: f64 = line.iter().zip(&array[driven]).map(|(m, g)| m * g).sum();
-        for (j, m) in line.iter().enumerate() {
-            open[j] += m * along;
-            diagonal[j] += m * m;
-        }
-    }
-    core::array::from_fn(|j| (open[j] / diagonal[j]).max(0.0))
-}
-
-/// Adds a floating row to the lower half of A.
-fn float(a: &mut [Row; COLUMNS], siemens: &Row, hold: f64) {
-    let per_line = 1.0 / (hold + siemens.iter().sum::<f64>());
-    for (c, g) in siemens.iter().enumerate() {
-        let share = g * per_line;
-        a[c].iter_mut().zip(&siemens[..=c]).for_each(|(a, other)| *a -= share * other);
-        a[c][c] += g;
-    }
-}
 
 pub struct Settling {
     tau_s: f64,

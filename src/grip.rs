@@ -42,7 +42,7 @@ const STOPPED: Newtons = Newtons::from_bits((4 << 16) / 10);
 pub struct Goal {
     /// Force to hold; 0 releases.
     pub force: Newtons,
-    /// Amount by which the array reads more than that because of its temperature.
+    /// Amount by which the array reads more than the force because of its temperature.
     pub drift: Newtons,
 }
 

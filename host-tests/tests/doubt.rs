@@ -85,7 +85,7 @@ fn sums_are_doubted_by_what_reaches_over_the_edge_or_is_hidden() {
         let over = ramp(reach_mm - 5.0 * PITCH_MM, 0.5 * PITCH_MM, 1.5 * PITCH_MM);
         let [least_hidden, hidden] = hidden_shares(&contact, &bad).map(|share| ramp(share, 0.125, 0.5));
         let doubt = f64::from(contact.doubt);
-        // The share is cut to 1/256 and its factors a little more, so it may be too small: by 2/256 of 96/256.
+        // The share and its factors are rounded down to 1/256, so it may be too small: by 2/256 of 96/256.
         let least = over.max(least_hidden - 2.0 * 255.0 / 96.0);
         let allowed = least - 1.01..=over.max(hidden) + 1.01;
         assert!(allowed.contains(&doubt), "{doubt}, {allowed:?} expected: {contact:?}");

@@ -47,7 +47,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Budget<ROWS, COLUMNS> {
         }
     }
 
-    /// Time that the longest frame takes beyond one by the sums: its upper and its lower bound, cycles of the core.
+    /// Bounds, upper and lower, of the time that the model adds to the longest frame, cycles of the core.
     ///
     /// Estimated cycles on a Cortex-M4F with the flash's wait states, all taxels under the contact, rounded up
     /// (`cargo xtask timing`, `docs/study.md`): with 10 x 10 taxels the start of a refinement takes at most 2,100,

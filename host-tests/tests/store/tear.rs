@@ -54,7 +54,7 @@ fn go(board: &mut Board, cut: Option<Cut>, number: i32) {
     let _ = board.save(record(number));
 }
 
-/// Operations of a whole run of `go`.
+/// Flash operations of `go` if nothing interrupts it.
 fn ops(board: &Board) -> Vec<Done> {
     let mut board = board.clone();
     go(&mut board, None, 100);
@@ -347,7 +347,7 @@ pub struct Cut {
     pub seed: u64,
 }
 
-/// Content behind the words that an interrupted erase has done.
+/// Content of the words that an interrupted erase did not reach.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rest {
     /// As it was.

@@ -344,7 +344,7 @@ impl Found {
         self.rows.push(Row { name, after, sigma });
     }
 
-    /// Takes no result of a part: nothing is written.
+    /// Records why a part has no result. Then nothing is written at all.
     pub fn block(&mut self, why: String) {
         self.refused.push(why);
         self.blocked = true;

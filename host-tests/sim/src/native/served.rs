@@ -291,7 +291,7 @@ pub fn line(truth: &Truth, status: &Status) -> String {
 
 /// Distance of an object out of reach.
 const AWAY_MM: f64 = 1e3;
-/// Speed of the object without another one given.
+/// Speed of the object if the command gives none.
 const MM_PER_S: f64 = 20.0;
 /// Largest speed of the object: its surface moves in steps of a frame.
 const MM_PER_S_MAX: f64 = 500.0;

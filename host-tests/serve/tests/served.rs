@@ -207,7 +207,7 @@ fn behind_a_terminal_it_serves_on_while_somebody_types() {
     let mut script = Killed(script.spawn().expect("Debian has it (bsdutils)"));
     let mut typed = script.0.stdin.take().expect("it was asked for");
     while !path.exists() {
-        std::thread::yield_now();
+        std::thread::sleep(std::time::Duration::from_millis(1));
     }
     typed.write_all(b"typed\n").expect("it takes it");
     // The terminal shows what it has.
@@ -220,7 +220,7 @@ fn behind_a_terminal_it_serves_on_while_somebody_types() {
     let written = loop {
         match std::fs::read_to_string(&number) {
             Ok(line) if line.ends_with('\n') => break line,
-            _ => std::thread::yield_now(),
+            _ => std::thread::sleep(std::time::Duration::from_millis(1)),
         }
     };
     std::fs::remove_file(&number).expect("it is there");
@@ -240,7 +240,7 @@ fn behind_a_terminal_it_serves_on_while_somebody_types() {
     let pid = rustix::process::Pid::from_raw(number).expect("a process number");
     rustix::process::kill_process(pid, rustix::process::Signal::INT).expect("it runs");
     while path.is_symlink() {
-        std::thread::yield_now();
+        std::thread::sleep(std::time::Duration::from_millis(1));
     }
 }
 

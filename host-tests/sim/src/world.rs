@@ -296,7 +296,7 @@ fn surface_mm(setup: &Setup, finger: usize, body: &Body) -> f64 {
 }
 
 impl<E: Set> World<E> {
-    /// True if neither a finger nor the object moved in the last step.
+    /// True if neither this finger nor the object moved in the last step.
     pub fn rests(&self, index: usize) -> bool {
         self.fingers[index].rests() && self.body == self.body_before && self.body.speed_mm_per_s == [0.0; 2]
     }

@@ -152,9 +152,7 @@ fn a_controller_that_starts_anew_ends_a_recording_and_a_press() {
     finger.done(&["tare"]);
     let file = finger.file("again.csv");
     let child = finger.start(&["record", "--rate-hz", "0", "--seconds", "1000000", &file]);
-    while !fs::read_to_string(format!("{file}.part")).is_ok_and(|text| text.lines().count() > 10) {
-        std::thread::yield_now();
-    }
+    Served::recorded(&format!("{file}.part"));
     finger.command(&format!("raw {REBOOT}"));
     let (code, said) = ended(&child.wait_with_output().expect("it ends"));
     assert_eq!(code, Some(1), "{said}");
@@ -255,9 +253,7 @@ fn only_files_are_written_in_place_and_by_one_at_a_time() {
     let other = Served::begin("wall");
     let file = finger.file("both.csv");
     let child = finger.start(&["record", &file]);
-    while !fs::read_to_string(format!("{file}.part")).is_ok_and(|text| text.lines().count() > 10) {
-        std::thread::yield_now();
-    }
+    Served::recorded(&format!("{file}.part"));
     other.refuses(&["record", "--seconds", "0", &file], &["another program is writing"]);
     Served::interrupt(&child);
     assert!(child.wait_with_output().expect("it ends").status.success());

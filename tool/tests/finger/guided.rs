@@ -90,9 +90,7 @@ fn a_killed_session_resumes_where_it_was() {
     let before = parameters(&finger);
     let listed = || fs::read_to_string(finger.file("killed/session.json")).is_ok_and(|text| text.contains("press-1"));
     let mut child = finger.start(&[&calibrate[..], &["--json"]].concat());
-    while !listed() {
-        std::thread::sleep(Served::LOOK);
-    }
+    Served::wait_for(listed);
     child.kill().expect("it runs");
     child.wait().expect("it ends");
     finger.done(&["stop"]);

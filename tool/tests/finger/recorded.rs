@@ -157,9 +157,7 @@ fn a_killed_recording_is_kept_and_can_be_read() {
     for name in ["killed.mcap", "killed.csv"] {
         let (file, part) = (finger.file(name), finger.file(&format!("{name}.part")));
         let mut child = finger.start(&["record", "--rate-hz", "0", &file]);
-        while !fs::metadata(&part).is_ok_and(|part| part.len() > 300_000) {
-            std::thread::yield_now();
-        }
+        Served::wait_for(|| fs::metadata(&part).is_ok_and(|part| part.len() > 300_000));
         child.kill().expect("it runs");
         child.wait().expect("it ends");
         let bytes = fs::read(&part).expect("it is there");
@@ -198,7 +196,7 @@ fn no_file_is_written_over_without_force() {
     // One that came while it was recorded stays, and so does the recording.
     let (file, part) = (finger.file("late.csv"), finger.file("late.csv.part"));
     let child = finger.start(&["record", &file]);
-    Served::begun(&part);
+    Served::recorded(&part);
     fs::write(&file, "mine").expect("a file");
     Served::interrupt(&child);
     let (code, said) = ended(&child.wait_with_output().expect("it ends"));

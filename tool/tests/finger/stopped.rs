@@ -30,9 +30,7 @@ fn caught(finger: &Served, arguments: &[&str], mode: &str) -> Child {
     finger.done(&["tare"]);
     let child = finger.start(&with_file(arguments, &finger.file("caught.mcap")));
     finger.until(mode);
-    while mode == "Press:" && finger.true_force_n() < 0.5 {
-        std::thread::sleep(Served::LOOK);
-    }
+    Served::wait_for(|| mode != "Press:" || finger.true_force_n() >= 0.5);
     child
 }
 

@@ -227,7 +227,7 @@ impl Served {
             if child.try_wait().expect("it was started").is_some() {
                 break false;
             }
-            std::thread::yield_now();
+            std::thread::sleep(Self::LOOK);
         };
         let _ = child.kill();
         child.wait().expect("it ends");
@@ -292,11 +292,21 @@ impl Served {
         err
     }
 
+    /// Waits for what another program does, and leaves the core to it between two looks.
+    pub fn wait_for(happened: impl Fn() -> bool) {
+        while !happened() {
+            std::thread::sleep(Self::LOOK);
+        }
+    }
+
     /// Waits until a file is there.
     pub fn begun(file: &str) {
-        while std::fs::metadata(file).is_err() {
-            std::thread::yield_now();
-        }
+        Self::wait_for(|| std::fs::metadata(file).is_ok());
+    }
+
+    /// Waits until a recording has more than ten lines: it is past the checks of its file.
+    pub fn recorded(part: &str) {
+        Self::wait_for(|| std::fs::read_to_string(part).is_ok_and(|text| text.lines().count() > 10));
     }
 
     /// Ctrl-C.

@@ -51,6 +51,8 @@ struct Device {
     /// Number of good packets, and the time of its last change.
     packets: (u32, f64),
     broken: Option<Broken>,
+    /// The last frame as the controller received it, with what is broken.
+    frame: Frame,
     /// Supply voltage that the controller sensed last.
     supply_mv: u16,
     reboot_s: Option<f64>,
@@ -110,20 +112,17 @@ impl<E: Set> Bus<E> {
             unit.frame.sequence = unit.frame.sequence.wrapping_add(1);
             sense.encoder = sense.encoder.wrapping_sub(device.encoder_start);
             let params = &unit.pipeline.config().params;
-            if device.broken.is_some() {
-                // It changes codes in the frame: the next scan samples every slot again.
-                unit.shown.fill(None);
-            }
-            let scanned =
-                device.broken.as_mut().is_none_or(|broken| broken.change(&mut unit.frame, &mut sense, params));
+            device.frame = unit.frame;
+            let frame = &mut device.frame;
+            let scanned = device.broken.as_mut().is_none_or(|broken| broken.change(frame, &mut sense, params));
             device.supply_mv = sense.supply_mv;
             let command = device.server.command();
             if device.capture.is_due(unit.pipeline.status(), &command) {
                 device.capture.begin(&mut unit.pipeline);
             }
             let status = if scanned {
-                let (_, status) = unit.pipeline.step(&unit.frame, &sense, &command);
-                device.capture.record(&unit.frame, &sense, &command, status);
+                let (_, status) = unit.pipeline.step(frame, &sense, &command);
+                device.capture.record(frame, &sense, &command, status);
                 device.capture.follow(&unit.pipeline);
                 unit.pipeline.status()
             } else {
@@ -182,7 +181,7 @@ impl<E: Set> Bus<E> {
                 reset_cause: device.reset,
                 crash: Crash::default(),
                 health: Health::default(),
-                frame: &unit.frame,
+                frame: &device.frame,
                 taxels: &pipeline.array().picture().taxels,
                 pascals_per_sum_q32: pipeline.config().pascals_per_sum_q32,
                 tare: &tare,
@@ -213,6 +212,7 @@ impl Device {
             encoder_start: 0,
             packets: (0, started_s),
             broken: None,
+            frame: Frame::EMPTY,
             supply_mv: 0,
             reboot_s: None,
             capture: Box::new(Capture::NEW),

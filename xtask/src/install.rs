@@ -226,7 +226,7 @@ const LEAST_SQUARES: Environment = Environment {
 /// Returns the command that starts a script of the fit, in an environment with what it imports.
 pub fn script(name: &str, console: &mut Console) -> Result<Command> {
     let mut command = Command::new(environment(&LEAST_SQUARES, console)?);
-    // -B leaves no compiled files among the sources.
+    // With -B Python writes no compiled files beside the sources.
     command.arg("-B").arg(host::root().join("host-tests/sensor").join(name));
     Ok(command)
 }

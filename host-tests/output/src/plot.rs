@@ -299,7 +299,7 @@ const DIRECTIONS: u32 = 24;
 /// Distance from which a line connects the label to its point, pixels.
 const FAR_PX: f64 = 14.0;
 
-/// A point.
+/// One point of a plot: a variant with its cost and its error.
 #[derive(Clone, Debug)]
 pub struct Dot {
     /// Cost.

@@ -82,7 +82,7 @@ impl Peer for Wire {
 /// estimate.
 const FETCH_NS: u64 = 60;
 
-/// USART2 of the part.
+/// USART2 of the microcontroller, at which the bus is.
 #[derive(Debug)]
 pub struct BusPort {
     port: Usart,

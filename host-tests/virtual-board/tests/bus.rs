@@ -183,7 +183,7 @@ fn at_least_half_of_the_stack_is_never_used(rig: &mut Rig) {
 
 // Much traffic on a bus of 3 Mbaud, while the board holds 1 N: no byte is lost; noise and values out of range move nothing.
 
-/// Number of 3 Mbaud in the parameters.
+/// Value of `baud_rate` for 3 Mbaud.
 const BAUD_CODE: u8 = 5;
 
 #[test]

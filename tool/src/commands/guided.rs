@@ -334,7 +334,7 @@ pub struct Found {
     blocked: bool,
     /// Further entries of the JSON object: dead and odd taxels, remaining errors.
     pub more: Map<String, Value>,
-    /// Sentences for people.
+    /// Remarks for the user, one sentence each.
     pub notes: Vec<String>,
 }
 

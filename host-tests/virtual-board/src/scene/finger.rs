@@ -342,7 +342,7 @@ impl Joint {
             return state.advance(to_s, self.meeting.longest_s);
         }
         if to_s <= self.now_s() {
-            // The world is frozen: no finger waits for another.
+            // The shared world does not move yet, so this finger need not wait for the others.
             self.held = Held { from_ns: to_ns, until_ns: to_ns, duty_ns: 0.0, last: bridge };
             return;
         }

@@ -118,27 +118,28 @@ impl Misfit {
         else {
             return;
         };
-        let dy_square = square(*dy);
-        let mut bad = *bad;
+        let (scale, dy_square, outside) = (view.scale, square(*dy), prediction.outside);
         let mut row = Self::NONE;
+        let mut bad_left = *bad;
         for (taxel, dx_square) in taxels.iter().zip(&prediction.dx_square) {
-            if bad & 1 == 0 {
+            if bad_left & 1 == 0 {
                 let at = dx_square + dy_square;
-                let share = view.share(*taxel);
-                if at < prediction.outside {
+                let share = scale.share(*taxel);
+                if at < outside {
                     row.taxels += 1;
-                    let residual = residual(share - prediction.taxel(at, &geometry.nodes).pressure);
+                    let residual = residual(share - prediction.pressure(at, geometry));
                     row.inside += (residual * residual) >> Bits::<ROWS, COLUMNS>::TAXEL;
                 } else {
-                    row.others += 1;
                     row.outside += (residual(share) * residual(share)) >> Bits::<ROWS, COLUMNS>::TAXEL;
                 }
             }
-            bad >>= 1;
+            bad_left >>= 1;
         }
+        row.others = COLUMNS as i32 - bad.count_ones() as i32 - row.taxels;
         self.add_row::<ROWS, COLUMNS>(&row);
     }
 
+    #[inline(always)]
     fn add_row<const ROWS: usize, const COLUMNS: usize>(&mut self, row: &Self) {
         self.taxels += row.taxels;
         self.others += row.others;

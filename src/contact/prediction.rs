@@ -144,6 +144,13 @@ impl<const ROWS: usize, const COLUMNS: usize> Prediction<ROWS, COLUMNS> {
         }
     }
 
+    /// Predicts a taxel's pressure alone, as [`Prediction::taxel`]. Not inlined: few of a row's taxels lie in a contact,
+    /// and without this the loop over the row keeps its values in registers.
+    #[inline(never)]
+    pub(super) fn pressure(&self, square: u32, geometry: &Geometry) -> i32 {
+        self.taxel(square, &geometry.nodes).pressure
+    }
+
     /// Predicts a taxel at a squared distance below [`Prediction::outside`].
     #[inline(always)]
     pub fn taxel(&self, square: u32, nodes: &[Node; NODES]) -> TaxelModel {
@@ -210,7 +217,7 @@ pub struct ScaledImage<'a, const ROWS: usize, const COLUMNS: usize> {
     /// Tactile image.
     pub picture: &'a TactileImage<ROWS, COLUMNS>,
     /// Scale by the image's peak.
-    pub scale: PeakScale,
+    pub scale: &'a PeakScale,
 }
 
 /// Scale of an image to shares of its highest taxel: 2^14 is the peak, so products fit 32 bits whatever the load.
@@ -258,8 +265,9 @@ impl PeakScale {
         })
     }
 
+    /// Returns a taxel as a share of the peak, Q14. Taxels below -2^18 have no meaning.
     #[inline(always)]
-    fn share(&self, taxel: i32) -> i32 {
+    pub fn share(&self, taxel: i32) -> i32 {
         high(taxel << (PEAK_BITS - 2), self.inverse_peak)
     }
 

@@ -61,7 +61,7 @@ pub fn read<const ROWS: usize, const COLUMNS: usize>(
     let Some(scale) = PeakScale::new(picture.peak, geometry) else {
         return sums;
     };
-    let view = ScaledImage { picture, scale };
+    let view = ScaledImage { picture, scale: &scale };
     let guess = Guess::from_lengths(sums.indentation, sums.centre_x, sums.centre_y, geometry);
     if covers(&sums, picture, config) {
         let confidence = confidence::<ROWS, COLUMNS>(&misfit(&guess, &view, config), &scale);

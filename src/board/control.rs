@@ -14,14 +14,12 @@ use fingertip::state::{Fault, Mode};
 use fingertip::units::CoreCycles;
 
 use super::analogue::Analogue;
-use super::bridge::{self, Bridge};
+use super::bridge::{self, Bridge, Encoder};
 use super::capture::Keeper;
-use super::encoder::Encoder;
 use super::exchange::{GAINS, HEARD, Heard, LOOP_STATE, LoopState, NotSaved, PARAMS, PICTURE, Report, SAVE, SAVED};
 use super::flash::Store;
-use super::guard::{self, Stopwatch};
+use super::guard::{self, Stopwatch, Watchdogs};
 use super::scan::{Completed, Scan, WAKE};
-use super::watchdog::Watchdogs;
 use super::{health, trace};
 
 /// The guard waits this many times as long for the first frame of a start as for a later one.

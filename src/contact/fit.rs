@@ -6,8 +6,7 @@
 //! changes slowly, while the sum follows every frame. So the force is the sum times the last ratio, as quick as the
 //! sum itself.
 
-use super::equations::{Comparison, Equations};
-use super::prediction::{Guess, PeakScale, Prediction, ScaledImage};
+use super::equations::{Comparison, Equations, Guess, PeakScale, Prediction, ScaledImage};
 use super::{
     CONFIDENCE_LEAST, Contact, FitLevel, TAXELS_MIN, confidence, contact_of_force, covers, from_sums, hidden, overhang,
 };

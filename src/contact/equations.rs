@@ -391,11 +391,11 @@ impl Misfit {
         else {
             return;
         };
-        let (scale, dy_square, outside) = (view.scale, square(*dy), prediction.outside);
+        let (scale, dy_square, outside) = (*view.scale, square(*dy), prediction.outside);
         let mut row = Self::NONE;
-        let mut bad_left = *bad;
+        let mut bad = *bad;
         for (taxel, dx_square) in taxels.iter().zip(&prediction.dx_square) {
-            if bad_left & 1 == 0 {
+            if bad & 1 == 0 {
                 let at = dx_square + dy_square;
                 let share = scale.share(*taxel);
                 if at < outside {
@@ -403,12 +403,12 @@ impl Misfit {
                     let residual = residual(share - prediction.pressure(at, geometry));
                     row.inside += (residual * residual) >> Bits::<ROWS, COLUMNS>::TAXEL;
                 } else {
+                    row.others += 1;
                     row.outside += (residual(share) * residual(share)) >> Bits::<ROWS, COLUMNS>::TAXEL;
                 }
             }
-            bad_left >>= 1;
+            bad >>= 1;
         }
-        row.others = COLUMNS as i32 - bad.count_ones() as i32 - row.taxels;
         self.add_row::<ROWS, COLUMNS>(&row);
     }
 

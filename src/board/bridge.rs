@@ -169,8 +169,8 @@ impl Bridge {
     }
 }
 
-/// Sets if a compare value waits for the next period. It does not only while the outputs are off, or if both become
-/// constant: RM0390 (OC1PE) guarantees no PWM without preload.
+/// Turns the preload of the compare values on or off. It is off only while the outputs are off, or when both values
+/// become constant: without it RM0390 (OC1PE) guarantees no PWM.
 #[inline(never)]
 fn set_preload(on: bool) {
     pac::TIM1.ccmr_output(0).write(|w| {

@@ -1,4 +1,5 @@
-//! The control task: one turn a frame, on an executor that only the guard, the scan and the bus interrupt.
+//! The control task: a turn at half of each frame and one at its end, on an executor that only the guard, the scan and
+//! the bus interrupt.
 //!
 //! Nothing here waits, allocates, logs or holds a lock for longer than a copy of a snapshot.
 //! A capture's start, a new configuration, new gains and a save take longer than a frame: the scan stops for them and

@@ -105,7 +105,7 @@ impl Scan {
         const { assert!(CLOCKS.frame_ns.is_none(), "this scan has no idle time") };
         stop();
         self.early = (0, 0);
-        // Not before: the register is the first converter's, whose clock is on by now.
+        // Not before: the register belongs to ADC1, whose clock is on by now.
         analogue::set_clock();
         // First of the scan, while no converter listens: a compare that is set below the counter is a trigger.
         set_timer(timing);
@@ -145,7 +145,7 @@ impl Scan {
         whole
     }
 
-    /// Replaces the slots of `frame` that the scan has already read again.
+    /// Replaces the first slots of `frame` by those that both banks have completed in the scan under way.
     pub fn copy_so_far(&mut self, frame: &mut Frame) {
         let [half_a, half_b] = [STREAM_A, STREAM_B].map(written_half);
         if half_a == half_b {
@@ -217,7 +217,7 @@ fn DMA2_STREAM2() {
     pac::DMA2.ifcr(0).write(|w| {
         w.set_htif(STREAM_B, first);
         w.set_tcif(STREAM_B, second);
-        // The half that comes next has yet to be completed by the first bank's stream.
+        // Bank A's flag of the half that begins now: it must not show that half's last round.
         w.set_htif(STREAM_A, half == 1);
         w.set_tcif(STREAM_A, half == 0);
     });

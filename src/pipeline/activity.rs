@@ -1,8 +1,8 @@
 //! The activity of the finger: one variant for each, which owns the state of that activity.
 //!
 //! Entering an activity creates its state and leaving drops it, so no activity can find what another one left behind.
-//! The few states that outlive an activity are updated in every frame: the tactile image with its baseline, the
-//! [`crate::touch`], the motion with its zero and winding, the temperature compensation, and the time budget.
+//! What outlives an activity lies in the [`Pipeline`] and is updated in every frame, as the tactile image with its
+//! baseline, the [`crate::touch`], the motion with its zero and winding, and the time budget.
 //!
 //! # Requests
 //!
@@ -41,7 +41,7 @@ const REST_NS: u32 = 20_000_000;
 /// Activity of the finger.
 #[derive(Clone, Debug)]
 pub enum Activity {
-    /// The bridge is off.
+    /// The motor is not driven: shorted until the tip is at rest, then open.
     Off(Halt),
     /// The zero of every taxel is measured, with the bridge off. After a release the tip is known to be free: what
     /// the array reads is a residue.

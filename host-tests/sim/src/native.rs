@@ -92,6 +92,8 @@ struct Unit<E: Set> {
     /// Contact at the last sample, and the number of slots since which it is the same.
     shown: Place,
     same_slots: usize,
+    /// True if a contact at rest gives the same codes in each scan.
+    repeats: bool,
     command: Command,
     next: Bridge,
 }
@@ -178,9 +180,11 @@ impl<E: Set> Board<E> {
         let (mut units, mut effects) = (Vec::new(), Vec::new());
         for (finger, parts) in fingers.enumerate() {
             effects.push((parts.drive, parts.contact));
+            let readout = Readout::new(&setup.array).with_events(scene, finger);
             units.push(Unit {
                 pipeline: Pipeline::new(config),
-                readout: Readout::new(&setup.array).with_events(scene, finger),
+                repeats: E::repeats(scene) && !readout.eventful(),
+                readout,
                 sensor: parts.sensor,
                 link: parts.link,
                 host: Host::new(scene),
@@ -371,14 +375,23 @@ impl<E: Set> Board<E> {
                     places[slot] = self.world.place(finger, since_s);
                 }
             }
-            if unit.readout.ideal(&unit.sensor) {
-                // The frame holds the codes of this contact once a whole scan has sampled it.
-                let known = unit.same_slots >= SLOTS;
+            if unit.repeats {
+                // After two scans of a contact the frame holds its codes.
+                let known = unit.same_slots >= 2 * SLOTS;
                 let compared = if rests { 1 } else { SLOTS };
-                let same = places[rows].iter().take(compared).all(|place| *place == unit.shown);
+                let same = places[rows.clone()].iter().take(compared).all(|place| *place == unit.shown);
                 unit.same_slots = if same { unit.same_slots + slots.len() } else { 0 };
                 if known && same {
+                    unit.sensor.repeat(rows.len() as i64, slots.len() as i64);
                     continue;
+                }
+                if known {
+                    // The effects remember the last slot.
+                    let slot = (slots.start + SLOTS - 1) % SLOTS;
+                    let row = slot.min(ROWS - 1);
+                    let kpa = self.world.placed_kpa(finger, &unit.shown, row);
+                    unit.readout.codes(&mut unit.sensor, slot, self.clock.since(self.start), &kpa);
+                    unit.sensor.repeat(-i64::from(slot < ROWS), -1);
                 }
             }
             unit.shown = places[slots.end.min(ROWS) - 1];

@@ -89,8 +89,11 @@ struct Unit<E: Set> {
     link: link::Named,
     host: Host,
     frame: Frame,
-    /// Contact at the last sample of each slot, whose codes the frame holds.
-    shown: [Option<Place>; SLOTS],
+    /// Contact at the last sample, and the number of slots since which it is the same.
+    shown: Place,
+    same_slots: usize,
+    /// True if a contact at rest gives the same codes in each scan.
+    repeats: bool,
     command: Command,
     next: Bridge,
 }
@@ -177,14 +180,17 @@ impl<E: Set> Board<E> {
         let (mut units, mut effects) = (Vec::new(), Vec::new());
         for (finger, parts) in fingers.enumerate() {
             effects.push((parts.drive, parts.contact));
+            let readout = Readout::new(&setup.array).with_events(scene, finger);
             units.push(Unit {
                 pipeline: Pipeline::new(config),
-                readout: Readout::new(&setup.array).with_events(scene, finger),
+                repeats: E::repeats(scene) && !readout.eventful(),
+                readout,
                 sensor: parts.sensor,
                 link: parts.link,
                 host: Host::new(scene),
                 frame: Frame::EMPTY,
-                shown: [None; SLOTS],
+                shown: Place::NOWHERE,
+                same_slots: 0,
                 command: Command::default(),
                 next: Bridge::Coast,
             });
@@ -355,36 +361,51 @@ impl<E: Set> Board<E> {
 
     /// Samples the slots of the last step of the world, each at its end.
     fn sample(&mut self, slots: Range<usize>, slot_s: f64) {
-        let begun = self.clock;
         for (finger, unit) in self.units.iter_mut().enumerate() {
+            let mut places = [unit.shown; SLOTS];
             // The last slot drives no row.
-            let mut places = [Place::NOWHERE; SLOTS];
             let rows = slots.start..slots.end.min(ROWS);
-            if self.world.rests(finger) {
-                places[rows].fill(self.world.place(finger, f64::INFINITY));
+            let rests = self.world.rests(finger);
+            if rests {
+                places[rows.clone()].fill(self.world.place(finger, f64::INFINITY));
             } else {
-                for slot in rows {
+                for slot in rows.clone() {
                     let gone = slot + 1 - slots.start;
                     let since_s = if gone == slots.len() { f64::INFINITY } else { slot_s * gone as f64 };
                     places[slot] = self.world.place(finger, since_s);
                 }
             }
-            let ideal = unit.readout.ideal(&unit.sensor);
-            self.clock = begun;
-            for slot in slots.clone() {
-                self.clock.go_on(slot_s);
-                let place = &places[slot];
-                if ideal && unit.shown[slot].replace(*place) == Some(*place) {
+            if unit.repeats {
+                // After two scans of a contact the frame holds its codes.
+                let known = unit.same_slots >= 2 * SLOTS;
+                let compared = if rests { 1 } else { SLOTS };
+                let same = places[rows.clone()].iter().take(compared).all(|place| *place == unit.shown);
+                unit.same_slots = if same { unit.same_slots + slots.len() } else { 0 };
+                if known && same {
+                    unit.sensor.repeat(rows.len() as i64, slots.len() as i64);
                     continue;
                 }
-                let kpa = if slot < ROWS { self.world.placed_kpa(finger, place, slot) } else { [0.0; COLUMNS] };
-                let time_s = self.clock.since(self.start);
-                let codes = unit.readout.codes(&mut unit.sensor, slot, time_s, &kpa);
+                if known {
+                    // The effects remember the last slot.
+                    let slot = (slots.start + SLOTS - 1) % SLOTS;
+                    let row = slot.min(ROWS - 1);
+                    let kpa = self.world.placed_kpa(finger, &unit.shown, row);
+                    unit.readout.codes(&mut unit.sensor, slot, self.clock.since(self.start), &kpa);
+                    unit.sensor.repeat(-i64::from(slot < ROWS), -1);
+                }
+            }
+            unit.shown = places[slots.end.min(ROWS) - 1];
+            let mut clock = self.clock;
+            for slot in slots.clone() {
+                clock.go_on(slot_s);
+                let kpa = if slot < ROWS { self.world.placed_kpa(finger, &places[slot], slot) } else { [0.0; COLUMNS] };
+                let codes = unit.readout.codes(&mut unit.sensor, slot, clock.since(self.start), &kpa);
                 for (column, code) in codes.into_iter().enumerate() {
                     unit.frame.set_code(slot, column, code);
                 }
             }
         }
+        slots.for_each(|_| self.clock.go_on(slot_s));
     }
 }
 

@@ -100,6 +100,7 @@ pub trait Watch {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cost {
     pub effect: &'static str,
+    /// Calls, with those left out as their results were known.
     pub evaluations: u64,
     /// Wall time, estimated from a sample of the calls.
     pub seconds: f64,

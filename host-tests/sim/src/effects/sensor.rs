@@ -6,7 +6,7 @@
 
 mod floating;
 
-use crate::effects::{Build, Description, Metered, Part, normal_within_3, normals};
+use crate::effects::{Build, Description, Metered, NamedEffect, Part, family_of, normal_within_3, normals};
 use crate::events::ArrayEvents;
 use crate::mechanics::decay;
 use crate::scene::Scene;
@@ -65,9 +65,21 @@ pub trait Stages {
     fn network(&mut self, _row: usize, _array: &[Row; ROWS], _seen: &mut Row) {}
     fn volts(&mut self, _slot: usize, _time_s: f64, _volts: &mut Row) {}
     fn codes(&mut self, _slot: usize, _time_s: f64, _codes: &mut Row) {}
+    /// Counts calls that were left out as their results were known; negative for a call too many.
+    fn repeat(&mut self, _rows: i64, _slots: i64) {}
 }
 
 impl Stages for () {}
+
+/// True if an effect gives the same codes in each scan of a contact at rest, and remembers the last slot at most.
+pub fn repeats(named: &NamedEffect) -> bool {
+    match named.effect.name {
+        "gain_spread" | "row_sag" | "saturation" | "offset" | "converter" => true,
+        // Then nothing is left of a voltage after a slot of 9 us.
+        "settling" => named.values.number("tau_us") <= 0.2,
+        _ => matches!(family_of(named.effect), "contact" | "drive"),
+    }
+}
 
 named! {
     Pressure(pressure: dyn Pressure),
@@ -105,6 +117,14 @@ impl Stages for Named {
     fn codes(&mut self, slot: usize, time_s: f64, codes: &mut Row) {
         self.codes.iter_mut().for_each(|effect| effect.call(|part| part(slot, time_s, codes)));
     }
+
+    fn repeat(&mut self, rows: i64, slots: i64) {
+        self.pressure.iter_mut().for_each(|effect| effect.repeated += rows);
+        self.conductance.iter_mut().for_each(|effect| effect.repeated += rows);
+        self.network.iter_mut().for_each(|effect| effect.repeated += rows);
+        self.volts.iter_mut().for_each(|effect| effect.repeated += slots);
+        self.codes.iter_mut().for_each(|effect| effect.repeated += slots);
+    }
 }
 
 /// Readout of the array of one finger.
@@ -130,9 +150,9 @@ impl Readout {
         Self { events: ArrayEvents::of(scene, finger), ..self }
     }
 
-    /// True if the codes of a slot follow from the pressures alone.
-    pub fn ideal(&self, stages: &impl Stages) -> bool {
-        stages.none() && self.events.is_none()
+    /// True if events of the scene change codes.
+    pub fn eventful(&self) -> bool {
+        self.events.is_some()
     }
 
     /// Returns the codes of a slot sampled at a time, for the pressures on its row (unused where no row is driven).

@@ -45,7 +45,7 @@ impl<E: Set> Bench<E> {
         finger.contact.effects.remember(&mut finger_before.contact.effects);
         if let (Some(now), Some(before)) = (now.units.first_mut(), before.units.into_iter().next()) {
             (now.pipeline, now.frame, now.command) = (before.pipeline, before.frame, before.command);
-            (now.sensor, now.next) = (before.sensor, before.next);
+            (now.sensor, now.next, now.repeats) = (before.sensor, before.next, before.repeats);
         }
         Ok(())
     }

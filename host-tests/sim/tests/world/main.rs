@@ -171,6 +171,21 @@ fn effects_without_magnitude_change_no_bit_and_are_called_alike_alone_and_togeth
 }
 
 #[test]
+fn a_contact_at_rest_reads_as_if_each_scan_were_computed() {
+    // Of each voltage a seventh is that of the slot before, so the first slot of a motion shows what the rest left behind.
+    let steady = "[effects.dry_friction]\ntorque_mnm = 0.12\n[effects.row_sag]\n[effects.settling]\nafter_us = 0.4\n";
+    let known = run_script::<Named>(steady);
+    // Noise, even without magnitude, is drawn for each scan.
+    let computed = run_script::<Named>(&format!("{steady}[effects.noise]\nrms_codes = 0\n"));
+    assert_eq!(known.digest, computed.digest);
+    for cost in &known.ledger {
+        assert!(
+            computed.ledger.iter().any(|other| (other.effect, other.evaluations) == (cost.effect, cost.evaluations))
+        );
+    }
+}
+
+#[test]
 fn every_effect_by_its_default_runs_to_the_end_and_alike_each_time() {
     for effect in effects::all() {
         let table = format!("[effects.{}]\n", effect.name);

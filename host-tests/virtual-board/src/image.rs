@@ -22,9 +22,8 @@ impl Firmware {
     /// # Errors
     /// The file is missing, or is no ELF.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let elf = std::fs::read(path).map_err(|source| Error::ReadImage { path: path.into(), source })?;
-        let file = object::File::parse(elf.as_slice())
-            .map_err(|source| Error::NotAnImage { path: path.into(), why: source.to_string() })?;
+        let elf = std::fs::read(path).map_err(|why| Error::ReadImage(path.into(), why))?;
+        let file = object::File::parse(elf.as_slice()).map_err(|why| Error::NotAnImage(path.into(), why.to_string()))?;
         let symbols = file.symbols().filter_map(|symbol| Some((symbol.name().ok()?.to_owned(), symbol.address())));
         let symbols = symbols.collect();
         Ok(Self { path: path.into(), elf, symbols })
@@ -75,7 +74,7 @@ impl Flashable {
     /// # Errors
     /// The image is not for a 32-bit microcontroller, or loads nothing.
     pub fn of(image: &Firmware) -> Result<Self, Error> {
-        let fail = |why: &str| Error::NotAnImage { path: image.path().into(), why: why.to_owned() };
+        let fail = |why: &str| Error::NotAnImage(image.path().into(), why.to_owned());
         let file = ElfFile::<FileHeader32<LittleEndian>>::parse(image.elf()).map_err(|why| fail(&why.to_string()))?;
         let mut segments = Vec::new();
         for header in file.elf_program_headers() {
@@ -121,9 +120,7 @@ impl Flashable {
         })?;
         match differs {
             None => Ok(()),
-            Some(at) => {
-                Err(Error::NotAnImage { path, why: format!("the emulated flash differs from it at {at:#010x}") })
-            }
+            Some(at) => Err(Error::NotAnImage(path, format!("the emulated flash differs from it at {at:#010x}"))),
         }
     }
 }

@@ -94,9 +94,8 @@ pub mod text {
                 stand.bench.log.frames().to_vec()
             })?;
             let image = self.image();
-            let table = Table::parse(image.elf()).map_err(|why| Error::NotAnImage {
-                path: image.path().into(),
-                why: format!("its defmt table cannot be read: {why}"),
+            let table = Table::parse(image.elf()).map_err(|why| {
+                Error::NotAnImage(image.path().into(), format!("its defmt table cannot be read: {why}"))
             })?;
             Ok(table.map_or_else(Vec::new, |table| frames.iter().flat_map(|frames| decode(&table, frames)).collect()))
         }

@@ -52,7 +52,7 @@ impl Default for Options {
 /// The image, the factory's calibration, and the presets.
 fn images(image: &Firmware, options: &Options) -> Result<Vec<Image>, Error> {
     let read = |path: &Path, bytes: Vec<u8>, at| {
-        Image::new(path, bytes, at).map_err(|why| Error::NotAnImage { path: path.into(), why: why.to_string() })
+        Image::new(path, bytes, at).map_err(|why| Error::NotAnImage(path.into(), why.to_string()))
     };
     let mut images = vec![read(image.path(), image.elf().to_vec(), None)?];
     let Factory { reference, sensor: [cold, hot] } = options.factory;
@@ -222,7 +222,7 @@ impl Rig {
             Some(Err(panic)) => panic.downcast::<String>().map_or_else(|_| "it panicked".to_owned(), |text| *text),
             None => "it had stopped before".to_owned(),
         };
-        Error::Emulator { at_ns: self.now_ns, why }
+        Error::Emulator(self.now_ns, why)
     }
 }
 
@@ -237,7 +237,7 @@ impl Drop for Rig {
 }
 
 fn failure(error: emulator::Error) -> Error {
-    Error::Emulator { at_ns: 0, why: error.to_string() }
+    Error::Emulator(0, error.to_string())
 }
 
 /// The run at a halt, between two instructions.

@@ -138,7 +138,7 @@ impl Boards {
                 let (shown, trouble) = rig.answer(&made)?;
                 shown.iter().for_each(|shown| watch.step(&shown.step()));
                 if let Some(why) = trouble {
-                    return Err(Error::Host { at_ms: rig.now_ns() as f64 * 1e-6, why: why.into() });
+                    return Err(Error::Host(rig.now_ns(), why.into()));
                 }
             }
         }
@@ -190,7 +190,7 @@ fn set_up(rig: &mut Rig, scene: &Scene, start_ns: u64) -> Result<(), Error> {
     rig.run_until_ns(BOOT_NS)?;
     if let Some(reset) = rig.resets()?.first() {
         let why = format!("the board does not start: it resets, by {}", reset.cause);
-        return Err(Error::Host { at_ms: reset.at_ns as f64 * 1e-6, why });
+        return Err(Error::Host(reset.at_ns, why));
     }
     write_u8(rig, "tare", address::TARE, 1)?;
     rig.run_until_ns(start_ns - 4 * MS)?;
@@ -208,10 +208,7 @@ fn set_up(rig: &mut Rig, scene: &Scene, start_ns: u64) -> Result<(), Error> {
     write_u8(rig, "status return level", address::STATUS_RETURN_LEVEL, 1)?;
     rig.run_until_ns(start_ns - 2 * MS)?;
     if rig.now_ns() > start_ns - 2 * MS {
-        return Err(Error::Host {
-            at_ms: rig.now_ns() as f64 * 1e-6,
-            why: "setting the board up took too long".into(),
-        });
+        return Err(Error::Host(rig.now_ns(), "setting the board up took too long".into()));
     }
     Ok(())
 }
@@ -223,7 +220,7 @@ fn set_up(rig: &mut Rig, scene: &Scene, start_ns: u64) -> Result<(), Error> {
 fn frame_offset(rig: &mut Rig) -> Result<u32, Error> {
     let Some(address) = rig.image().item("scan", "SEQUENCE") else {
         let why = "the image has no counter of frames named `scan::SEQUENCE`".into();
-        return Err(Error::Host { at_ms: rig.now_ns() as f64 * 1e-6, why });
+        return Err(Error::Host(rig.now_ns(), why));
     };
     let mut offset = i32::MIN;
     // Where a frame has just ended the image is about to count it: of several looks the largest difference is the right
@@ -241,7 +238,7 @@ fn frame_offset(rig: &mut Rig) -> Result<u32, Error> {
 }
 
 fn write_u8(rig: &mut Rig, doing: &str, register: u16, value: u8) -> Result<(), Error> {
-    let at_ms = rig.now_ns() as f64 * 1e-6;
+    let at_ns = rig.now_ns();
     let written = rig.client(WAIT_NS, move |line| line.write_u8(host::ID, register, value).map(drop))?;
-    written.map_err(|why| Error::Host { at_ms, why: format!("{doing}: {why}") })
+    written.map_err(|why| Error::Host(at_ns, format!("{doing}: {why}")))
 }

@@ -21,19 +21,14 @@ use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// Settings of the demonstration.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// The flash image, an ELF.
     pub image: PathBuf,
     /// Shorter, and without the second run.
     pub quick: bool,
 }
 
 /// Runs the demonstration and takes its figures.
-///
-/// # Errors
-/// The image does not run, or does not reach the goals.
 pub fn run(plan: &Plan) -> Result<(Figures, Run), Error> {
     let begun = Instant::now();
     let scene = demo::scene(plan.quick)?;
@@ -98,7 +93,6 @@ const WAIT_NS: u64 = 20_000_000;
 /// Pause of the line after the last request, ms.
 const QUIET_MS: u64 = 2;
 
-/// Counts of the board at an instant.
 #[derive(Clone, Copy, Debug)]
 pub struct Counts {
     at_ns: u64,
@@ -109,9 +103,6 @@ pub struct Counts {
 
 impl Counts {
     /// Now.
-    ///
-    /// # Errors
-    /// The emulator stopped.
     pub fn of(rig: &mut Rig) -> Result<Self, Error> {
         let (at_ns, duties) = (rig.now_ns(), rig.latency()?.frames);
         Ok(Self { at_ns, scans: rig.scan_counts()?, instructions: rig.instructions()?, duties })
@@ -121,7 +112,6 @@ impl Counts {
 /// All figures; the keys end with the unit.
 #[derive(Clone, Debug, Serialize)]
 pub struct Figures {
-    /// SHA-256 of the image in flash.
     pub image_sha256: String,
     /// Size of the image in flash, bytes.
     pub image_bytes: usize,
@@ -131,9 +121,7 @@ pub struct Figures {
     pub wall_time_s: f64,
     /// Frames in that virtual time.
     pub frames: u64,
-    /// Their rate.
     pub frame_rate_hz: f64,
-    /// Frames that the control missed.
     pub missed_frames: u32,
     /// Latency from a frame's last conversion to its duty.
     pub latency_us: Range,
@@ -141,7 +129,6 @@ pub struct Figures {
     pub loop_time_max_us: u16,
     /// Instructions of the whole firmware for a frame: interrupts, executor, step, bus, log. Sleep counts none.
     pub instructions_a_frame: f64,
-    /// Figures of the true force.
     #[serde(flatten)]
     pub forces: Forces,
     /// Digest of every duty and every byte on the bus, with their times.
@@ -152,20 +139,14 @@ pub struct Figures {
     pub checks: Vec<Check>,
 }
 
-/// The least and the largest.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Range {
-    /// The least.
     pub least: f64,
-    /// The largest.
     pub largest: f64,
 }
 
 impl Figures {
     /// Computes the figures of a run between two instants, each against its bound.
-    ///
-    /// # Errors
-    /// The run did not follow the script (no touch, or a force that was not reached), or the board does not answer.
     pub fn of(
         run: &Run,
         [from, to]: [&Counts; 2],
@@ -244,7 +225,6 @@ pub struct Screen {
 }
 
 impl Screen {
-    /// A screen for a run of this scene.
     pub fn new(scene: &Scene) -> Self {
         let bar = std::io::stdout().is_terminal().then(|| {
             let length_ms = (scene.duration_s * 1e3) as u64;

@@ -72,7 +72,6 @@ pub mod text {
     use crate::rig::Rig;
     use defmt_decoder::{DecodeError, Table};
 
-    /// A line that the image logged.
     #[derive(Clone, Debug, PartialEq, Eq)]
     pub struct LogLine {
         /// Virtual time at which it was read, ns.
@@ -85,9 +84,6 @@ pub mod text {
 
     impl Rig {
         /// The image's log so far; one without a log has none.
-        ///
-        /// # Errors
-        /// The emulator stopped, or the image has a log that this crate cannot decode.
         pub fn log(&mut self) -> Result<Vec<LogLine>, Error> {
             let frames = self.with(|stand| {
                 stand.bench.log.drain(stand.bench.next_ns, stand.host);

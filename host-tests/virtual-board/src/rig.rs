@@ -22,7 +22,6 @@ use std::path::Path;
 use std::sync::mpsc;
 use std::thread::JoinHandle;
 
-/// Settings of a run.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Addresses and bytes that memory holds beside the image, for example a parameter sector.
@@ -86,9 +85,6 @@ pub struct Rig {
 
 impl Rig {
     /// A board with an image and a world, a step after power-on.
-    ///
-    /// # Errors
-    /// The image cannot be read or placed.
     pub fn new(image: &Path, world: impl Into<Surroundings>, options: &Options) -> Result<Self, Error> {
         let image = Firmware::read(image)?;
         let images = images(&image, options)?;
@@ -107,7 +103,6 @@ impl Rig {
         Ok(rig)
     }
 
-    /// The image.
     pub fn image(&self) -> &Firmware {
         &self.image
     }
@@ -132,7 +127,6 @@ impl Rig {
         self.order(Order::Run(until_ns.next_multiple_of(STEP_NS)))
     }
 
-    /// Runs on for some ms.
     pub fn run_ms(&mut self, ms: u64) -> Result<(), Error> {
         self.run_until_ns(self.now_ns + ms * 1_000_000)
     }
@@ -147,9 +141,6 @@ impl Rig {
     }
 
     /// The plant, to look at or to change.
-    ///
-    /// # Errors
-    /// The emulator stopped, or the board runs in a scene.
     pub fn world<T: Send + 'static>(&mut self, job: impl FnOnce(&mut Plant) -> T + Send + 'static) -> Result<T, Error> {
         self.with(|stand| match &mut stand.bench.front_end.lock().world {
             Surroundings::Plant(world) => Ok(job(world)),
@@ -158,9 +149,6 @@ impl Rig {
     }
 
     /// The finger in its scene.
-    ///
-    /// # Errors
-    /// The emulator stopped, or there is no scene around the board.
     pub fn finger<T: Send + 'static>(
         &mut self,
         job: impl FnOnce(&mut Finger) -> T + Send + 'static,
@@ -171,7 +159,6 @@ impl Rig {
         })?
     }
 
-    /// Counts of the converters.
     pub fn scan_counts(&mut self) -> Result<ScanCounts, Error> {
         self.with(|stand| stand.bench.front_end.lock().counts)
     }
@@ -246,7 +233,6 @@ pub struct Stand<'a> {
     pub session: &'a mut Session<FingerBoard>,
     /// The guest's memory and interrupt lines.
     pub host: &'a mut dyn Host,
-    /// The instant.
     pub stop: Stop,
     /// All around the board.
     pub bench: &'a mut Bench,

@@ -51,9 +51,6 @@ const BAUD_CODE: u8 = 5;
 const WATCHDOG_MS: i64 = 20;
 
 /// Runs a scene. The times of the board and of the scene's script begin together.
-///
-/// # Errors
-/// The image does not run, or the scene cannot be simulated.
 pub fn simulate(image: &Path, scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, Error> {
     let mut boards = Boards::power_on(image, scene)?;
     let summary = boards.run(scene, watch)?;
@@ -75,9 +72,6 @@ pub struct Boards {
 
 impl Boards {
     /// Boots and tares them and enables torque: the scene begins a millisecond later.
-    ///
-    /// # Errors
-    /// Like [`simulate`].
     pub fn power_on(image: &Path, scene: &Scene) -> Result<Self, Error> {
         let begun = Instant::now();
         let params = scene.params();
@@ -103,9 +97,6 @@ impl Boards {
     }
 
     /// Runs the scene from its beginning to its end, once.
-    ///
-    /// # Errors
-    /// Like [`simulate`].
     pub fn run(&mut self, scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, Error> {
         let begun = Instant::now();
         let fingers = self.rigs.len();
@@ -174,7 +165,6 @@ fn set_out(rig: &mut Rig, now_ns: u64, second_s: f64, wants_pressures: bool) -> 
     })
 }
 
-/// A millisecond begins.
 fn begin(bench: &mut Bench, now_ns: u64, second_s: f64, wants_pressures: bool) {
     if let Surroundings::Scene(finger) = &mut bench.front_end.lock().world {
         finger.clock.run_at(now_ns, second_s);

@@ -6,10 +6,8 @@ use fingertip::params::Params;
 use fingertip::shipped::{COLUMNS, REGISTERS, TAXELS, address};
 use output::units;
 
-/// Command that renews this page.
 pub const COMMAND: &str = "cargo xtask docs";
 
-/// The page.
 pub fn markdown() -> String {
     let mut page = String::new();
     let state = address::PRESENT_MODE;

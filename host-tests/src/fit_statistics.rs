@@ -28,9 +28,7 @@ pub const FRAMES: usize = 90;
 /// Pictures of one kind.
 #[derive(Clone, Copy, Debug)]
 pub struct Series {
-    /// Name in the tables.
     pub name: &'static str,
-    /// Draws a scene.
     pub scene: fn(&mut Rng) -> Scene,
     /// Disturbances of the readings.
     pub reading: Reading,
@@ -70,11 +68,8 @@ pub const BAD: [Series; 6] = [
 /// One tactile image with its truth.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// The contact.
     pub scene: Scene,
-    /// Pressures on the taxels.
     pub pressures: Pressures,
-    /// Tactile image of `pressures`.
     pub picture: TactileImage,
     /// Share of the seen force that an edge takes; 0 without one.
     pub cut: f64,
@@ -125,9 +120,6 @@ impl Default for Configs {
 
 impl Configs {
     /// Configuration for a scene's array.
-    ///
-    /// # Panics
-    /// If the pitch is not one of [`PITCHES_MM`].
     pub fn of(&self, scene: &Scene) -> &Config {
         let found = self.0.iter().find(|(pitch_mm, _)| *pitch_mm == scene.pitch_mm);
         &found.expect("one of the arrays' pitches").1
@@ -163,7 +155,6 @@ impl Outcome {
 /// A case and what came of it.
 #[derive(Clone, Debug)]
 pub struct Verdict {
-    /// The case.
     pub case: Case,
     /// Outcome of each reading method.
     pub outcomes: [Outcome; WAYS],
@@ -238,7 +229,6 @@ pub fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
 
 // The tables of `docs/contact.md`, from pictures judged by [`crate::fit_statistics`].
 
-/// Page with the tables.
 pub const PAGE: Page = Page { name: "docs/contact.md", tables: "tables", command: "cargo xtask fit --write" };
 /// Cases a series where nothing else is asked.
 pub const CASES: usize = 10_000;

@@ -18,15 +18,11 @@ const SMOOTH_S: f64 = 0.01;
 /// The world and the controller at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sample {
-    /// When.
     pub time_s: f64,
-    /// Requested force.
     pub goal_n: f64,
     /// The contact force as it is.
     pub true_force_n: f64,
-    /// Travel of the tip.
     pub travel_mm: f64,
-    /// Indentation of the tip.
     pub indentation_mm: f64,
     /// Share of the supply at the motor, -1 to 1; positive presses.
     pub duty: f64,
@@ -35,9 +31,7 @@ pub struct Sample {
 /// A stretch of the run to look at more closely.
 #[derive(Clone, Debug)]
 pub struct Panel<'a> {
-    /// Event.
     pub title: String,
-    /// The samples.
     pub samples: &'a [Sample],
     /// The instant that counts as 0.
     pub zero_s: f64,

@@ -4,9 +4,9 @@ use crate::core::{Core, Cycles, Executed, Flash, Next, Settings, Touched};
 use crate::decode::Unknown;
 
 use crate::instruction::{IfThen, Instruction, Kind, holds};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
-use std::fmt::Write;
 
 /// A place in the guest's code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -229,19 +229,11 @@ pub struct Figures {
     pub flash: u64,
 }
 
-impl Figures {
-    /// The names of the figures, in their order.
-    pub const NAMES: [&str; 5] = ["instructions", "low", "estimate", "high", "flash"];
-
-    /// Values in the order of [`Figures::NAMES`].
-    pub const fn values(&self) -> [u64; 5] {
-        let Self { instructions, cycles: Cycles { low, estimate, high }, flash } = *self;
-        [instructions, low, estimate, high, flash]
-    }
-}
+/// Names of the figures, in the order of [`Region::summaries`].
+const NAMES: [&str; 5] = ["instructions", "low", "estimate", "high", "flash"];
 
 /// A figure over the passes of a region.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 pub struct Summary {
     /// Sum.
     pub total: u64,
@@ -275,7 +267,8 @@ pub struct Region {
 impl Region {
     /// Adds a pass.
     pub fn push(&mut self, pass: &Figures) {
-        self.passes.push(pass.values());
+        let Figures { instructions, cycles: Cycles { low, estimate, high }, flash } = *pass;
+        self.passes.push([instructions, low, estimate, high, flash]);
     }
 
     /// Number of passes.
@@ -283,58 +276,14 @@ impl Region {
         self.passes.len()
     }
 
-    /// Each figure over the passes, in the order of [`Figures::NAMES`].
+    /// Each figure over the passes, in the order of [`Measured`].
     pub fn summaries(&self) -> [Summary; 5] {
         std::array::from_fn(|figure| Summary::of(self.passes.iter().map(|pass| pass[figure]).collect()))
     }
 }
 
-/// A table: a line for each region and figure.
-pub fn text(regions: &BTreeMap<u32, Region>) -> String {
-    let mut text = format!(
-        "{:>8} {:>8}  {:<12} {:>14} {:>10} {:>10} {:>10}\n",
-        "region", "passes", "", "total", "min", "median", "max"
-    );
-    for (number, region) in regions {
-        let passes = region.passes();
-        for (name, Summary { total, min, median, max }) in Figures::NAMES.iter().zip(region.summaries()) {
-            // A string takes every write.
-            let _ = writeln!(text, "{number:>8} {passes:>8}  {name:<12} {total:>14} {min:>10} {median:>10} {max:>10}");
-        }
-    }
-    for (name, total) in Figures::NAMES.iter().zip(totals(regions)) {
-        let _ = writeln!(text, "{:>8} {:>8}  {name:<12} {total:>14}", "all", "");
-    }
-    text
-}
-
-/// An object a line: the regions in order of their numbers, then the sums over all of them.
-pub fn json_lines(regions: &BTreeMap<u32, Region>) -> String {
-    let mut text = String::new();
-    for (number, region) in regions {
-        let _ = write!(text, "{{\"region\":{number},\"passes\":{}", region.passes());
-        for (name, Summary { total, min, median, max }) in Figures::NAMES.iter().zip(region.summaries()) {
-            let _ = write!(text, ",\"{name}\":{{\"total\":{total},\"min\":{min},\"median\":{median},\"max\":{max}}}");
-        }
-        text.push_str("}\n");
-    }
-    let sums = Figures::NAMES.iter().zip(totals(regions)).map(|(name, total)| format!("\"{name}\":{total}"));
-    let _ = writeln!(text, "{{\"total\":{{{}}}}}", sums.collect::<Vec<_>>().join(","));
-    text
-}
-
-fn totals(regions: &BTreeMap<u32, Region>) -> [u64; 5] {
-    let mut totals = [0; 5];
-    for region in regions.values() {
-        for (total, summary) in totals.iter_mut().zip(region.summaries()) {
-            *total += summary.total;
-        }
-    }
-    totals
-}
-
 /// A region of a report.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 pub struct Measured {
     /// Number of the region.
     pub region: u32,
@@ -352,20 +301,25 @@ pub struct Measured {
     pub flash: Summary,
 }
 
+/// An object a line: the regions in order of their numbers, then the sums over all of them.
+pub fn json_lines(regions: &BTreeMap<u32, Region>) -> String {
+    let (mut text, mut totals) = (String::new(), [0; 5]);
+    for (region, passes) in regions {
+        let summaries = passes.summaries();
+        totals.iter_mut().zip(&summaries).for_each(|(total, summary)| *total += summary.total);
+        let ([instructions, low, estimate, high, flash], passes) = (summaries, passes.passes() as u64);
+        let measured = Measured { region: *region, passes, instructions, low, estimate, high, flash };
+        text += &serde_json::to_string(&measured).unwrap_or_default();
+        text += "\n";
+    }
+    let sums: Vec<_> = NAMES.iter().zip(totals).map(|(name, total)| format!("\"{name}\":{total}")).collect();
+    text + &format!("{{\"total\":{{{}}}}}\n", sums.join(","))
+}
+
 /// Reads what [`json_lines`] wrote: the regions, in order of their numbers. `None` where it is anything else.
 pub fn parse(text: &str) -> Option<Vec<Measured>> {
     let (regions, total) = text.trim_end().rsplit_once('\n').unwrap_or(("", text.trim_end()));
-    total.starts_with("{\"total\":").then(|| regions.lines().map(parse_line).collect())?
-}
-
-fn parse_line(line: &str) -> Option<Measured> {
-    // The writer puts every number behind a key of its own, in a fixed order: the numbers tell all.
-    let mut numbers = line.split(|letter: char| !letter.is_ascii_digit()).filter(|word| !word.is_empty());
-    let mut number = || numbers.next()?.parse::<u64>().ok();
-    let (region, passes) = (number()?.try_into().ok()?, number()?);
-    let mut summary = || Some(Summary { total: number()?, min: number()?, median: number()?, max: number()? });
-    let (instructions, low, estimate, high, flash) = (summary()?, summary()?, summary()?, summary()?, summary()?);
-    numbers.next().is_none().then_some(Measured { region, passes, instructions, low, estimate, high, flash })
+    total.starts_with("{\"total\":").then(|| regions.lines().map(|line| serde_json::from_str(line).ok()).collect())?
 }
 
 #[cfg(test)]
@@ -419,15 +373,5 @@ mod tests {
         assert_eq!(parse(&json_lines(&BTreeMap::new())), Some(vec![]));
         assert_eq!(parse("{\"region\":1}\n{\"total\":{}}"), None);
         assert_eq!(parse(""), None);
-    }
-
-    #[test]
-    fn the_table_has_a_line_for_each_figure() {
-        let text = text(&regions());
-        assert_eq!(text.lines().count(), 1 + 2 * Figures::NAMES.len() + Figures::NAMES.len());
-        assert!(
-            text.contains("       7        3  estimate                 19          5          6          8\n"),
-            "{text}"
-        );
     }
 }

@@ -151,10 +151,10 @@ pub fn curves(panels: &[Curves<'_>], panel_px: (u32, u32)) -> Result<String, Plo
             let frame = Frame { title, x, unit: y, x_range: *x_range, range: *y_range };
             frame.draw(&area, |chart| {
                 curves.iter().try_for_each(|curve| match curve {
-                    Curve::Solid(points) => chart.solid(points, INK),
+                    Curve::Solid(points) => chart.solid(points),
                     Curve::Pale(points) => chart.pale(points),
                     Curve::Second(points) => chart.second(points),
-                    Curve::Dashed(points) => chart.dashed(points, GOAL_INK),
+                    Curve::Dashed(points) => chart.dashed(points),
                     Curve::Circles(points) => chart.circles(points),
                 })
             })?;

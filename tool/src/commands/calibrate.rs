@@ -52,7 +52,6 @@ pub struct Calibrate {
 }
 
 impl Calibrate {
-    /// Goals to hold, mN.
     fn goals_mn(&self) -> Vec<i64> {
         match (self.no_scale, self.scale_n.is_empty()) {
             (true, _) => Vec::new(),

@@ -309,13 +309,11 @@ impl Session {
 pub struct Row {
     /// Name of the parameter, which ends with its unit.
     name: &'static str,
-    /// Value to write.
     after: f64,
     /// Standard uncertainty in the same unit; none for what a person said.
     sigma: Option<f64>,
 }
 
-/// Gains that were measured.
 pub struct GainRows {
     /// Gains to write, in 1/16384, row by row.
     pub after: Vec<Vec<u16>>,
@@ -323,7 +321,6 @@ pub struct GainRows {
     pub sigma: Vec<Vec<Option<f64>>>,
 }
 
-/// Everything that a procedure found.
 #[derive(Default)]
 pub struct Found {
     rows: Vec<Row>,
@@ -339,7 +336,6 @@ pub struct Found {
 }
 
 impl Found {
-    /// Adds a parameter.
     pub fn row(&mut self, name: &'static str, after: f64, sigma: Option<f64>) {
         self.rows.push(Row { name, after, sigma });
     }

@@ -73,7 +73,6 @@ pub enum Command {
     },
 }
 
-/// A stored register and its value.
 pub type Value = (&'static Register, i64);
 
 /// Does it; nothing is half done without a word.
@@ -413,7 +412,6 @@ const GAINS: &str = "gains";
 /// Number of entries: a file that was cut has fewer, or a last line without an end.
 const ENTRIES: &str = "entries";
 
-/// Content of a backup.
 struct Backup {
     /// Values of registers with a name.
     values: Vec<Value>,
@@ -449,7 +447,6 @@ fn write_backup(path: &Path, force: bool, client: &mut Client, kept: &Backup) ->
     whole::write(path, force, text.as_bytes())
 }
 
-/// Reads it.
 fn read_backup(path: &Path) -> Result<Backup, Error> {
     let text = fs::read_to_string(path).map_err(|why| match why.kind() {
         ErrorKind::InvalidData => Error::file("read", path, "it is no text"),

@@ -273,7 +273,6 @@ pub struct Tare {
     within_s: f64,
 }
 
-/// Tares, and reports the result.
 pub fn tare(args: &Tare, client: &mut Client, json: bool) -> Result<(), Error> {
     no_fault_nor_motion(client)?;
     if client.number(address::TORQUE_ENABLE)? != 0 {
@@ -289,7 +288,6 @@ pub fn tare(args: &Tare, client: &mut Client, json: bool) -> Result<(), Error> {
     if touched { Err(TOUCHED.into()) } else { Ok(()) }
 }
 
-/// Result of a tare.
 pub(super) struct Tared {
     /// Something seemed to touch the tip meanwhile.
     pub touched: bool,

@@ -73,32 +73,21 @@ pub struct Case {
     pub picture: TactileImage,
     /// Share of the seen force that an edge takes; 0 without one.
     pub cut: f64,
-    /// Draws that were left out before this one because too few taxels see the contact.
-    pub too_few: usize,
-    /// Draws that were left out because the edge takes too little.
-    pub invisible: usize,
 }
 
 impl Series {
     /// Case `number` of the series. Draws with too few live taxels or too small a cut are skipped.
     pub fn case(&self, number: usize) -> Case {
         let mut rng = Rng::with_seed(0x5eed_0000_0000 + number as u64);
-        let (mut too_few, mut invisible) = (0, 0);
         loop {
             let scene = (self.scene)(&mut rng);
             let pressures = scene.pressures();
             let bad = self.reading.dead(&mut rng);
             let (picture, seen) = self.reading.picture(&pressures, bad, &mut rng);
-            if seen < TAXELS_MIN {
-                too_few += 1;
-                continue;
-            }
             let cut = scene.cut(&pressures, &picture.bad);
-            if cut.is_some_and(|cut| cut < CUT_MIN) {
-                invisible += 1;
-                continue;
+            if seen >= TAXELS_MIN && cut.is_none_or(|cut| cut >= CUT_MIN) {
+                return Case { scene, pressures, picture, cut: cut.unwrap_or(0.0) };
             }
-            return Case { scene, pressures, picture, cut: cut.unwrap_or(0.0), too_few, invisible };
         }
     }
 }

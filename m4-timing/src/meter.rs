@@ -11,9 +11,7 @@ use std::fmt;
 /// A place in the guest's code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Site {
-    /// Address of the place.
     pub address: u32,
-    /// Instruction at the address.
     pub code: Result<Instruction, Unknown>,
 }
 
@@ -26,9 +24,7 @@ impl Site {
 
 /// State of the guest that the meter reads before an instruction executes.
 pub trait Registers {
-    /// A core register.
     fn core(&mut self, number: u8) -> u32;
-    /// The program status.
     fn xpsr(&mut self) -> u32;
 }
 
@@ -101,9 +97,6 @@ impl Meter {
     }
 
     /// The core is about to execute what lies at a place.
-    ///
-    /// # Errors
-    /// The region cannot be measured.
     pub fn execute(&mut self, site: &Site, registers: &mut impl Registers) -> Result<(), MeterError> {
         let address = site.address;
         let Some(pass) = &mut self.pass else {
@@ -143,9 +136,6 @@ impl Meter {
     }
 
     /// Returns the measurements.
-    ///
-    /// # Errors
-    /// A region did not end.
     pub fn finish(&self) -> Result<&BTreeMap<u32, Region>, MeterError> {
         self.pass.as_ref().map_or(Ok(&self.regions), |pass| Err(MeterError::NotEnded(pass.number)))
     }
@@ -235,13 +225,10 @@ const NAMES: [&str; 5] = ["instructions", "low", "estimate", "high", "flash"];
 /// A figure over the passes of a region.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 pub struct Summary {
-    /// Sum.
     pub total: u64,
-    /// Smallest.
     pub min: u64,
     /// The one in the middle; of an even number the lower of the two.
     pub median: u64,
-    /// Largest.
     pub max: u64,
 }
 
@@ -258,20 +245,17 @@ impl Summary {
     }
 }
 
-/// The passes of a region.
 #[derive(Clone, Debug, Default)]
 pub struct Region {
     passes: Vec<[u64; 5]>,
 }
 
 impl Region {
-    /// Adds a pass.
     pub fn push(&mut self, pass: &Figures) {
         let Figures { instructions, cycles: Cycles { low, estimate, high }, flash } = *pass;
         self.passes.push([instructions, low, estimate, high, flash]);
     }
 
-    /// Number of passes.
     pub fn passes(&self) -> usize {
         self.passes.len()
     }
@@ -282,12 +266,9 @@ impl Region {
     }
 }
 
-/// A region of a report.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 pub struct Measured {
-    /// Number of the region.
     pub region: u32,
-    /// Passes through it.
     pub passes: u64,
     /// Instructions executed, those whose condition did not hold too.
     pub instructions: Summary,

@@ -398,8 +398,8 @@ fn status(bytes: &[u8]) -> Option<Status> {
     Some(Status {
         sequence: word(address::FRAME_COUNTER)? as u32,
         missed_frames: word(address::MISSED_FRAMES)? as u32,
-        mode: mode(byte(address::PRESENT_MODE)?),
-        fault: fault(byte(address::FAULT)?),
+        mode: Mode::of(byte(address::PRESENT_MODE)?).unwrap_or(Mode::Fault),
+        fault: Fault::of(byte(address::FAULT)?),
         limits: Limits(half(address::LIMITS)?),
         contact: Contact {
             force: newtons(word(address::PRESENT_FORCE_MN)?),
@@ -423,12 +423,4 @@ fn status(bytes: &[u8]) -> Option<Status> {
 fn scaled(thousandths: i32, one: i64) -> i32 {
     let bits = (i64::from(thousandths) * one).div_euclid(1000);
     bits.clamp(i32::MIN.into(), i32::MAX.into()) as i32
-}
-
-fn mode(number: u8) -> Mode {
-    Mode::ALL.into_iter().find(|mode| *mode as u8 == number).unwrap_or(Mode::Fault)
-}
-
-fn fault(number: u8) -> Option<Fault> {
-    Fault::ALL.into_iter().find(|fault| *fault as u8 == number)
 }

@@ -34,18 +34,17 @@ pub fn run(plan: &Plan) -> Result<(Figures, Run), Error> {
     let scene = demo::scene(plan.quick)?;
     let repeat = (!plan.quick).then(|| {
         let (image, scene) = (plan.image.clone(), scene.clone());
-        std::thread::spawn(move || simulate(&image, &scene, &mut Nobody).map(|summary| summary.digest))
+        std::thread::spawn(move || simulate(&image, &scene, &mut Trace::new(&scene)).map(|summary| summary.digest))
     });
 
     let mut boards = Boards::power_on(&plan.image, &scene)?;
     let flash = Flashable::of(boards.rigs[0].image())?;
     flash.check_loaded(&mut boards.rigs[0])?;
     let from = Counts::of(&mut boards.rigs[0])?;
-    let mut watch = Seen { trace: Trace::new(&scene), screen: Screen::new(&scene) };
-    let summary = boards.run(&scene, &mut watch)?;
+    let mut screen = Screen::new(&scene);
+    let summary = boards.run(&scene, &mut screen)?;
     let rig: &mut Rig = &mut boards.rigs[0];
     let to = Counts::of(rig)?;
-    let Seen { trace, screen } = watch;
     let repeated = match repeat {
         Some(repeat) => {
             screen.waiting("the same run once more, to compare the traces");
@@ -54,38 +53,10 @@ pub fn run(plan: &Plan) -> Result<(Figures, Run), Error> {
         None => None,
     };
     screen.finish();
-    let run = trace.finish()?;
+    let run = screen.trace.finish()?;
     let mut figures = Figures::of(&run, [&from, &to], rig, &flash, summary, repeated)?;
     figures.wall_time_s = begun.elapsed().as_secs_f64();
     Ok((figures, run))
-}
-
-/// Empty watcher, with which the board is read as often as with a real one.
-struct Nobody;
-
-impl Watch for Nobody {
-    fn wants_every_frame(&self) -> bool {
-        true
-    }
-
-    fn step(&mut self, _: &Step) {}
-}
-
-/// Recorded trace and display.
-struct Seen {
-    trace: Trace,
-    screen: Screen,
-}
-
-impl Watch for Seen {
-    fn wants_every_frame(&self) -> bool {
-        self.trace.wants_every_frame()
-    }
-
-    fn step(&mut self, step: &Step) {
-        self.trace.step(step);
-        self.screen.step(step);
-    }
 }
 
 /// Longest wait for an answer, ns.
@@ -213,8 +184,9 @@ const FULL_KPA: f64 = 70.0;
 /// The array is drawn this often, in the scene's time.
 const DRAWN_MS: u64 = 50;
 
-/// Display of the run: a progress bar on a terminal, plain lines otherwise.
+/// Trace and display of the run: a progress bar on a terminal, plain lines otherwise.
 pub struct Screen {
+    trace: Trace,
     scene: Scene,
     array: Taxels,
     /// Number of goals reported.
@@ -233,7 +205,7 @@ impl Screen {
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
             bar
         });
-        Self { scene: scene.clone(), array: Taxels::of(scene), told: 0, drawn_ms: 0, bar }
+        Self { trace: Trace::new(scene), scene: scene.clone(), array: Taxels::of(scene), told: 0, drawn_ms: 0, bar }
     }
 
     /// Reports the reason of a wait.
@@ -257,7 +229,12 @@ impl Screen {
 }
 
 impl Watch for Screen {
+    fn wants_every_frame(&self) -> bool {
+        true
+    }
+
     fn step(&mut self, step: &Step) {
+        self.trace.step(step);
         while let Some(event) = self.scene.script.get(self.told).filter(|event| event.at_s <= step.time_s) {
             self.say(format!("{:7.3} s  goal: {}", event.at_s, what(event.goal_n)));
             self.told += 1;

@@ -4,6 +4,7 @@ use super::{say, say_json};
 use crate::state::RESTARTED;
 use crate::table::{self, name};
 use crate::{Client, Error, whole};
+use fingertip::link::settings::Saved;
 use fingertip::link::table::Register;
 use fingertip::params::Params;
 use fingertip::pressure::GAIN_ONE;
@@ -18,8 +19,8 @@ use std::time::{Duration, Instant};
 use toml_edit::Document;
 
 /// Values of `SAVED_STATE`.
-const SAME: i64 = 0;
-const CHANGED: i64 = 1;
+const SAME: i64 = Saved::Same as i64;
+const CHANGED: i64 = Saved::Changed as i64;
 /// A save makes the core wait for the flash.
 const SAVE_WITHIN: Duration = Duration::from_secs(5);
 

@@ -3,7 +3,7 @@
 
 pub(super) mod motion;
 
-use super::{Interrupt, aside, params, say};
+use super::{Interrupt, aside, params, report, say};
 use crate::{Client, Error, numbers, table, whole};
 use fingertip::params::Params;
 use fingertip::pressure::GAIN_ONE;
@@ -80,7 +80,7 @@ impl<'a> Procedure<'a> {
 pub(super) struct Run<'a> {
     options: &'a Options,
     interrupt: Interrupt,
-    json: bool,
+    pub json: bool,
 }
 
 /// Time without a look at the signals, ns.
@@ -90,9 +90,7 @@ const TRIES: u32 = 3;
 
 impl Run<'_> {
     pub fn report(&self, text: impl std::fmt::Display) {
-        if !self.json {
-            aside(text);
-        }
+        report(text, self.json);
     }
 
     /// Asks until the answer can be parsed, three times at most. `idle` runs every 50 ms meanwhile. `option` gives the answer
@@ -339,12 +337,6 @@ impl Found {
     pub fn row(&mut self, name: &'static str, after: f64, sigma: Option<f64>) {
         self.rows.push(Row { name, after, sigma });
     }
-
-    /// Records why a part has no result. Then nothing is written at all.
-    pub fn block(&mut self, why: String) {
-        self.refused.push(why);
-        self.blocked = true;
-    }
 }
 
 /// Step of a session that lists what is being written.
@@ -371,6 +363,13 @@ pub fn same_settings(session: &Session, client: &mut Client) -> Result<(), Error
 }
 
 impl Procedure<'_> {
+    /// Records why a part has no result, and forgets its step. Nothing is written at all then.
+    pub fn without(&mut self, step: &str, why: String) -> Result<(), Error> {
+        self.found.refused.push(why);
+        self.found.blocked = true;
+        self.session.forget(step)
+    }
+
     /// Shows the results, writes them if confirmed, and prints the JSON object. Fails if a part has no result, or the
     /// controller refuses: then nothing was changed.
     pub fn finish(mut self) -> Result<(), Error> {

@@ -93,7 +93,7 @@ impl Procedure<'_> {
             )
             .into());
         }
-        capture::fetch(self.client, now, &|text| self.run.report(text))
+        capture::fetch(self.client, now, self.run.json)
     }
 
     /// Waits until the controller's chip has this temperature.

@@ -28,11 +28,13 @@ impl Inputs {
         Self { file: File::open(command_line(&mut [0; 256])), place: 0 }
     }
 
+    /// The next bytes.
     pub fn read(&mut self, bytes: &mut [u8]) {
         self.file.read(bytes);
         self.place += bytes.len();
     }
 
+    /// The next words.
     pub fn words<const N: usize>(&mut self) -> [i32; N] {
         core::array::from_fn(|_| {
             let mut bytes = [0; 4];
@@ -46,6 +48,7 @@ impl Inputs {
         self.place
     }
 
+    /// Seeks to a position.
     pub fn seek(&mut self, place: usize) {
         // SAFETY: takes two numbers.
         if unsafe { syscall!(SEEK, self.file.handle, place) } as isize != 0 {

@@ -6,7 +6,6 @@ use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 
-/// Page with the tables of [`markdown`].
 pub const PAGE: Page = Page { name: "docs/board.md", tables: "analogue figures", command: "cargo xtask docs" };
 
 /// Settle time of the default scan, s.

@@ -6,10 +6,8 @@ use fingertip::params::Params;
 use fingertip::shipped::{COLUMNS, REGISTERS, TAXELS, address};
 use output::units;
 
-/// Command that renews this page.
 pub const COMMAND: &str = "cargo xtask docs";
 
-/// The page.
 pub fn markdown() -> String {
     let mut page = String::new();
     let state = address::PRESENT_MODE;
@@ -115,14 +113,8 @@ fn parameters(page: &mut String) {
 /// Range, unless it is that of the type, or of a count that is only read.
 fn range(register: &Register) -> String {
     let Register { min, max, kind, .. } = *register;
-    let whole = match kind {
-        Kind::U8 => [0, u8::MAX.into()],
-        Kind::I8 => [i8::MIN.into(), i8::MAX.into()],
-        Kind::U16 => [0, u16::MAX.into()],
-        Kind::I16 => [i16::MIN.into(), i16::MAX.into()],
-        Kind::U32 => [0, u32::MAX.into()],
-        Kind::I32 => [i32::MIN.into(), i32::MAX.into()],
-    };
+    let bits = 8 * kind.width();
+    let whole = if is_signed(kind) { [-1 << (bits - 1), (1 << (bits - 1)) - 1] } else { [0, (1 << bits) - 1] };
     let counts = register.access == Access::ReadOnly && min == 0;
     if counts || [min, max] == whole { String::new() } else { format!("{min} to {max}") }
 }
@@ -140,15 +132,12 @@ fn param(register: &Register) -> Option<usize> {
 }
 
 fn kind(register: &Register) -> String {
-    let name = match register.kind {
-        Kind::U8 => "u8",
-        Kind::I8 => "i8",
-        Kind::U16 => "u16",
-        Kind::I16 => "i16",
-        Kind::U32 => "u32",
-        Kind::I32 => "i32",
-    };
-    if register.count == 1 { name.into() } else { format!("{name} x {}", register.count) }
+    let name = format!("{:?}", register.kind).to_lowercase();
+    if register.count == 1 { name } else { format!("{name} x {}", register.count) }
+}
+
+fn is_signed(kind: Kind) -> bool {
+    matches!(kind, Kind::I8 | Kind::I16 | Kind::I32)
 }
 
 fn access(access: Access) -> &'static str {
@@ -278,7 +267,7 @@ fn item(register: &Register) -> Item {
         name,
         // To 12 digits: 100 steps of a thousandth are a tenth.
         unit: unit.map(|(_, factor, unit)| ((factor * f64::from(register.scale) * 1e12).round() / 1e12, *unit)),
-        signed: matches!(register.kind, Kind::I8 | Kind::I16 | Kind::I32),
+        signed: is_signed(register.kind),
     }
 }
 

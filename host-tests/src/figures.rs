@@ -32,9 +32,6 @@ pub fn all() -> Result<[(&'static str, String); 3], PlotError> {
 }
 
 /// The paper's tip: a = 10 mm, Y = 250 kPa.
-///
-/// # Panics
-/// Never: the core's own tests make it too.
 pub fn tip() -> Tip {
     Tip::new(Millimetres::from_bits(10 << 24), Kilopascals::from_bits(250 << 16)).expect("inside the domain")
 }
@@ -123,9 +120,7 @@ pub fn readings(tip: &Tip) -> Vec<(Millimetres, Newtons)> {
     (1..=READINGS).map(&mut read).collect()
 }
 
-/// A modulus fitted to readings.
 pub struct Modulus {
-    /// The modulus.
     pub kpa: f64,
     /// Standard uncertainty of the modulus.
     pub sigma_kpa: f64,

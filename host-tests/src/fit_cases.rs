@@ -17,7 +17,6 @@ pub const RADIUS_MM: f64 = 10.0;
 pub const MODULUS_KPA: f64 = 250.0;
 /// Codes for a kPa on a taxel.
 pub const CODES_PER_KPA: f64 = 24.0;
-/// Pitches of the arrays, mm.
 pub const PITCHES_MM: [f64; 3] = [1.27, 1.5, 2.0];
 /// Sub-samples of a taxel's side where the pressure has no closed form.
 const SAMPLES: usize = 12;
@@ -60,7 +59,6 @@ pub enum Object {
 pub struct Scene {
     /// Distance from taxel to taxel.
     pub pitch_mm: f64,
-    /// Indentation.
     pub d_mm: f64,
     /// Offset of the contact's centre from the array's middle, along the columns.
     pub x_mm: f64,
@@ -70,7 +68,6 @@ pub struct Scene {
     pub object: Object,
 }
 
-/// Contact radius of the reference tip.
 pub fn contact_radius_mm(d_mm: f64) -> f64 {
     (d_mm * (2.0 * RADIUS_MM - d_mm)).max(0.0).sqrt()
 }
@@ -127,15 +124,11 @@ impl Scene {
         Self { pitch_mm, d_mm, x_mm, y_mm, object: Object::Plane }
     }
 
-    /// The force of a plane contact.
     pub fn force_n(&self) -> f64 {
         PI * MODULUS_KPA * 1e-3 * self.d_mm * self.d_mm
     }
 
     /// The core's constants for this array.
-    ///
-    /// # Panics
-    /// If the pitch is outside the parameters' range.
     pub fn config(&self) -> Config {
         let pitch_um = (self.pitch_mm * 1e3).round() as i32;
         Config::shipped(&Params { pitch_um, ..Params::DEFAULT }).expect("the pitch is in range")
@@ -211,7 +204,6 @@ fn between(rng: &mut Rng, low: f64, high: f64) -> f64 {
     low + (high - low) * rng.f64()
 }
 
-/// A normal deviate.
 fn normal(rng: &mut Rng) -> f64 {
     (-2.0 * (1.0 - rng.f64()).ln()).sqrt() * (TAU * rng.f64()).cos()
 }
@@ -228,7 +220,6 @@ pub enum Steps {
 /// Disturbances of the readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Noise {
-    /// Nothing.
     None,
     /// Each taxel's own reading times this, normally distributed.
     OfReading(f64),
@@ -239,9 +230,7 @@ pub enum Noise {
 /// Steps from pressures to a tactile image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
-    /// Rounding.
     pub steps: Steps,
-    /// Noise.
     pub noise: Noise,
     /// Dead taxels, drawn at random.
     pub dead: usize,

@@ -28,9 +28,7 @@ pub const FRAMES: usize = 90;
 /// Pictures of one kind.
 #[derive(Clone, Copy, Debug)]
 pub struct Series {
-    /// Name in the tables.
     pub name: &'static str,
-    /// Draws a scene.
     pub scene: fn(&mut Rng) -> Scene,
     /// Disturbances of the readings.
     pub reading: Reading,
@@ -70,40 +68,26 @@ pub const BAD: [Series; 6] = [
 /// One tactile image with its truth.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// The contact.
     pub scene: Scene,
-    /// Pressures on the taxels.
     pub pressures: Pressures,
-    /// Tactile image of `pressures`.
     pub picture: TactileImage,
     /// Share of the seen force that an edge takes; 0 without one.
     pub cut: f64,
-    /// Draws that were left out before this one because too few taxels see the contact.
-    pub too_few: usize,
-    /// Draws that were left out because the edge takes too little.
-    pub invisible: usize,
 }
 
 impl Series {
     /// Case `number` of the series. Draws with too few live taxels or too small a cut are skipped.
     pub fn case(&self, number: usize) -> Case {
         let mut rng = Rng::with_seed(0x5eed_0000_0000 + number as u64);
-        let (mut too_few, mut invisible) = (0, 0);
         loop {
             let scene = (self.scene)(&mut rng);
             let pressures = scene.pressures();
             let bad = self.reading.dead(&mut rng);
             let (picture, seen) = self.reading.picture(&pressures, bad, &mut rng);
-            if seen < TAXELS_MIN {
-                too_few += 1;
-                continue;
-            }
             let cut = scene.cut(&pressures, &picture.bad);
-            if cut.is_some_and(|cut| cut < CUT_MIN) {
-                invisible += 1;
-                continue;
+            if seen >= TAXELS_MIN && cut.is_none_or(|cut| cut >= CUT_MIN) {
+                return Case { scene, pressures, picture, cut: cut.unwrap_or(0.0) };
             }
-            return Case { scene, pressures, picture, cut: cut.unwrap_or(0.0), too_few, invisible };
         }
     }
 }
@@ -125,9 +109,6 @@ impl Default for Configs {
 
 impl Configs {
     /// Configuration for a scene's array.
-    ///
-    /// # Panics
-    /// If the pitch is not one of [`PITCHES_MM`].
     pub fn of(&self, scene: &Scene) -> &Config {
         let found = self.0.iter().find(|(pitch_mm, _)| *pitch_mm == scene.pitch_mm);
         &found.expect("one of the arrays' pitches").1
@@ -163,7 +144,6 @@ impl Outcome {
 /// A case and what came of it.
 #[derive(Clone, Debug)]
 pub struct Verdict {
-    /// The case.
     pub case: Case,
     /// Outcome of each reading method.
     pub outcomes: [Outcome; WAYS],
@@ -238,7 +218,6 @@ pub fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
 
 // The tables of `docs/contact.md`, from pictures judged by [`crate::fit_statistics`].
 
-/// Page with the tables.
 pub const PAGE: Page = Page { name: "docs/contact.md", tables: "tables", command: "cargo xtask fit --write" };
 /// Cases a series where nothing else is asked.
 pub const CASES: usize = 10_000;

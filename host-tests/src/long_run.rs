@@ -55,7 +55,6 @@ pub fn cycle<S: Clone + PartialEq>(start: &S, most: u64, mut step: impl FnMut(&m
 pub struct Outcome {
     /// The machine and its input.
     pub name: String,
-    /// End state.
     pub cycle: Cycle,
     /// Number of inputs that were applied one by one.
     pub taken: u64,
@@ -86,7 +85,6 @@ impl std::fmt::Display for Outcome {
 pub struct Machine<S> {
     /// Name of the machine and its input.
     pub name: String,
-    /// Start state.
     pub start: S,
     /// Number of inputs in a period.
     pub inputs: u64,
@@ -102,9 +100,6 @@ pub type Output<S> = (&'static str, fn(&S) -> i64, i64);
 impl<S: Clone + PartialEq + 'static> Machine<S> {
     /// Finds the cycle and measures it. With `whole`, all [`STEPS`] are also taken one by one, and must end
     /// where the cycle says.
-    ///
-    /// # Panics
-    /// If there is no cycle within `most` steps, or the single steps end in another state. An overflow also panics.
     pub fn run(&self, most: u64, whole: bool) -> Outcome {
         let found = cycle(&self.start, most, &self.step);
         let (cycle, begin) = found.unwrap_or_else(|| panic!("{}: no cycle within {most} steps", self.name));
@@ -155,9 +150,6 @@ fn frame(preload: u16, codes: u16) -> Frame {
 
 /// Holds a goal with constant frames, the given codes on 16 taxels and a constant encoder count, until only the frame
 /// number changes in the pipeline from period to period.
-///
-/// # Panics
-/// If the state still changes after `most` steps.
 pub fn hold(name: &str, torque: bool, goal_mn: i32, codes: u16, most: u64) -> (Outcome, Status) {
     let mut pipeline = Pipeline::new(&Config::shipped(&cool()).expect("the defaults are allowed"));
     let sense = Sense { supply_mv: 6_000, ..Sense::default() };
@@ -201,7 +193,6 @@ fn state(pipeline: &Pipeline, sequence: u32) -> String {
 
 /// Steps within which a machine must come to its cycle.
 const MOST: u64 = 200_000_000;
-/// The supply of the reference finger, mV.
 const SUPPLY_MV: u16 = 6_000;
 /// Fastest and slowest scan, and the one between.
 const SCANS: [(&str, i32, i32); 3] = [("fast", 500, 3), ("default", 2_400, 15), ("slow", 100_000, 480)];

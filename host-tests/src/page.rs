@@ -10,9 +10,6 @@ fn path(name: &str) -> PathBuf {
 }
 
 /// Writes a file that is not fresh, or only checks it; false if a check found it stale.
-///
-/// # Errors
-/// The file cannot be written.
 pub fn renew(name: &str, text: &str, check: bool) -> Result<bool, String> {
     let fresh = fs::read_to_string(path(name)).is_ok_and(|present| present == text);
     if !(fresh || check) {
@@ -35,24 +32,17 @@ pub struct Page {
     pub name: &'static str,
     /// Name of the tables in the marker lines.
     pub tables: &'static str,
-    /// The command that writes them.
     pub command: &'static str,
 }
 
 impl Page {
     /// The page with its tables replaced.
-    ///
-    /// # Errors
-    /// The page cannot be read, or lacks the marker lines.
     pub fn renewed(&self, tables: &str) -> Result<String, String> {
         let old = fs::read_to_string(path(self.name)).map_err(|error| format!("{}: {error}", self.name))?;
         self.replaced(&old, tables).ok_or_else(|| format!("{} lacks the markers of its tables", self.name))
     }
 
     /// Checks that these are its tables, or writes them.
-    ///
-    /// # Errors
-    /// A check found other tables, or the page cannot be written.
     pub fn renew(&self, tables: &str, check: bool) -> Result<(), String> {
         if renew(self.name, &self.renewed(tables)?, check)? {
             return Ok(());
@@ -71,7 +61,6 @@ impl Page {
     }
 }
 
-/// The page with the table.
 pub const PAGE: Page = Page { name: "docs/firmware.md", tables: "saves", command: "cargo xtask docs" };
 /// Size of flash sectors 6 and 7, bytes (RM0390 table 4).
 const SECTOR_BYTES: usize = 128 * 1024;

@@ -60,17 +60,11 @@ const CORTEX_M4F: &str = "qemu-system-arm -M netduinoplus2 -icount shift=3,align
 const HUNG: Duration = Duration::from_secs(7200);
 
 /// Runs an image for the firmware's core in a folder with the words of its command line to its end, and returns what it wrote.
-///
-/// # Errors
-/// The emulator does not start, the image reports a failure, or hangs.
 pub fn run(image: &Path, folder: &Path, words: &[&str]) -> Result<String, Box<dyn Error>> {
     run_on(CORTEX_M4F, image, folder, words)
 }
 
 /// Runs an image on an emulator: its program and its options for the board, separated by spaces.
-///
-/// # Errors
-/// The emulator does not start, the image reports a failure, or hangs.
 pub fn run_on(emulator: &str, image: &Path, folder: &Path, words: &[&str]) -> Result<String, Box<dyn Error>> {
     let mut options = emulator.split(' ');
     let program = options.next().unwrap_or_default();

@@ -28,9 +28,6 @@ const GOALS_MN: [(usize, i32); 8] =
 const SEED: u64 = 2003;
 
 /// The recording.
-///
-/// # Panics
-/// Never: the default parameters are sound, as the core's own tests show.
 pub fn records() -> Vec<Record> {
     let mut board = Bench::default();
     let mut random = Rng::with_seed(SEED);
@@ -74,9 +71,6 @@ pub fn to_bytes(records: &[Record]) -> Vec<u8> {
 }
 
 /// Replays a recording through a fresh pipeline on this machine.
-///
-/// # Panics
-/// Never: the default parameters are sound, as the core's own tests show.
 pub fn digest(records: &[Record]) -> u64 {
     let config = config();
     let mut pipeline = Pipeline::new(&config);
@@ -126,9 +120,6 @@ fn fill(frame: &mut Frame, mut code: impl FnMut(usize, usize, u16) -> u16) {
 }
 
 /// The configuration that the default parameters make, with the motor's direction confirmed.
-///
-/// # Panics
-/// If the core refuses its defaults: a mistake in the core.
 pub fn config() -> Config {
     Config::shipped(&images::CONFIRMED).expect("the defaults are allowed")
 }

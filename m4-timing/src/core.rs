@@ -34,16 +34,12 @@ use std::ops::{Add, AddAssign};
 /// Cycles of an instruction or of many.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cycles {
-    /// The fewest.
     pub low: u64,
-    /// The estimate.
     pub estimate: u64,
-    /// The most.
     pub high: u64,
 }
 
 impl Cycles {
-    /// The three figures.
     pub const fn new(low: u64, estimate: u64, high: u64) -> Self {
         Self { low, estimate, high }
     }
@@ -71,9 +67,7 @@ impl AddAssign for Cycles {
 /// An instruction that was executed, and what is known of how.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Executed {
-    /// The instruction.
     pub instruction: Instruction,
-    /// Address of the instruction.
     pub address: u32,
     /// True if its condition did not hold.
     pub skipped: bool,
@@ -83,10 +77,8 @@ pub struct Executed {
     pub touched: Option<Touched>,
 }
 
-/// An access to memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Touched {
-    /// Address of the access.
     pub address: u32,
     /// Length in bytes.
     pub bytes: u32,
@@ -282,7 +274,6 @@ const FLASH_LINES: usize = 1 << 17;
 /// Properties of a part's flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
-    /// Wait states of an access.
     pub wait_states: u32,
     /// Lines of the instruction cache.
     pub instruction_lines: usize,

@@ -8,7 +8,6 @@ use std::fmt;
 /// Machine code that this core does not have, or whose time is not known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Unknown {
-    /// The first halfword.
     pub first: u16,
     /// The second, where there is one.
     pub second: Option<u16>,
@@ -27,9 +26,6 @@ pub const fn is_wide(first: u16) -> bool {
 }
 
 /// Decodes the bytes of one instruction, little-endian.
-///
-/// # Errors
-/// The bytes are no instruction of a Cortex-M4F.
 pub fn decode(bytes: &[u8]) -> Result<Instruction, Unknown> {
     let halfword = |place: usize| Some(u16::from_le_bytes([*bytes.get(place)?, *bytes.get(place + 1)?]));
     let first = halfword(0).unwrap_or(0xffff);

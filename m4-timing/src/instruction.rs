@@ -5,16 +5,12 @@ pub type CoreSet = u16;
 /// The single-precision registers s0 to s31, and the flags of FPSCR as bit 32.
 pub type FloatSet = u64;
 
-/// The stack pointer.
 pub const SP: u8 = 13;
-/// The link register.
 pub const LR: u8 = 14;
-/// The program counter.
 pub const PC: u8 = 15;
 /// FPSCR's flags in a [`FloatSet`].
 pub const FPSCR: FloatSet = 1 << 32;
 
-/// A decoded instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Instruction {
     /// Kind, as far as timing is concerned.
@@ -130,7 +126,6 @@ impl Instruction {
         if self.wide { 4 } else { 2 }
     }
 
-    /// True if it reads or writes memory.
     pub const fn accesses_memory(&self) -> bool {
         use Kind::{
             FloatLoad, FloatLoadMany, FloatStore, FloatStoreMany, Load, LoadMany, LoadPc, Store, StoreIndexed,

@@ -4,6 +4,7 @@
 //! Everything but the plugin is safe, pure and independent of QEMU. [`core`] lists the rules with their
 //! sources; `docs/timing.md` says how far they agree with published measurements.
 
+#![allow(missing_docs, reason = "parts of the project's own programs: a name that says all needs no comment")]
 #![deny(unsafe_code)]
 
 pub mod core;

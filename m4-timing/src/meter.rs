@@ -4,16 +4,14 @@ use crate::core::{Core, Cycles, Executed, Flash, Next, Settings, Touched};
 use crate::decode::Unknown;
 
 use crate::instruction::{IfThen, Instruction, Kind, holds};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
-use std::fmt::Write;
 
 /// A place in the guest's code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Site {
-    /// Address of the place.
     pub address: u32,
-    /// Instruction at the address.
     pub code: Result<Instruction, Unknown>,
 }
 
@@ -26,9 +24,7 @@ impl Site {
 
 /// State of the guest that the meter reads before an instruction executes.
 pub trait Registers {
-    /// A core register.
     fn core(&mut self, number: u8) -> u32;
-    /// The program status.
     fn xpsr(&mut self) -> u32;
 }
 
@@ -101,9 +97,6 @@ impl Meter {
     }
 
     /// The core is about to execute what lies at a place.
-    ///
-    /// # Errors
-    /// The region cannot be measured.
     pub fn execute(&mut self, site: &Site, registers: &mut impl Registers) -> Result<(), MeterError> {
         let address = site.address;
         let Some(pass) = &mut self.pass else {
@@ -143,9 +136,6 @@ impl Meter {
     }
 
     /// Returns the measurements.
-    ///
-    /// # Errors
-    /// A region did not end.
     pub fn finish(&self) -> Result<&BTreeMap<u32, Region>, MeterError> {
         self.pass.as_ref().map_or(Ok(&self.regions), |pass| Err(MeterError::NotEnded(pass.number)))
     }
@@ -229,27 +219,16 @@ pub struct Figures {
     pub flash: u64,
 }
 
-impl Figures {
-    /// The names of the figures, in their order.
-    pub const NAMES: [&str; 5] = ["instructions", "low", "estimate", "high", "flash"];
-
-    /// Values in the order of [`Figures::NAMES`].
-    pub const fn values(&self) -> [u64; 5] {
-        let Self { instructions, cycles: Cycles { low, estimate, high }, flash } = *self;
-        [instructions, low, estimate, high, flash]
-    }
-}
+/// Names of the figures, in the order of [`Region::summaries`].
+const NAMES: [&str; 5] = ["instructions", "low", "estimate", "high", "flash"];
 
 /// A figure over the passes of a region.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 pub struct Summary {
-    /// Sum.
     pub total: u64,
-    /// Smallest.
     pub min: u64,
     /// The one in the middle; of an even number the lower of the two.
     pub median: u64,
-    /// Largest.
     pub max: u64,
 }
 
@@ -266,79 +245,30 @@ impl Summary {
     }
 }
 
-/// The passes of a region.
 #[derive(Clone, Debug, Default)]
 pub struct Region {
     passes: Vec<[u64; 5]>,
 }
 
 impl Region {
-    /// Adds a pass.
     pub fn push(&mut self, pass: &Figures) {
-        self.passes.push(pass.values());
+        let Figures { instructions, cycles: Cycles { low, estimate, high }, flash } = *pass;
+        self.passes.push([instructions, low, estimate, high, flash]);
     }
 
-    /// Number of passes.
     pub fn passes(&self) -> usize {
         self.passes.len()
     }
 
-    /// Each figure over the passes, in the order of [`Figures::NAMES`].
+    /// Each figure over the passes, in the order of [`Measured`].
     pub fn summaries(&self) -> [Summary; 5] {
         std::array::from_fn(|figure| Summary::of(self.passes.iter().map(|pass| pass[figure]).collect()))
     }
 }
 
-/// A table: a line for each region and figure.
-pub fn text(regions: &BTreeMap<u32, Region>) -> String {
-    let mut text = format!(
-        "{:>8} {:>8}  {:<12} {:>14} {:>10} {:>10} {:>10}\n",
-        "region", "passes", "", "total", "min", "median", "max"
-    );
-    for (number, region) in regions {
-        let passes = region.passes();
-        for (name, Summary { total, min, median, max }) in Figures::NAMES.iter().zip(region.summaries()) {
-            // A string takes every write.
-            let _ = writeln!(text, "{number:>8} {passes:>8}  {name:<12} {total:>14} {min:>10} {median:>10} {max:>10}");
-        }
-    }
-    for (name, total) in Figures::NAMES.iter().zip(totals(regions)) {
-        let _ = writeln!(text, "{:>8} {:>8}  {name:<12} {total:>14}", "all", "");
-    }
-    text
-}
-
-/// An object a line: the regions in order of their numbers, then the sums over all of them.
-pub fn json_lines(regions: &BTreeMap<u32, Region>) -> String {
-    let mut text = String::new();
-    for (number, region) in regions {
-        let _ = write!(text, "{{\"region\":{number},\"passes\":{}", region.passes());
-        for (name, Summary { total, min, median, max }) in Figures::NAMES.iter().zip(region.summaries()) {
-            let _ = write!(text, ",\"{name}\":{{\"total\":{total},\"min\":{min},\"median\":{median},\"max\":{max}}}");
-        }
-        text.push_str("}\n");
-    }
-    let sums = Figures::NAMES.iter().zip(totals(regions)).map(|(name, total)| format!("\"{name}\":{total}"));
-    let _ = writeln!(text, "{{\"total\":{{{}}}}}", sums.collect::<Vec<_>>().join(","));
-    text
-}
-
-fn totals(regions: &BTreeMap<u32, Region>) -> [u64; 5] {
-    let mut totals = [0; 5];
-    for region in regions.values() {
-        for (total, summary) in totals.iter_mut().zip(region.summaries()) {
-            *total += summary.total;
-        }
-    }
-    totals
-}
-
-/// A region of a report.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 pub struct Measured {
-    /// Number of the region.
     pub region: u32,
-    /// Passes through it.
     pub passes: u64,
     /// Instructions executed, those whose condition did not hold too.
     pub instructions: Summary,
@@ -352,20 +282,25 @@ pub struct Measured {
     pub flash: Summary,
 }
 
+/// An object a line: the regions in order of their numbers, then the sums over all of them.
+pub fn json_lines(regions: &BTreeMap<u32, Region>) -> String {
+    let (mut text, mut totals) = (String::new(), [0; 5]);
+    for (region, passes) in regions {
+        let summaries = passes.summaries();
+        totals.iter_mut().zip(&summaries).for_each(|(total, summary)| *total += summary.total);
+        let ([instructions, low, estimate, high, flash], passes) = (summaries, passes.passes() as u64);
+        let measured = Measured { region: *region, passes, instructions, low, estimate, high, flash };
+        text += &serde_json::to_string(&measured).unwrap_or_default();
+        text += "\n";
+    }
+    let sums: Vec<_> = NAMES.iter().zip(totals).map(|(name, total)| format!("\"{name}\":{total}")).collect();
+    text + &format!("{{\"total\":{{{}}}}}\n", sums.join(","))
+}
+
 /// Reads what [`json_lines`] wrote: the regions, in order of their numbers. `None` where it is anything else.
 pub fn parse(text: &str) -> Option<Vec<Measured>> {
     let (regions, total) = text.trim_end().rsplit_once('\n').unwrap_or(("", text.trim_end()));
-    total.starts_with("{\"total\":").then(|| regions.lines().map(parse_line).collect())?
-}
-
-fn parse_line(line: &str) -> Option<Measured> {
-    // The writer puts every number behind a key of its own, in a fixed order: the numbers tell all.
-    let mut numbers = line.split(|letter: char| !letter.is_ascii_digit()).filter(|word| !word.is_empty());
-    let mut number = || numbers.next()?.parse::<u64>().ok();
-    let (region, passes) = (number()?.try_into().ok()?, number()?);
-    let mut summary = || Some(Summary { total: number()?, min: number()?, median: number()?, max: number()? });
-    let (instructions, low, estimate, high, flash) = (summary()?, summary()?, summary()?, summary()?, summary()?);
-    numbers.next().is_none().then_some(Measured { region, passes, instructions, low, estimate, high, flash })
+    total.starts_with("{\"total\":").then(|| regions.lines().map(|line| serde_json::from_str(line).ok()).collect())?
 }
 
 #[cfg(test)]
@@ -419,15 +354,5 @@ mod tests {
         assert_eq!(parse(&json_lines(&BTreeMap::new())), Some(vec![]));
         assert_eq!(parse("{\"region\":1}\n{\"total\":{}}"), None);
         assert_eq!(parse(""), None);
-    }
-
-    #[test]
-    fn the_table_has_a_line_for_each_figure() {
-        let text = text(&regions());
-        assert_eq!(text.lines().count(), 1 + 2 * Figures::NAMES.len() + Figures::NAMES.len());
-        assert!(
-            text.contains("       7        3  estimate                 19          5          6          8\n"),
-            "{text}"
-        );
     }
 }

@@ -264,7 +264,6 @@ extern "C" fn ended(_: Id, _: *mut c_void) {
             Ok(regions) => regions,
             Err(refusal) => refuse(&refusal),
         };
-        eprint!("{}", meter::text(regions));
         if let Some(path) = &plugin.out
             && let Err(error) = fs::write(path, meter::json_lines(regions))
         {

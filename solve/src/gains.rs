@@ -31,7 +31,6 @@ use crate::robust::median;
 use nalgebra::{Matrix3, Vector3};
 use std::fmt;
 
-/// Condition of a taxel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Condition {
     /// Follows the model.
@@ -51,7 +50,6 @@ pub struct Gain {
     pub reads: f64,
     /// Standard uncertainty of `reads`, apart from the factor that all have in common.
     pub sigma: f64,
-    /// Condition.
     pub condition: Condition,
     /// Highest reading of the taxel, codes.
     pub highest: f64,
@@ -77,7 +75,6 @@ impl Gain {
 /// Pose of a press, with what it rests on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Posed {
-    /// The pose.
     pub pose: Pose,
     /// Force of each step of the press, N.
     pub forces_n: Vec<f64>,
@@ -88,7 +85,6 @@ pub struct Posed {
 /// Result for the whole array.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gains {
-    /// Number of columns of the array.
     pub columns: usize,
     /// Gains, row by row.
     pub taxels: Vec<Gain>,
@@ -224,9 +220,7 @@ impl fmt::Display for Gains {
 pub struct Shift {
     /// Middle of the step, s.
     pub time_s: f64,
-    /// Travel, mm.
     pub travel_mm: f64,
-    /// Force, N.
     pub force_n: f64,
     /// Force that the stiffest step leads one to expect, N.
     pub expected_n: f64,
@@ -236,12 +230,10 @@ pub struct Shift {
     pub sigma_mm: f64,
 }
 
-/// Judgement of a press.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Judgement {
     /// Yield of the plate, mm/N, and its standard uncertainty.
     pub yields_mm_per_n: [f64; 2],
-    /// Verdict.
     pub verdict: Verdict,
 }
 
@@ -318,7 +310,6 @@ pub fn shifts(press: &Press, pose: &Pose, taxels: &[Gain], forces_n: &[f64]) -> 
     shifts
 }
 
-/// Judges a press by the shifts of its steps.
 pub fn judge(pose: &Pose, yields_mm_per_n: [f64; 2], shifts: &[Shift]) -> Judgement {
     let depth_mm = |shift: &Shift| shift.travel_mm - pose.touch_mm;
     let deepest_mm = shifts.iter().map(depth_mm).fold(0.0, f64::max);

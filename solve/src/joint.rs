@@ -36,7 +36,6 @@ pub const YIELD_USUAL: f64 = 0.02;
 /// A taxel counts as reached where the model brings it to this share of the highest pressure of a press.
 const REACHED: f64 = 1.0 / 24.0;
 
-/// A step of the fit.
 struct Used<'a> {
     press: usize,
     step: &'a Step,
@@ -46,9 +45,6 @@ struct Used<'a> {
 /// Poses and gains of presses on the same array.
 ///
 /// A yield of the plate of this size, mm/N, is taken for usual; 0 is a rigid plate.
-///
-/// # Errors
-/// The presses are too few or too shallow: see [`NoGains`].
 pub fn joint(presses: &[Press], yield_usual: f64) -> Result<Gains, NoGains> {
     let array = presses.first().ok_or(NoGains::NoPress)?.array;
     let mut used = Vec::new();
@@ -81,7 +77,6 @@ struct Unknowns {
     gains: Vec<f64>,
 }
 
-/// The joint fit.
 struct Joint<'a> {
     presses: &'a [Press],
     array: Array,

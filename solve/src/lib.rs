@@ -24,6 +24,8 @@
 //! # Ok::<(), solve::scale::NoScale>(())
 //! ```
 
+#![allow(missing_docs, reason = "parts of the project's own programs: a name that says all needs no comment")]
+
 pub mod gains;
 mod joint;
 pub mod memory;
@@ -44,7 +46,6 @@ use std::fmt;
 /// A number with its standard uncertainty, in the same unit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Value {
-    /// The estimate.
     pub value: f64,
     /// Standard uncertainty of the estimate.
     pub sigma: f64,

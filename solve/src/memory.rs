@@ -31,7 +31,6 @@ pub struct Memory {
     pub creep: f64,
     /// Share s of the force that the tip forgets in the end.
     pub relaxation: f64,
-    /// Time constant of the relaxation, s.
     pub relaxation_s: f64,
 }
 

@@ -56,7 +56,6 @@ impl Pose {
 /// Mean pressure on a taxel as a share of Y, with its slopes by the unknowns of the pose.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Share {
-    /// The pressure.
     pub value: f64,
     /// Derivatives of the pressure by the unknowns.
     pub slopes: [f64; UNKNOWNS],
@@ -69,7 +68,6 @@ pub struct At {
     pub travel_mm: f64,
     /// Half of the travel within the step, mm.
     pub half_mm: f64,
-    /// Force, N.
     pub force_n: f64,
 }
 
@@ -90,7 +88,6 @@ pub struct Square {
 }
 
 impl Square {
-    /// Square of a taxel.
     pub fn new(pose: &Pose, radius_mm: f64, array: &Array, taxel: usize) -> Self {
         let unknowns = pose.unknowns(radius_mm);
         let [touch, axis_x, axis_y, tilt_x, tilt_y, roundness, _] = unknowns;

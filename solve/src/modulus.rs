@@ -28,7 +28,6 @@ const TRIED_S: [f64; 13] = [0.03, 0.044, 0.065, 0.095, 0.14, 0.2, 0.3, 0.44, 0.6
 /// Error of the model in a step's force: as a share of it, and of the largest.
 const FORCE_PART: f64 = 0.003;
 const LARGEST_PART: f64 = 0.0007;
-/// Unknowns of a press.
 const UNKNOWNS: usize = 5;
 
 /// Modulus of one press.
@@ -42,7 +41,6 @@ pub struct OfPress {
     pub touch_mm: f64,
     /// Memory of tip and ink.
     pub memory: Memory,
-    /// Standard uncertainty of the creep.
     pub creep_sigma: f64,
 }
 

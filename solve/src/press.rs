@@ -10,9 +10,7 @@ use crate::record::Ended;
 /// Tactile array: square taxels that touch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Array {
-    /// Number of rows.
     pub rows: usize,
-    /// Number of columns.
     pub columns: usize,
     /// Distance from taxel to taxel, mm.
     pub pitch_mm: f64,
@@ -21,7 +19,6 @@ pub struct Array {
 }
 
 impl Array {
-    /// Number of taxels.
     pub fn taxels(&self) -> usize {
         self.rows * self.columns
     }
@@ -60,7 +57,6 @@ pub struct Step {
     pub time_s: [f64; 2],
     /// Travel at the first and the last frame by the encoder, mm; it grows towards the plate.
     pub travel_mm: [f64; 2],
-    /// Number of frames.
     pub frames: u32,
     /// Forward or return stroke.
     pub branch: Branch,
@@ -76,12 +72,10 @@ impl Step {
         0.5 * (self.travel_mm[0] + self.travel_mm[1])
     }
 
-    /// Middle of its time, s.
     pub fn middle_s(&self) -> f64 {
         0.5 * (self.time_s[0] + self.time_s[1])
     }
 
-    /// Position of the press.
     pub fn at(&self, array: &Array) -> At {
         let half_mm = 0.5 * (self.travel_mm[1] - self.travel_mm[0]).abs();
         At { travel_mm: self.middle_mm(), half_mm, force_n: self.force_n(array) }
@@ -103,7 +97,6 @@ impl Step {
 pub struct Press {
     /// Radius of the tip as configured, mm.
     pub radius_mm: f64,
-    /// Array.
     pub array: Array,
     /// Steps in order of time.
     pub steps: Vec<Step>,
@@ -122,7 +115,6 @@ impl Press {
         })
     }
 
-    /// Deepest step.
     pub fn deepest(&self) -> Option<&Step> {
         self.steps.iter().max_by(|a, b| a.middle_mm().total_cmp(&b.middle_mm()))
     }

@@ -36,7 +36,6 @@ const ZERO_K: f64 = -273.15;
 /// than it was then (0.4 %/K).
 const RESISTANCE_PART: f64 = 0.022;
 
-/// Kind of a series.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Kind {
     /// Steps of a press.
@@ -96,7 +95,6 @@ pub enum NoRecord {
     Params(#[from] ParamError),
 }
 
-/// Press of a series.
 pub fn press(bytes: &[u8], params: &Params) -> Result<Press, NoRecord> {
     params.check()?;
     let (head, body) = Head::of(bytes, Kind::Press)?;

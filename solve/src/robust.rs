@@ -37,7 +37,6 @@ pub fn spread(residuals: impl Iterator<Item = f64>) -> f64 {
 /// Result of a fit.
 #[derive(Clone, Debug)]
 pub struct Fit {
-    /// Unknowns.
     pub unknowns: DVector<f64>,
     /// Their covariance for residuals of a standard deviation of 1.
     pub covariance: DMatrix<f64>,

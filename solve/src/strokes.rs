@@ -64,7 +64,6 @@ const PUSH_SIGMAS: f64 = 4.0;
 const JUMP_COUNTS: f64 = 3.0;
 const JUMP: f64 = 3.0;
 
-/// A sample of a stroke.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sample {
     /// The encoder's count.
@@ -114,7 +113,6 @@ pub struct Record {
     pub rad_per_mm: f64,
     /// Resistance of the whole circuit, Ohm.
     pub resistance: Value,
-    /// The strokes, in order.
     pub strokes: Vec<Stroke>,
     /// Early end of the motions.
     pub ended: Option<Ended>,
@@ -160,9 +158,6 @@ pub struct MeasuredDrive {
 }
 
 /// Drive that a record shows.
-///
-/// # Errors
-/// [`NoDrive`] if the motions were ended early or the samples do not follow the model.
 pub fn solve(record: &Record) -> Result<MeasuredDrive, NoDrive> {
     match record.ended {
         // The motions continued after the memory was full: all strokes in it are used except the last, which was cut.

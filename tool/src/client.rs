@@ -59,7 +59,6 @@ pub struct Client {
     owed: bool,
 }
 
-/// Answer to a Ping.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pong {
     pub id: u8,
@@ -295,7 +294,6 @@ fn assignment(address: u16, value: i64) -> Result<Vec<u8>, Error> {
     Ok([&address.to_le_bytes()[..], &table::encode(register, value)].concat())
 }
 
-/// The bytes of an instruction packet.
 fn packet(id: u8, instruction: u8, params: &[u8]) -> Reply {
     let mut packet = Reply::new();
     let mut sender = Sender::new(&mut packet, id, instruction);
@@ -312,7 +310,6 @@ const NO_TERMINAL: i32 = rustix::io::Errno::NOTTY.raw_os_error();
 /// Beginning of a served finger's message to a second client.
 const BUSY: &[u8] = b"busy: ";
 
-/// Connection to the bus.
 #[derive(Debug)]
 pub enum Line {
     /// A serial port or a pseudo-terminal.
@@ -321,7 +318,6 @@ pub enum Line {
     Tcp(TcpStream),
 }
 
-/// The serial ports of this machine.
 pub fn ports() -> Vec<String> {
     let ports = SerialPort::available_ports().unwrap_or_default();
     let mut names: Vec<String> = ports.iter().map(|path| path.display().to_string()).collect();

@@ -53,6 +53,13 @@ pub fn aside(text: impl std::fmt::Display) {
     let _ = writeln!(io::stderr(), "{text}");
 }
 
+/// Says beside the results how far it is, for people only.
+fn report(text: impl std::fmt::Display, json: bool) {
+    if !json {
+        aside(text);
+    }
+}
+
 /// Says an answer for scripts.
 fn say_json(value: &Value) {
     say(serde_json::to_string_pretty(value).unwrap_or_default());

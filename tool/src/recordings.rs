@@ -43,7 +43,6 @@ pub fn through_the_core(
     replay(bytes, &CLOCKS, each)
 }
 
-/// Content of a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Kept {
     /// The capture, as the board kept it.
@@ -225,12 +224,9 @@ const IMAGE_SCHEMA: &str = include_str!("messages/raw_image.json");
 /// Pa for a grey level: that of the scenes, 8 codes at 24 codes for a kPa.
 const PA_PER_GREY: i64 = 333;
 
-/// A kind of message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Topic {
-    /// The numbers.
     Scalars,
-    /// The pressures.
     Image,
 }
 

@@ -91,7 +91,6 @@ impl State {
         table::bits(address::LIMITS, self.limits)
     }
 
-    /// The limits for people.
     pub fn limits_text(&self) -> String {
         let names = self.limit_names();
         if names.is_empty() { "none".into() } else { names.join(", ") }

@@ -80,7 +80,6 @@ pub fn is_stored(register: &Register) -> bool {
     register.count == 1 && matches!(register.access, Access::Stored | Access::StoredLive)
 }
 
-/// All that are.
 pub fn stored() -> impl Iterator<Item = &'static Register> {
     REGISTERS.iter().filter(|register| is_stored(register))
 }
@@ -118,7 +117,6 @@ pub fn bits(address: u16, number: i64) -> Vec<String> {
     (0..32).filter(|bit| number >> bit & 1 == 1).map(|bit| meaning(address, bit)).collect()
 }
 
-/// Meaning of an error of a status packet.
 pub fn meaning_of_error(number: u8) -> &'static str {
     match number {
         1 => "it was understood, but cannot be carried out in the present state of the loop",

@@ -52,7 +52,6 @@ impl Part {
         Ok(begun)
     }
 
-    /// File to write to.
     pub fn file(&self) -> io::Result<File> {
         self.file.try_clone()
     }

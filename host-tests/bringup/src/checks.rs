@@ -9,11 +9,9 @@ use std::sync::OnceLock;
 
 /// A figure of the image's report, with its expected range.
 pub struct Check {
-    /// Name in the report.
     pub name: String,
     /// Description.
     pub what: String,
-    /// Unit of the figure.
     pub unit: &'static str,
     /// Range of expected values.
     pub within: [f64; 2],
@@ -253,9 +251,6 @@ fn loop_bits() -> u32 {
 }
 
 /// All checks, in the report's order.
-///
-/// # Panics
-/// The demonstration's figures are not as its command writes them.
 pub fn checks() -> Vec<Check> {
     let mut checks = Vec::new();
     for (name, what, unit, within, source, then, unseen) in TABLE {
@@ -319,9 +314,6 @@ fn two_counts_percent(from_n: f64, to_n: f64) -> f64 {
 }
 
 /// A check for each figure of each step.
-///
-/// # Panics
-/// The demonstration's figures are not as its command writes them.
 pub fn steps() -> Vec<Check> {
     let demo: Value = serde_json::from_str(DEMO).expect("docs/demo.json is JSON");
     let steps = demo["steps"].as_array().expect("docs/demo.json has steps");

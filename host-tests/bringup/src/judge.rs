@@ -18,7 +18,6 @@ const CYCLES: f64 = 10.0;
 /// Cycles of an empty call of a kernel.
 const NOTHING: &str = "nothing: an empty call";
 
-/// Which board it was.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Board {
@@ -40,14 +39,11 @@ pub enum Verdict {
     NotShown,
 }
 
-/// A check and its result.
 #[derive(Debug, Serialize)]
 pub struct Judged {
-    /// Name in the report.
     pub name: String,
     /// Description.
     pub what: String,
-    /// Unit of the figures.
     pub unit: &'static str,
     /// Measured figure; `None` if it was not reported.
     pub figure: Option<f64>,
@@ -55,9 +51,7 @@ pub struct Judged {
     pub at_least: f64,
     /// Largest expected figure; `None` without a limit.
     pub at_most: Option<f64>,
-    /// Source.
     pub source: &'static str,
-    /// Verdict.
     pub verdict: Verdict,
     /// Advice, or the reason for which it is not shown.
     pub advice: Option<&'static str>,
@@ -66,28 +60,22 @@ pub struct Judged {
 /// Measured cycles of a kernel, with the timing model's estimate.
 #[derive(Debug, Serialize)]
 pub struct Kernel {
-    /// Kernel and variant.
     pub name: String,
     /// Measured, the call taken off.
     pub median_cycles: f64,
-    /// The same.
     pub most_cycles: f64,
     /// Estimate for the same inputs with the flash's wait states; `None` without one.
     pub estimated_cycles: Option<f64>,
-    /// Verdict.
     pub verdict: Verdict,
 }
 
 /// All results of a board.
 #[derive(Debug, Serialize)]
 pub struct Judgement {
-    /// Version of these fields.
     pub schema_version: u32,
-    /// SHA-256 of the flashed bytes.
     pub image_sha256: String,
     /// Unique ID of the part.
     pub board_uid: String,
-    /// Which board it was.
     pub board: Board,
     /// Number of checks that pass.
     pub passed: usize,
@@ -95,16 +83,11 @@ pub struct Judgement {
     pub failed: usize,
     /// Number of checks that the emulated board cannot show.
     pub not_shown: usize,
-    /// All checks.
     pub checks: Vec<Judged>,
-    /// All kernels.
     pub kernels: Vec<Kernel>,
 }
 
 /// Estimated cycles by kernel, of a file with a line `CYCLES KERNEL` each.
-///
-/// # Errors
-/// The file cannot be read, or has another line.
 pub fn estimates(path: &Path) -> Result<HashMap<String, f64>, Error> {
     let wrong = |why: &str| Error::other(format!("{}: {why}", path.display()));
     let text = fs::read_to_string(path).map_err(|error| wrong(&error.to_string()))?;

@@ -6,6 +6,7 @@
 //! The lines between image and host: `bringup VERSION UID`, `figure NAME VALUE`, `cycles MEDIAN MOST KERNEL`, and `end
 //! CHECK`, a check over all before it. A line that begins with `#` only reports progress.
 #![cfg_attr(target_os = "none", no_std)]
+#![allow(missing_docs, reason = "parts of the project's own programs: a name that says all needs no comment")]
 
 pub mod script;
 

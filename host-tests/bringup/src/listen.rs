@@ -3,7 +3,6 @@
 use crate::{CHECK, READY, VERSION, checked};
 use std::io::{Error, ErrorKind, Read, Write};
 
-/// Report of a board.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Report {
     /// The part's unique number.
@@ -15,9 +14,6 @@ pub struct Report {
 }
 
 /// Asks for a report and takes it in; `progress` hears how far it is.
-///
-/// # Errors
-/// An error or a time-out of the port, a damaged report, or an image that crashed.
 pub fn listen(port: &mut (impl Read + Write), frames: u32, progress: &mut dyn FnMut(&str)) -> Result<Report, Error> {
     let (mut line, mut report, mut check) = (Vec::new(), None::<Report>, CHECK);
     let mut bytes = [0; 256];

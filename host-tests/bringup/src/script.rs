@@ -114,7 +114,6 @@ impl Way {
 
 /// Finger and host: everything around the control step.
 pub struct Bench {
-    /// The finger.
     pub finger: Finger,
     frame: Frame,
     sense: Sense,
@@ -170,7 +169,6 @@ impl Bench {
         value as u32 ^ (value >> 32) as u32
     }
 
-    /// Inputs of the next step.
     pub fn inputs(&self) -> (&Frame, &Sense, &Command) {
         (&self.frame, &self.sense, &self.command)
     }
@@ -251,7 +249,6 @@ const DEPTH_STEP_MM: f32 = 0.02;
 /// Points along each side of a taxel whose mean is its pressure.
 const POINTS: usize = 6;
 
-/// The finger.
 pub struct Finger {
     kpa: [[f32; CLASSES]; DEPTHS],
     /// Travel at which the tip touches.
@@ -307,7 +304,6 @@ impl Finger {
         FORCE_PER_MM2 * depth_mm * depth_mm
     }
 
-    /// Travel of the tip.
     pub fn travel_mm(&self) -> f32 {
         self.angle_rad * MM_PER_RAD
     }

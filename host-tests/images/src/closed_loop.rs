@@ -32,9 +32,6 @@ pub struct Ended {
 }
 
 /// Runs the loop with taxels `pitch_um` apart. `step` makes each step of the pipeline.
-///
-/// # Errors
-/// The parameters are refused.
 pub fn run<const ROWS: usize, const COLUMNS: usize>(
     pitch_um: u32,
     mut step: impl FnMut(&mut Pipeline<ROWS, COLUMNS>, &Frame<ROWS, COLUMNS>, &Sense, &Command) -> Duty,

@@ -2,6 +2,7 @@
 //! function.
 #![no_std]
 #![forbid(unsafe_code)]
+#![allow(missing_docs, reason = "parts of the project's own programs: a name that says all needs no comment")]
 
 #[cfg(test)]
 extern crate std;

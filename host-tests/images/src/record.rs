@@ -19,11 +19,9 @@ const UNMEASURED: i32 = i32::MIN;
 /// The arguments of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Record {
-    /// The frame.
     pub frame: Frame,
     /// Sensed values other than the frame.
     pub sense: Sense,
-    /// Command of the host.
     pub command: Command,
 }
 
@@ -113,12 +111,10 @@ impl Digest {
         Self(CRC.digest())
     }
 
-    /// Adds the results of a step.
     pub fn add(&mut self, duty: Duty, status: &Status) {
         status.words(duty, |word| self.0.update(&word.to_le_bytes()));
     }
 
-    /// Value of the digest.
     pub fn value(self) -> u64 {
         self.0.finalize()
     }

@@ -31,7 +31,6 @@ impl Source {
         Self(2003)
     }
 
-    /// 32 random bits.
     pub fn word(&mut self) -> u32 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 32) as u32
@@ -77,7 +76,6 @@ impl Mix {
     /// Digest of no numbers.
     pub const EMPTY: Self = Self(0);
 
-    /// Adds a number.
     pub fn add(&mut self, number: impl Into<i64>) {
         let number: i64 = number.into();
         self.0 = (self.0.rotate_left(23) ^ number.cast_unsigned()).wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -102,7 +100,6 @@ impl Write for Mix {
     }
 }
 
-/// Running comparison.
 pub struct Comparison {
     source: Source,
     taken: u32,
@@ -113,9 +110,6 @@ pub struct Comparison {
 
 impl Comparison {
     /// Comparison before the first step.
-    ///
-    /// # Errors
-    /// None: the default parameters are sound, as the core's own tests show.
     pub fn new() -> Result<Self, ConfigError> {
         let config = Config::shipped(&crate::CONFIRMED)?;
         let sample = Sample::new(config.tip);

@@ -14,7 +14,6 @@ use fingertip::pressure::TactileImage;
 /// Number of refinements of the reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Refined {
-    /// Once.
     One,
     /// Twice, the second time with the rim worked out closely.
     Two,

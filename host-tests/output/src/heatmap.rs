@@ -10,7 +10,6 @@ pub type Pressures = [[f64; COLUMNS]; ROWS];
 /// Terminal colours (of the 256) from no pressure to the most; their brightness only rises.
 const RAMP: [u8; 12] = [233, 17, 18, 54, 90, 126, 162, 198, 203, 209, 215, 229];
 
-/// The colour of a pressure.
 fn colour(kpa: f64, full_kpa: f64) -> u8 {
     let place = (kpa / full_kpa * RAMP.len() as f64).clamp(0.0, RAMP.len() as f64 - 1.0);
     RAMP[place as usize]

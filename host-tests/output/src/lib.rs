@@ -1,5 +1,7 @@
 //! Output of the programs on the host: text, pictures and files.
 
+#![allow(missing_docs, reason = "parts of the project's own programs: a name that says all needs no comment")]
+
 pub mod heatmap;
 pub mod kept;
 pub mod plot;

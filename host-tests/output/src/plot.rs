@@ -51,9 +51,6 @@ const DARK: [(&str, &str); 7] = [
 ];
 
 /// A picture that follows the light or dark scheme of the page it is shown on.
-///
-/// # Panics
-/// A colour of the picture has none for dark pages.
 pub fn with_dark_scheme(svg: &str) -> String {
     let drawn = svg.split(['"', '\'']).filter(|part| part.len() == 7 && part.starts_with('#'));
     for colour in drawn {
@@ -118,7 +115,6 @@ pub enum Curve {
 }
 
 impl Curve {
-    /// Points of the curve.
     pub fn points_mut(&mut self) -> &mut Vec<(f64, f64)> {
         let (Self::Solid(points)
         | Self::Pale(points)
@@ -129,10 +125,8 @@ impl Curve {
     }
 }
 
-/// A panel.
 #[derive(Clone, Debug)]
 pub struct Curves<'a> {
-    /// Title.
     pub title: String,
     /// The horizontal axis, with its unit.
     pub x: &'a str,
@@ -157,10 +151,10 @@ pub fn curves(panels: &[Curves<'_>], panel_px: (u32, u32)) -> Result<String, Plo
             let frame = Frame { title, x, unit: y, x_range: *x_range, range: *y_range };
             frame.draw(&area, |chart| {
                 curves.iter().try_for_each(|curve| match curve {
-                    Curve::Solid(points) => chart.solid(points, INK),
+                    Curve::Solid(points) => chart.solid(points),
                     Curve::Pale(points) => chart.pale(points),
                     Curve::Second(points) => chart.second(points),
-                    Curve::Dashed(points) => chart.dashed(points, GOAL_INK),
+                    Curve::Dashed(points) => chart.dashed(points),
                     Curve::Circles(points) => chart.circles(points),
                 })
             })?;
@@ -171,10 +165,8 @@ pub fn curves(panels: &[Curves<'_>], panel_px: (u32, u32)) -> Result<String, Plo
 
 // Pressure maps: one square for each taxel, the contact's circle dotted over them, one scale for all.
 
-/// One map.
 #[derive(Clone, Debug)]
 pub struct Map {
-    /// Title.
     pub title: String,
     /// Pressure on each taxel, kPa.
     pub pressures_kpa: Pressures,
@@ -188,7 +180,6 @@ const MAP_PX: u32 = 280;
 /// Makes the taxels squares.
 const HEIGHT_PX: u32 = 295;
 const SCALE_PX: u32 = 90;
-/// Steps of the scale beside the maps.
 const SCALE_STEPS: u32 = 64;
 const DOTS: u32 = 60;
 
@@ -306,7 +297,6 @@ pub struct Dot {
     pub x: f64,
     /// Error; 0 is drawn on the lower axis.
     pub y: f64,
-    /// Label.
     pub label: String,
     /// True if it is on the front: filled, on the line.
     pub best: bool,
@@ -314,10 +304,8 @@ pub struct Dot {
     pub own: bool,
 }
 
-/// A picture.
 #[derive(Clone, Debug)]
 pub struct Front<'a> {
-    /// Title.
     pub title: &'a str,
     /// The horizontal axis, with its unit.
     pub x: &'a str,
@@ -327,7 +315,6 @@ pub struct Front<'a> {
     pub dots: Vec<Dot>,
 }
 
-/// Draws it.
 pub fn front(front: &Front<'_>) -> Result<String, PlotError> {
     let Front { title, x, y, dots } = front;
     let positive = |of: fn(&Dot) -> f64| dots.iter().map(of).filter(|value| *value > 0.0);

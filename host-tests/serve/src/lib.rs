@@ -4,6 +4,8 @@
 //! passes received bytes to it, and sends its answers. One thread does all: it sleeps until a byte arrives, an answer
 //! is due, or a [`TICK`] is over. [`Pace`] measures real-time operation and answer times.
 
+#![allow(missing_docs, reason = "parts of the project's own programs: a name that says all needs no comment")]
+
 #[cfg(feature = "native")]
 pub mod native;
 mod port;
@@ -27,21 +29,12 @@ pub trait Finger {
     fn now_s(&self) -> f64;
 
     /// Advances the finger to a time, or beyond it to the end of a step.
-    ///
-    /// # Errors
-    /// The simulation failed.
     fn run_until(&mut self, time_s: f64) -> Result<(), Self::Error>;
 
     /// Receives bytes of the host.
-    ///
-    /// # Errors
-    /// The simulation failed.
     fn hear(&mut self, bytes: &[u8]) -> Result<(), Self::Error>;
 
     /// Returns the bytes that the finger has sent by now.
-    ///
-    /// # Errors
-    /// The simulation failed.
     fn answer(&mut self) -> Result<Vec<u8>, Self::Error>;
 
     /// Time of the next answer, s, if it is known beforehand.
@@ -55,17 +48,11 @@ pub trait Finger {
     }
 
     /// Executes a command from the standard input, and returns what was done.
-    ///
-    /// # Errors
-    /// The command is unknown or cannot be executed.
     fn command(&mut self, text: &str) -> Result<String, String>;
 }
 
 /// Serves a finger until it is stopped. An answer counts as late after `late`, without its configured delay. With
 /// `always` the real-time ratio is reported also while it is 1.
-///
-/// # Errors
-/// The simulation failed.
 pub fn serve<F: Finger>(finger: &mut F, port: &mut Port, late: Duration, always: bool) -> Result<Served, F::Error> {
     let mut pace = Pace::new(finger.now_s(), late, always);
     let mut due = Instant::now() + TICK;
@@ -119,7 +106,6 @@ const KEEPS_UP: f64 = 0.98;
 const LOOK: Duration = Duration::from_secs(1);
 const LOOKS_BETWEEN: u32 = 5;
 
-/// Statistics of a served finger.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Served {
     /// Time of the finger, s.
@@ -132,7 +118,6 @@ pub struct Served {
     pub sent: u64,
     /// Answers, and how many of them were late.
     pub answers: u64,
-    /// See there.
     pub late: u64,
     /// The longest time between a request and its answer, less the answer's own delay.
     pub longest_s: f64,
@@ -193,13 +178,11 @@ impl Pace {
         time_s.map(|time_s| self.begun + Duration::from_secs_f64((time_s - self.begun_s + self.lost_s).max(0.0)))
     }
 
-    /// Bytes came in.
     pub fn asked(&mut self, bytes: usize) {
         self.all.received += bytes as u64;
         self.asked = Some(Instant::now());
     }
 
-    /// An answer left.
     pub fn answered(&mut self, bytes: usize) {
         self.all.sent += bytes as u64;
         // An answer in pieces counts by its first piece.
@@ -240,14 +223,12 @@ impl Pace {
         Some(text)
     }
 
-    /// All of it.
     pub fn end(&self, now_s: f64) -> Served {
         Served { virtual_s: now_s - self.begun_s, wall_s: self.begun.elapsed().as_secs_f64(), ..self.all }
     }
 }
 
 impl Served {
-    /// Text for people.
     pub fn text(&self) -> String {
         let Self { virtual_s, wall_s, received, sent, answers, late, longest_s } = self;
         format!(

@@ -82,9 +82,6 @@ struct Side {
 
 impl Port {
     /// Opens it.
-    ///
-    /// # Errors
-    /// The link's name is taken by a file, or by another process that serves there, or the TCP port by another program.
     pub fn open(place: &Place) -> io::Result<Self> {
         let place = match place {
             Place::Pty(link) => Opened::Pty(Pty::open(link.as_deref())?),

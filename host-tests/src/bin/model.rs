@@ -7,8 +7,8 @@
 //! the exit code 1.
 
 use std::error::Error;
+use std::io;
 use std::process::ExitCode;
-use std::{fmt, io};
 
 use csv::StringRecord;
 use dashu_float::DBig;
@@ -64,25 +64,8 @@ fn places(header: &StringRecord) -> Result<[usize; 4], String> {
     Ok(places)
 }
 
-/// Why a row has no answer.
-#[derive(Debug)]
-enum CellError {
-    /// A cell is no decimal number.
-    Number { column: &'static str, text: String },
-    /// A cell is outside the domain.
-    Range { column: &'static str, text: String, range: String },
-}
-
-impl fmt::Display for CellError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Number { column, text } => write!(f, "{column} is {text:?}: a decimal number is needed"),
-            Self::Range { column, text, range } => write!(f, "{column} is {text}: {range} is covered"),
-        }
-    }
-}
-
-fn answer(cells: [&str; 4]) -> Result<[String; 6], CellError> {
+/// Results of a row, or why it has none.
+fn answer(cells: [&str; 4]) -> Result<[String; 6], String> {
     let [a, y, d, r] = [0, 1, 2, 3].map(|place| Cell { column: INPUTS[place], text: cells[place] });
     let (radius, modulus) = (a.read()?, y.read()?);
     let (depth, distance) = (d.read()?, r.read()?);
@@ -90,12 +73,12 @@ fn answer(cells: [&str; 4]) -> Result<[String; 6], CellError> {
     let modulus_bits = y.within(&modulus, (MODULUS_MIN.to_bits(), MODULUS_MAX.to_bits()), 16)?;
     let depth_max = exact(&radius) * exact(&DBig::from_parts(95.into(), -2));
     let depth_bits = round(&depth, 24).filter(|&bits| bits >= 1 && depth <= depth_max);
-    let depth_bits = depth_bits.ok_or_else(|| d.refuse("2^-24 mm to 0.95 a_mm".to_owned()))?;
+    let depth_bits = depth_bits.ok_or_else(|| d.refuse("2^-24 mm to 0.95 a_mm"))?;
     let distance_bits = round(&distance, 24).filter(|&bits| bits >= 0 && distance >= DBig::ZERO);
-    let distance_bits = distance_bits.ok_or_else(|| r.refuse("0 to below 128 mm".to_owned()))?;
+    let distance_bits = distance_bits.ok_or_else(|| r.refuse("0 to below 128 mm"))?;
 
     let tip = Tip::new(Millimetres::from_bits(radius_bits), Kilopascals::from_bits(modulus_bits))
-        .map_err(|error| a.refuse(error.to_string()))?;
+        .map_err(|error| a.refuse(error))?;
     let (depth, distance) = (Millimetres::from_bits(depth_bits), Millimetres::from_bits(distance_bits));
     let force = tip.force(depth);
     Ok([
@@ -116,27 +99,27 @@ struct Cell<'a> {
 
 impl Cell<'_> {
     /// The cell's exact value.
-    fn read(&self) -> Result<DBig, CellError> {
-        let refusal = || CellError::Number { column: self.column, text: self.text.to_owned() };
+    fn read(&self) -> Result<DBig, String> {
+        let refusal = || format!("{} is {:?}: a decimal number is needed", self.column, self.text);
         // The parser also takes separators and other notations; a CSV cell has digits, a point, a sign, an exponent.
         if !self.text.chars().all(|c| c.is_ascii_digit() || matches!(c, '.' | '-' | '+' | 'e' | 'E')) {
             return Err(refusal());
         }
         let value: DBig = self.text.parse().map_err(|_| refusal())?;
-        let range = || self.refuse(format!("a number below 1e{EXPONENT_MAX} with fewer digits"));
+        let range = || self.refuse(format_args!("a number below 1e{EXPONENT_MAX} with fewer digits"));
         if value.repr().exponent().abs() > EXPONENT_MAX { Err(range()) } else { Ok(value) }
     }
 
     /// The nearest fixed-point value, where the exact one is inside the range.
-    fn within(&self, value: &DBig, (min, max): (i32, i32), fraction_bits: u32) -> Result<i32, CellError> {
+    fn within(&self, value: &DBig, (min, max): (i32, i32), fraction_bits: u32) -> Result<i32, String> {
         let (least, most) = (min >> fraction_bits, max >> fraction_bits);
         let inside = *value >= DBig::from(least) && *value <= DBig::from(most);
         let bits = round(value, fraction_bits).filter(|_| inside);
-        bits.ok_or_else(|| self.refuse(format!("{least} to {most}")))
+        bits.ok_or_else(|| self.refuse(format_args!("{least} to {most}")))
     }
 
-    fn refuse(&self, range: String) -> CellError {
-        CellError::Range { column: self.column, text: self.text.to_owned(), range }
+    fn refuse(&self, range: impl std::fmt::Display) -> String {
+        format!("{} is {}: {range} is covered", self.column, self.text)
     }
 }
 

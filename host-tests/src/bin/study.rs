@@ -1,11 +1,6 @@
 //! Cost of accuracy in time: makes the study's inputs, and tables and pictures of its run.
-//!
-//! `study inputs FILE` writes the inputs for the image. `study few KEPT FULL` writes the few that the image of `cargo
-//! xtask bringup` keeps, and the same with the records that it makes itself.
-//! `study report SHIPPED QUICK LOOP [--check] [--json FILE] [--out DIR]` judges two runs, of the image built as the firmware
-//! is and built for speed, and the lines of `budget --whole-loop`: it renews or checks `docs/study.md`, the README's table
-//! and the pictures.
 
+use clap::Parser;
 use host_tests::page::renew;
 use host_tests::program::ended;
 use host_tests::study::inputs::Inputs;
@@ -17,49 +12,63 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-const USAGE: &str = "usage: study inputs FILE | study few KEPT FULL | study report SHIPPED QUICK LOOP [--check] [--json FILE] [--out DIR]";
+/// Makes the study's inputs, and judges its runs.
+#[derive(Parser)]
+enum Command {
+    /// Write the inputs for the image
+    Inputs { file: PathBuf },
+    /// Write the few inputs that the image of `cargo xtask bringup` keeps, and the same with the records that it makes itself
+    Few { kept: PathBuf, full: PathBuf },
+    /// Judge two runs, of the image built as the firmware is and built for speed, and the lines of `budget --whole-loop`
+    Report {
+        shipped: PathBuf,
+        quick: PathBuf,
+        #[arg(value_name = "LOOP")]
+        whole: PathBuf,
+        /// Fail where docs/study.md, the README's table or a picture is stale, instead of renewing it
+        #[arg(long)]
+        check: bool,
+        /// Write the figures to this file
+        #[arg(long, value_name = "FILE")]
+        json: Option<PathBuf>,
+        /// Write page and pictures into this folder
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
+}
 
 fn main() -> ExitCode {
-    let words: Vec<String> = std::env::args().skip(1).collect();
-    ended(match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
-        ["inputs", file] => fs::write(file, Inputs::new().to_bytes()).map_err(|error| format!("{file}: {error}")),
-        ["few", kept, full] => few(kept, full),
-        ["report", shipped, quick, whole, ref flags @ ..] => report([shipped, quick], whole, flags),
-        _ => Err(USAGE.into()),
+    ended(match Command::parse() {
+        Command::Inputs { file } => write(&file, &Inputs::new().to_bytes()),
+        Command::Few { kept, full } => {
+            let inputs = Inputs::new();
+            write(&kept, &inputs.few_to_bytes()).and_then(|()| write(&full, &inputs.few_with_records()))
+        }
+        Command::Report { shipped, quick, whole, check, json, out } => {
+            report([&shipped, &quick], &whole, check, json.as_deref(), out.as_deref())
+        }
     })
 }
 
-fn few(kept: &str, full: &str) -> Result<(), String> {
-    let inputs = Inputs::new();
-    for (file, bytes) in [(kept, inputs.few_to_bytes()), (full, inputs.few_with_records())] {
-        fs::write(file, bytes).map_err(|error| format!("{file}: {error}"))?;
-    }
-    Ok(())
+fn read(file: &Path) -> Result<String, String> {
+    fs::read_to_string(file).map_err(|error| format!("{}: {error}", file.display()))
 }
 
-fn report(runs: [&str; 2], whole: &str, flags: &[&str]) -> Result<(), String> {
-    let (mut check, mut json, mut out) = (false, None, None);
-    let mut flags = flags.iter();
-    while let Some(flag) = flags.next() {
-        let mut value = || flags.next().map(PathBuf::from).ok_or_else(|| format!("{flag} takes a value: {USAGE}"));
-        match *flag {
-            "--check" => check = true,
-            "--json" => json = Some(value()?),
-            "--out" => out = Some(value()?),
-            _ => return Err(USAGE.into()),
-        }
-    }
-    let read = |file| output::parse(&fs::read_to_string(file).map_err(|error| format!("{file}: {error}"))?);
-    let [shipped, quick] = runs.map(read);
+fn write(file: &Path, bytes: &[u8]) -> Result<(), String> {
+    fs::write(file, bytes).map_err(|error| format!("{}: {error}", file.display()))
+}
+
+fn report(runs: [&Path; 2], whole: &Path, check: bool, json: Option<&Path>, out: Option<&Path>) -> Result<(), String> {
+    let [shipped, quick] = runs.map(|file| output::parse(&read(file)?));
     let (runs, inputs) = (output::merged(shipped?, quick?)?, Inputs::new());
     let studied: Result<Vec<Studied>, String> =
         KERNELS.iter().map(|kernel| Ok((kernel, kernels::points(kernel, &runs, &inputs)?))).collect();
     let studied = studied?;
     if let Some(file) = json {
-        fs::write(&file, page::json_lines(&studied)).map_err(|error| format!("{}: {error}", file.display()))?;
+        write(file, page::json_lines(&studied).as_bytes())?;
     }
     let mut files = Vec::new();
-    let whole = WholeLoop::read(&fs::read_to_string(whole).map_err(|error| format!("{whole}: {error}"))?)?;
+    let whole = WholeLoop::read(&read(whole)?)?;
     let tables = page::markdown(&studied, whole.markdown()?);
     for (page, tables) in [(page::PAGE, tables), (page::README, whole.levels_table(&studied)?)] {
         files.push((page.name.to_owned(), page.renewed(&tables)?));
@@ -72,7 +81,7 @@ fn report(runs: [&str; 2], whole: &str, flags: &[&str]) -> Result<(), String> {
     verdicts(&studied);
     frame_front(&studied)?;
     if let Some(folder) = out {
-        return write_all(&folder, &files);
+        return write_all(folder, &files);
     }
     renew_all(&files, check)
 }
@@ -111,7 +120,7 @@ fn write_all(folder: &Path, files: &[(String, String)]) -> Result<(), String> {
     fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     for (name, text) in files {
         let file = folder.join(Path::new(name).file_name().unwrap_or_default());
-        fs::write(&file, text).map_err(|error| format!("{}: {error}", file.display()))?;
+        write(&file, text.as_bytes())?;
         println!("written  {}", file.display());
     }
     Ok(())

@@ -120,9 +120,6 @@ fn agreed(by_integers: Judged, by_reference: f64) -> Judged {
 // The inputs: boundaries, random points and the reference tip.
 
 /// A tip from raw integers inside the domain.
-///
-/// # Panics
-/// Outside the domain.
 pub fn tip(radius_bits: i32, modulus_bits: i32) -> Tip {
     Tip::new(Millimetres::from_bits(radius_bits), Kilopascals::from_bits(modulus_bits)).expect("inside the domain")
 }
@@ -178,7 +175,6 @@ pub struct Point {
 }
 
 impl Point {
-    /// The next random point.
     pub fn random(rng: &mut Rng) -> Self {
         let tip = tip(
             rng.i32(RADIUS_MIN.to_bits()..=RADIUS_MAX.to_bits()),

@@ -58,7 +58,6 @@ pub fn error_ulp(bits: i32, fraction_bits: isize, exact: &Real) -> f64 {
     difference.to_f64().value() * 2_f64.powi(fraction_bits as i32)
 }
 
-/// A tip.
 pub struct Reference {
     /// Its radius, mm.
     a: Real,
@@ -70,7 +69,6 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// The same tip.
     pub fn new(tip: &Tip) -> Self {
         let y_kpa = real(tip.modulus().to_bits(), 16);
         Self { a: real(tip.radius().to_bits(), 24), pi_y: &*PI_OVER_1000 * &y_kpa, y_kpa, one: real(1, 0) }
@@ -160,15 +158,11 @@ impl Reference {
 
 // The points computed elsewhere: `oracle/park2003.csv`, 25 digits each.
 
-/// Path of the file of points.
 pub fn path() -> std::path::PathBuf {
     Path::new(env!("FINGERTIP_ROOT")).join("host-tests/oracle/park2003.csv")
 }
 
 /// Every point of the oracle.
-///
-/// # Errors
-/// The file is missing or not what it should be.
 pub fn check() -> Result<[Tally; 5], Box<dyn Error>> {
     let mut tallies = [
         Tally::new("r_c(d)", 0.501),
@@ -372,9 +366,6 @@ pub struct LongRun {
 
 /// Feeds the relaxation filter a repeating pattern until its state repeats, with time constants from one period to the
 /// longest of `periods_max`.
-///
-/// # Panics
-/// The state does not repeat within 10^9 steps.
 pub fn long_run(pattern: &[i32], periods_max: u32) -> LongRun {
     let share = Ratio::from_bits(65_536 / 3);
     let terms =

@@ -26,7 +26,6 @@ impl Judged {
 /// Tally of one function over a set of inputs.
 #[derive(Clone, Debug)]
 pub struct Tally {
-    /// The function.
     pub name: &'static str,
     /// Claimed bound in units of the last place; 1/2 claims that every result is correctly rounded.
     pub bound_ulp: f64,
@@ -116,7 +115,6 @@ pub fn parallel<const N: usize>(
 
 // The proof's figures as the tables of `docs/model.md`.
 
-/// Page with the tables.
 pub const PAGE: Page = Page { name: "docs/model.md", tables: "bounds", command: "cargo xtask prove --write" };
 
 /// One table: each section's title, then its functions.

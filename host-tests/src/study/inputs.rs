@@ -16,7 +16,6 @@ const SEED: u64 = 2003;
 /// A pair of numbers in Q16, with at most 24 significant bits each.
 pub type Pair = [i32; 2];
 
-/// All inputs.
 pub struct Inputs {
     /// Numbers to take the root of, 0.01 to 32767.
     pub root: Vec<Pair>,
@@ -34,21 +33,17 @@ pub struct Inputs {
     pub fits: [Vec<Seen>; 2],
     /// A controller's errors, -1 to 1.
     pub control: Vec<Pair>,
-    /// The recorded stimulus.
     pub records: Vec<Record>,
 }
 
 /// A contact and its pictures, each with noise of its own.
 pub struct Seen {
-    /// The truth.
     pub scene: Scene,
-    /// Tactile image.
     pub pictures: Vec<TactileImage>,
 }
 
 /// The series of `docs/contact.md` that are studied: none and 1 % of each reading.
 const SERIES: [usize; 2] = [0, 3];
-/// Contacts of a series.
 const CONTACTS: usize = 64;
 
 fn seen(series: &Series) -> Vec<Seen> {
@@ -188,9 +183,6 @@ impl Inputs {
     }
 
     /// The same with the records behind it, as that image makes them: what the timing model's image takes.
-    ///
-    /// # Panics
-    /// Never: the default parameters are sound, as the core's own tests show.
     pub fn few_with_records(&self) -> Vec<u8> {
         let config = config();
         let (mut pipeline, mut bench) = (Pipeline::new(&config), Bench::new());

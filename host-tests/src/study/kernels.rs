@@ -7,7 +7,6 @@ use super::scan;
 use crate::figures::tip;
 use crate::prove::reference::{Real, Reference, real};
 
-/// A kernel.
 pub struct Kernel {
     /// As the image calls it.
     pub name: &'static str,
@@ -37,7 +36,6 @@ impl Kernel {
 pub enum Measure {
     /// One number from one or two.
     Scalar {
-        /// The inputs.
         section: fn(&Inputs) -> &[Pair],
         /// The exact result.
         exact: fn(&Reference, &Pair) -> Real,
@@ -57,7 +55,6 @@ pub enum Measure {
     Cost,
 }
 
-/// All of them.
 pub const KERNELS: &[Kernel] = &[
     Kernel {
         name: "root",
@@ -195,7 +192,6 @@ pub struct Errors {
 }
 
 impl Errors {
-    /// Takes one in.
     pub fn add(&mut self, error: f64) {
         let error = error.abs();
         // A variant without a result is infinitely wrong.
@@ -212,9 +208,6 @@ impl Errors {
 }
 
 /// The variants of a kernel as points; cheapest first.
-///
-/// # Errors
-/// A variant was not run on all inputs.
 pub fn points(kernel: &Kernel, runs: &[Ran], inputs: &Inputs) -> Result<Vec<Point>, String> {
     let of_kernel = runs.iter().filter(|ran| ran.kernel == kernel.name);
     let mut points = of_kernel.map(|ran| point(kernel, ran, inputs)).collect::<Result<Vec<_>, _>>()?;
@@ -297,7 +290,6 @@ fn control(ran: &Ran, inputs: &[Pair]) -> Option<[f64; 2]> {
     Some(errors.both())
 }
 
-/// The value of an input.
 pub fn input(bits: i32) -> Real {
     real(bits, 16)
 }

@@ -82,7 +82,6 @@ impl Cost {
         }
     }
 
-    /// Cells of a table.
     pub fn cells(&self) -> String {
         let Self { instructions, low, estimate, high, flash } = self;
         let cells = [instructions.median, instructions.max, low.median, estimate.median, high.median, estimate.max];
@@ -94,11 +93,8 @@ impl Cost {
 /// A variant's run.
 #[derive(Clone, Debug, Default)]
 pub struct Ran {
-    /// Its kernel.
     pub kernel: String,
-    /// Its name.
     pub name: String,
-    /// True if it is the firmware's.
     pub firmware: bool,
     /// Results for each input.
     pub returned: Vec<Vec<Number>>,
@@ -107,9 +103,6 @@ pub struct Ran {
 }
 
 /// Reads a report: the image's output, then a line `cost REGION` with ten figures for each region.
-///
-/// # Errors
-/// A line cannot be read, or a region is missing.
 pub fn parse(text: &str) -> Result<Vec<Ran>, String> {
     let mut runs: BTreeMap<u32, Ran> = BTreeMap::new();
     let (mut current, mut costs) = (None, BTreeMap::new());
@@ -148,9 +141,6 @@ pub fn parse(text: &str) -> Result<Vec<Ran>, String> {
 }
 
 /// The firmware's variants as shipped, all other variants at the compiler's highest speed.
-///
-/// # Errors
-/// The runs are not of the same variants, or one returned something else than the other.
 pub fn merged(shipped: Vec<Ran>, quick: Vec<Ran>) -> Result<Vec<Ran>, String> {
     if shipped.len() != quick.len() {
         return Err("the two images have not the same variants".into());

@@ -10,7 +10,6 @@ use std::iter;
 
 /// The page of the study; the README has a short table between the same lines.
 pub const PAGE: Page = Page { name: "docs/study.md", tables: "study", command: "cargo xtask study" };
-/// See [`PAGE`].
 pub const README: Page = Page { name: "README.md", ..PAGE };
 
 /// Largest number of variants of which the page shows also the beaten ones.
@@ -148,9 +147,7 @@ pub fn json_lines(studied: &[Studied]) -> String {
 /// A variant with its cost and its errors.
 #[derive(Clone, Debug)]
 pub struct Point {
-    /// Its name.
     pub name: String,
-    /// True if it is the firmware's.
     pub firmware: bool,
     /// Cost of a call.
     pub cost: Cost,
@@ -211,9 +208,6 @@ pub fn span(points: &[Point]) -> (usize, f64, f64) {
 // Error against cycles, a plot for each kernel.
 
 /// Draws a kernel.
-///
-/// # Errors
-/// There is no variant, or no room for its label.
 pub fn draw(kernel: &Kernel, points: &[Point]) -> Result<String, PlotError> {
     let dot = |(point, by): (&Point, Option<usize>)| Dot {
         // An axis of logarithms has no place for less than a cycle.

@@ -69,7 +69,6 @@ impl Row {
     }
 }
 
-/// The table.
 pub fn markdown() -> String {
     let array = Setup::default().array;
     let mut rows: Vec<_> = SETTINGS.into_iter().filter_map(|setting| Row::of(setting, &array)).collect();

@@ -10,7 +10,6 @@ use std::fmt::Write as _;
 
 /// Number of goals that the fingers hold.
 const GOALS: usize = 4;
-/// Picture of the section.
 pub const PICTURE: &str = "docs/pictures/study-whole-loop.svg";
 /// Word lengths that are tried, bits.
 const BITS: [u32; 8] = [12, 14, 16, 18, 20, 24, 28, 32];
@@ -33,9 +32,6 @@ pub struct WholeLoop {
 
 impl WholeLoop {
     /// Reads the lines of the program.
-    ///
-    /// # Errors
-    /// A line is not one of the program's.
     pub fn read(text: &str) -> Result<Self, String> {
         let mut all = Self::default();
         for line in text.lines() {
@@ -57,9 +53,6 @@ impl WholeLoop {
     }
 
     /// Returns the section that opens the page.
-    ///
-    /// # Errors
-    /// A settle time is not allowed.
     pub fn markdown(&self) -> Result<String, String> {
         let mut page = format!(
             "\n## The whole loop\n\nError of the **true force** that {} [usual fingers](budget.md) hold, rms over the fingers, against the cycles of \
@@ -83,9 +76,6 @@ impl WholeLoop {
     }
 
     /// Returns the table of the fit levels, which the README shows.
-    ///
-    /// # Errors
-    /// The step was not studied at a fit level.
     pub fn levels_table(&self, studied: &[Studied]) -> Result<String, String> {
         let mut table = String::from(
             "| fit level | cycles, median | with flash | max | as they come: at 0.5 N, mN | 1 N | 2 N | 5 N | calibrated: at 0.5 N, mN | 1 N | 2 N | 5 N |\n\
@@ -108,9 +98,6 @@ impl WholeLoop {
     }
 
     /// Draws error over cycles.
-    ///
-    /// # Errors
-    /// A fit level was not studied, or there is no room for a label.
     pub fn draw(&self, studied: &[Studied]) -> Result<String, String> {
         let mut dots = Vec::new();
         for (level, errors) in self.levels.iter().enumerate().skip(1) {
@@ -130,7 +117,6 @@ impl WholeLoop {
     }
 }
 
-/// The step at a fit level.
 fn step<'a>(studied: &'a [Studied], level: usize) -> Result<&'a Point, String> {
     let name = if level == 2 { "Pipeline::step".into() } else { format!("Pipeline::step, fit level {level}") };
     let points = studied.iter().filter(|(kernel, _)| kernel.name == "step").flat_map(|(_, points)| points);

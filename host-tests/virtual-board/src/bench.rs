@@ -33,7 +33,6 @@ pub struct Bench {
     pub next_ns: u64,
     /// The world and the converters' inputs.
     pub front_end: Shared,
-    /// Digest of the run.
     pub trace: Trace,
     /// Latency from frame to duty.
     pub latency: Latency,
@@ -41,7 +40,6 @@ pub struct Bench {
     pub bridge_edges: Vec<BridgeEdge>,
     /// Times at which the transmit enable went high and low.
     pub transmit_edges: Vec<BridgeEdge>,
-    /// The image's log.
     pub log: Log,
     /// Bytes that the image sent and that are not read yet.
     pub received: Vec<TimedByte>,
@@ -49,7 +47,6 @@ pub struct Bench {
     pub core_held: bool,
     /// Flash content that the image wrote.
     pub flash: Programmer,
-    /// The external clock.
     pub clock: ExternalClock,
     /// The host of a scene, once the board is set up.
     pub host: Option<Box<SceneHost>>,

@@ -24,7 +24,6 @@ use std::num::{NonZeroU32, NonZeroU64};
 const HSE_HZ: u64 = 8_000_000;
 /// The microcontroller's supply.
 const VDD_MV: u32 = 3_300;
-/// The core's clock.
 const CORE_HZ: NonZeroU64 = NonZeroU64::new(168_000_000).expect("the core is clocked");
 /// Instructions that the core retires in a second, constant: a CPI of 1.34 at 168 MHz, as in the cycle estimate of the
 /// control step.
@@ -39,7 +38,6 @@ const TIM1_FUNCTION: u8 = 1;
 /// The microcontroller on its board.
 #[derive(Debug)]
 pub struct FingerBoard {
-    /// The microcontroller.
     pub part: Part,
 }
 
@@ -48,9 +46,6 @@ impl Store for FingerBoard {}
 
 impl FingerBoard {
     /// Powered, with nothing run, with bits 3:2 of the option bytes.
-    ///
-    /// # Errors
-    /// The part's description does not fit this crate: another release of `rigless`.
     pub fn new(front_end: Shared, brown_out_bits: u8) -> Result<Self, Error> {
         let mut part = Part::new(front_end)?;
         part.chip.rcc.attach_crystals(HSE_HZ, 0);
@@ -140,7 +135,6 @@ impl FingerBoard {
 /// The world behind the board's pins: the plant of `sim`, or one finger in the world of a scene.
 #[derive(Debug)]
 pub enum Surroundings {
-    /// The plant.
     Plant(Box<Plant>),
     /// A scene's.
     Scene(Box<Finger>),
@@ -188,7 +182,6 @@ impl Surroundings {
         matches!(self, Self::Scene(_))
     }
 
-    /// The supply at the bridge.
     pub fn supply_v(&self) -> f64 {
         match self {
             Self::Plant(world) => world.supply_v(),
@@ -212,7 +205,6 @@ impl Surroundings {
         }
     }
 
-    /// The converters' reference.
     pub fn reference_v(&self) -> f64 {
         match self {
             Self::Plant(world) => world.setup().array.reference_v,

@@ -13,9 +13,6 @@ use std::path::Path;
 const SILENT_MS: u64 = 60_000;
 
 /// Runs the image to the end of its report and judges that.
-///
-/// # Errors
-/// The image does not run, crashes, or is silent.
 pub fn run(
     image: &Path,
     options: &Options,

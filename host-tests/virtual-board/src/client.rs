@@ -66,12 +66,6 @@ impl Rig {
     }
 
     /// Runs a client on the bus. An unanswered packet costs the wait's virtual time.
-    ///
-    /// # Errors
-    /// The emulator stopped, or no pseudo-terminal is available.
-    ///
-    /// # Panics
-    /// If the client panics.
     pub fn client<T: Send>(&mut self, wait_ns: u64, job: impl FnOnce(&mut Client) -> T + Send) -> Result<T, Error> {
         let (mut near, mut far) = SerialPort::pair()?;
         for end in [&mut near, &mut far] {

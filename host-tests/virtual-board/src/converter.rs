@@ -323,7 +323,6 @@ pub fn length(registers: &RegisterFile) -> usize {
     }
 }
 
-/// The input that a rank converts.
 pub fn input(registers: &RegisterFile, rank: usize) -> usize {
     // Six ranks of five bits in a register, the last register first.
     let register = [Register::Sqr3, Register::Sqr2, Register::Sqr1][rank / 6 % 3];

@@ -21,36 +21,30 @@ use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// Settings of the demonstration.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// The flash image, an ELF.
     pub image: PathBuf,
     /// Shorter, and without the second run.
     pub quick: bool,
 }
 
 /// Runs the demonstration and takes its figures.
-///
-/// # Errors
-/// The image does not run, or does not reach the goals.
 pub fn run(plan: &Plan) -> Result<(Figures, Run), Error> {
     let begun = Instant::now();
     let scene = demo::scene(plan.quick)?;
     let repeat = (!plan.quick).then(|| {
         let (image, scene) = (plan.image.clone(), scene.clone());
-        std::thread::spawn(move || simulate(&image, &scene, &mut Nobody).map(|summary| summary.digest))
+        std::thread::spawn(move || simulate(&image, &scene, &mut Trace::new(&scene)).map(|summary| summary.digest))
     });
 
     let mut boards = Boards::power_on(&plan.image, &scene)?;
     let flash = Flashable::of(boards.rigs[0].image())?;
     flash.check_loaded(&mut boards.rigs[0])?;
     let from = Counts::of(&mut boards.rigs[0])?;
-    let mut watch = Seen { trace: Trace::new(&scene), screen: Screen::new(&scene) };
-    let summary = boards.run(&scene, &mut watch)?;
+    let mut screen = Screen::new(&scene);
+    let summary = boards.run(&scene, &mut screen)?;
     let rig: &mut Rig = &mut boards.rigs[0];
     let to = Counts::of(rig)?;
-    let Seen { trace, screen } = watch;
     let repeated = match repeat {
         Some(repeat) => {
             screen.waiting("the same run once more, to compare the traces");
@@ -59,38 +53,10 @@ pub fn run(plan: &Plan) -> Result<(Figures, Run), Error> {
         None => None,
     };
     screen.finish();
-    let run = trace.finish()?;
+    let run = screen.trace.finish()?;
     let mut figures = Figures::of(&run, [&from, &to], rig, &flash, summary, repeated)?;
     figures.wall_time_s = begun.elapsed().as_secs_f64();
     Ok((figures, run))
-}
-
-/// Empty watcher, with which the board is read as often as with a real one.
-struct Nobody;
-
-impl Watch for Nobody {
-    fn wants_every_frame(&self) -> bool {
-        true
-    }
-
-    fn step(&mut self, _: &Step) {}
-}
-
-/// Recorded trace and display.
-struct Seen {
-    trace: Trace,
-    screen: Screen,
-}
-
-impl Watch for Seen {
-    fn wants_every_frame(&self) -> bool {
-        self.trace.wants_every_frame()
-    }
-
-    fn step(&mut self, step: &Step) {
-        self.trace.step(step);
-        self.screen.step(step);
-    }
 }
 
 /// Longest wait for an answer, ns.
@@ -98,7 +64,6 @@ const WAIT_NS: u64 = 20_000_000;
 /// Pause of the line after the last request, ms.
 const QUIET_MS: u64 = 2;
 
-/// Counts of the board at an instant.
 #[derive(Clone, Copy, Debug)]
 pub struct Counts {
     at_ns: u64,
@@ -109,9 +74,6 @@ pub struct Counts {
 
 impl Counts {
     /// Now.
-    ///
-    /// # Errors
-    /// The emulator stopped.
     pub fn of(rig: &mut Rig) -> Result<Self, Error> {
         let (at_ns, duties) = (rig.now_ns(), rig.latency()?.frames);
         Ok(Self { at_ns, scans: rig.scan_counts()?, instructions: rig.instructions()?, duties })
@@ -121,7 +83,6 @@ impl Counts {
 /// All figures; the keys end with the unit.
 #[derive(Clone, Debug, Serialize)]
 pub struct Figures {
-    /// SHA-256 of the image in flash.
     pub image_sha256: String,
     /// Size of the image in flash, bytes.
     pub image_bytes: usize,
@@ -131,9 +92,7 @@ pub struct Figures {
     pub wall_time_s: f64,
     /// Frames in that virtual time.
     pub frames: u64,
-    /// Their rate.
     pub frame_rate_hz: f64,
-    /// Frames that the control missed.
     pub missed_frames: u32,
     /// Latency from a frame's last conversion to its duty.
     pub latency_us: Range,
@@ -141,7 +100,6 @@ pub struct Figures {
     pub loop_time_max_us: u16,
     /// Instructions of the whole firmware for a frame: interrupts, executor, step, bus, log. Sleep counts none.
     pub instructions_a_frame: f64,
-    /// Figures of the true force.
     #[serde(flatten)]
     pub forces: Forces,
     /// Digest of every duty and every byte on the bus, with their times.
@@ -152,20 +110,14 @@ pub struct Figures {
     pub checks: Vec<Check>,
 }
 
-/// The least and the largest.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Range {
-    /// The least.
     pub least: f64,
-    /// The largest.
     pub largest: f64,
 }
 
 impl Figures {
     /// Computes the figures of a run between two instants, each against its bound.
-    ///
-    /// # Errors
-    /// The run did not follow the script (no touch, or a force that was not reached), or the board does not answer.
     pub fn of(
         run: &Run,
         [from, to]: [&Counts; 2],
@@ -232,8 +184,9 @@ const FULL_KPA: f64 = 70.0;
 /// The array is drawn this often, in the scene's time.
 const DRAWN_MS: u64 = 50;
 
-/// Display of the run: a progress bar on a terminal, plain lines otherwise.
+/// Trace and display of the run: a progress bar on a terminal, plain lines otherwise.
 pub struct Screen {
+    trace: Trace,
     scene: Scene,
     array: Taxels,
     /// Number of goals reported.
@@ -244,7 +197,6 @@ pub struct Screen {
 }
 
 impl Screen {
-    /// A screen for a run of this scene.
     pub fn new(scene: &Scene) -> Self {
         let bar = std::io::stdout().is_terminal().then(|| {
             let length_ms = (scene.duration_s * 1e3) as u64;
@@ -253,7 +205,7 @@ impl Screen {
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
             bar
         });
-        Self { scene: scene.clone(), array: Taxels::of(scene), told: 0, drawn_ms: 0, bar }
+        Self { trace: Trace::new(scene), scene: scene.clone(), array: Taxels::of(scene), told: 0, drawn_ms: 0, bar }
     }
 
     /// Reports the reason of a wait.
@@ -277,7 +229,12 @@ impl Screen {
 }
 
 impl Watch for Screen {
+    fn wants_every_frame(&self) -> bool {
+        true
+    }
+
     fn step(&mut self, step: &Step) {
+        self.trace.step(step);
         while let Some(event) = self.scene.script.get(self.told).filter(|event| event.at_s <= step.time_s) {
             self.say(format!("{:7.3} s  goal: {}", event.at_s, what(event.goal_n)));
             self.told += 1;

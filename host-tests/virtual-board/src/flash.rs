@@ -20,7 +20,6 @@ use std::ops::Range;
 pub const SECTOR: Range<u64> = 0x0806_0000..0x0808_0000;
 /// Sector 6: the other one.
 pub const OTHER_SECTOR: Range<u64> = 0x0804_0000..0x0806_0000;
-/// Both.
 pub const SECTORS: Range<u64> = OTHER_SECTOR.start..SECTOR.end;
 /// Flash of the F446, which has less than the emulated part.
 const FLASH_BYTES: u64 = 512 << 10;
@@ -33,9 +32,6 @@ static PROGRAMMABLE: [Region; MEMORY.len()] = {
 };
 
 /// A bus that serves only to lay out memory.
-///
-/// # Errors
-/// The part's description does not fit this crate: another release of `rigless`.
 pub fn layout(of: &Bus) -> Result<Bus, Error> {
     Bus::builder(CPU, &PROGRAMMABLE, of.peripherals().copied()).build()
 }
@@ -45,7 +41,6 @@ pub fn layout(of: &Bus) -> Result<Bus, Error> {
 pub struct Programmer {
     /// Time for which the core stalls while a word is programmed, ns: typically 16 us, at most 100 us (DS10693).
     pub word_ns: u64,
-    /// Number of words programmed.
     pub words: u64,
     /// Number of sectors erased.
     pub erases: u64,

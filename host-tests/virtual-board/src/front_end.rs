@@ -16,9 +16,7 @@ const COLUMN_INPUTS: [Option<(usize, [usize; 5])>; 3] =
     [None, Some((5, [4, 6, 7, 14, 15])), Some((0, [1, 10, 11, 12, 13]))];
 /// The input behind the supply's divider, of whichever converter.
 const SUPPLY_INPUT: usize = 0;
-/// The supply's divider.
 const SUPPLY_RATIO: f64 = 11.0;
-/// Codes of the converter.
 const CODES: f64 = 4096.0;
 
 /// Rows driven, and the time since which they are.
@@ -75,7 +73,6 @@ const DAC_COLUMN: usize = 5;
 const DAC_CR: u64 = 0;
 const DAC_DHR12R1: u64 = 8;
 
-/// Counts of the converters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ScanCounts {
     /// Words converted by the two scanning converters.
@@ -99,7 +96,6 @@ pub struct FrontEnd {
     pub trigger_missed: bool,
     /// The interrupt of the scan's stream does not reach the core.
     pub scan_interrupt_lost: bool,
-    /// Counts of the converters.
     pub counts: ScanCounts,
     /// Scan of a scene; `None` outside a scene.
     pub scan: Option<Scan>,

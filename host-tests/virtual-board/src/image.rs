@@ -18,19 +18,15 @@ pub struct Firmware {
 
 impl Firmware {
     /// Reads an image.
-    ///
-    /// # Errors
-    /// The file is missing, or is no ELF.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let elf = std::fs::read(path).map_err(|source| Error::ReadImage { path: path.into(), source })?;
-        let file = object::File::parse(elf.as_slice())
-            .map_err(|source| Error::NotAnImage { path: path.into(), why: source.to_string() })?;
+        let elf = std::fs::read(path).map_err(|why| Error::ReadImage(path.into(), why))?;
+        let file =
+            object::File::parse(elf.as_slice()).map_err(|why| Error::NotAnImage(path.into(), why.to_string()))?;
         let symbols = file.symbols().filter_map(|symbol| Some((symbol.name().ok()?.to_owned(), symbol.address())));
         let symbols = symbols.collect();
         Ok(Self { path: path.into(), elf, symbols })
     }
 
-    /// Path of the image file.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -47,7 +43,6 @@ impl Firmware {
         self.symbols.iter().find(|(of, _)| of.contains(&path)).map(|(_, address)| *address)
     }
 
-    /// The address of a symbol.
     pub fn symbol(&self, name: &str) -> Option<u64> {
         self.symbols.iter().find(|(of, _)| of == name).map(|(_, address)| *address)
     }
@@ -71,11 +66,8 @@ pub struct Flashable {
 
 impl Flashable {
     /// Lays out the loadable segments of an image by their load addresses.
-    ///
-    /// # Errors
-    /// The image is not for a 32-bit microcontroller, or loads nothing.
     pub fn of(image: &Firmware) -> Result<Self, Error> {
-        let fail = |why: &str| Error::NotAnImage { path: image.path().into(), why: why.to_owned() };
+        let fail = |why: &str| Error::NotAnImage(image.path().into(), why.to_owned());
         let file = ElfFile::<FileHeader32<LittleEndian>>::parse(image.elf()).map_err(|why| fail(&why.to_string()))?;
         let mut segments = Vec::new();
         for header in file.elf_program_headers() {
@@ -105,9 +97,6 @@ impl Flashable {
     }
 
     /// Checks that the emulated flash holds exactly these bytes.
-    ///
-    /// # Errors
-    /// Some byte differs.
     pub fn check_loaded(&self, rig: &mut Rig) -> Result<(), Error> {
         let Self { base, bytes } = self.clone();
         let path = rig.image().path().to_owned();
@@ -121,9 +110,7 @@ impl Flashable {
         })?;
         match differs {
             None => Ok(()),
-            Some(at) => {
-                Err(Error::NotAnImage { path, why: format!("the emulated flash differs from it at {at:#010x}") })
-            }
+            Some(at) => Err(Error::NotAnImage(path, format!("the emulated flash differs from it at {at:#010x}"))),
         }
     }
 }

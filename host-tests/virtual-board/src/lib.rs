@@ -37,66 +37,34 @@ use std::path::PathBuf;
 /// Reason why a run could not start or continue.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The image could not be read.
-    #[error("cannot read the image {}: {source}; build it first (cargo xtask build)", path.display())]
-    ReadImage {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// The file is not an image for the board.
-    #[error("{} is not an image for the board: {why}", path.display())]
-    NotAnImage {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        why: String,
-    },
-    /// The emulated part does not fit this crate.
+    #[error("cannot read the image {path}: {1}; build it first (cargo xtask build)", path = .0.display())]
+    ReadImage(PathBuf, std::io::Error),
+    #[error("{path} is not an image for the board: {1}", path = .0.display())]
+    NotAnImage(PathBuf, String),
+    /// Another release of `rigless` than this crate is written for.
     #[error("the emulated part cannot be put together: {0}")]
     Part(#[from] rigless::soc::Error),
-    /// The emulator stopped.
-    #[error("the emulator stopped at {at_ns} ns: {why}")]
-    Emulator {
-        /// The last instant that the run is known to have reached.
-        at_ns: u64,
-        /// Reason reported by the emulator.
-        why: String,
-    },
-    /// A fault could not be injected.
-    #[error("cannot inject the fault: {0}")]
-    Fault(String),
-    /// The client's pseudo-terminal failed.
+    /// The last instant that the run is known to have reached, and the emulator's reason.
+    #[error("the emulator stopped at {0} ns: {1}")]
+    Emulator(u64, String),
     #[error("the bus client's pseudo-terminal: {0}")]
     Client(#[from] std::io::Error),
-    /// The bring-up image gave no report.
     #[error("the report of the bring-up image: {0}")]
     Report(std::io::Error),
-    /// Some of its checks fail.
     #[error("{0} checks fail; see the table")]
     Failed(usize),
     /// The plant was requested, but the board runs in a scene, or the other way round.
     #[error("the world around the board is another one")]
     OtherWorld,
-    /// The demonstration has no figures or no pictures.
     #[error(transparent)]
     Demo(#[from] sim::demo::DemoError),
-    /// The demonstration misses bounds.
     #[error("{0} of the bounds missed; see the table")]
     Missed(usize),
-    /// A scene cannot be simulated.
     #[error(transparent)]
     Scene(#[from] sim::SimError),
-    /// The board did not carry out a request of a scene's host.
-    #[error("{at_ms:.3} ms after power-on: {why}")]
-    Host {
-        /// Time since power-on, ms.
-        at_ms: f64,
-        /// Failure of the board.
-        why: String,
-    },
-    /// The run used features that the emulator lacks and the allow-list does not name.
+    /// Time since power-on, and what the board did not do for a scene's host.
+    #[error("{at_ms:.3} ms after power-on: {1}", at_ms = *.0 as f64 * 1e-6)]
+    Host(u64, String),
     #[error("emulator gaps that are not on the allow-list:\n{0}")]
     Gaps(String),
 }

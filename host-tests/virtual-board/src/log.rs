@@ -72,7 +72,6 @@ pub mod text {
     use crate::rig::Rig;
     use defmt_decoder::{DecodeError, Table};
 
-    /// A line that the image logged.
     #[derive(Clone, Debug, PartialEq, Eq)]
     pub struct LogLine {
         /// Virtual time at which it was read, ns.
@@ -85,18 +84,14 @@ pub mod text {
 
     impl Rig {
         /// The image's log so far; one without a log has none.
-        ///
-        /// # Errors
-        /// The emulator stopped, or the image has a log that this crate cannot decode.
         pub fn log(&mut self) -> Result<Vec<LogLine>, Error> {
             let frames = self.with(|stand| {
                 stand.bench.log.drain(stand.bench.next_ns, stand.host);
                 stand.bench.log.frames().to_vec()
             })?;
             let image = self.image();
-            let table = Table::parse(image.elf()).map_err(|why| Error::NotAnImage {
-                path: image.path().into(),
-                why: format!("its defmt table cannot be read: {why}"),
+            let table = Table::parse(image.elf()).map_err(|why| {
+                Error::NotAnImage(image.path().into(), format!("its defmt table cannot be read: {why}"))
             })?;
             Ok(table.map_or_else(Vec::new, |table| frames.iter().flat_map(|frames| decode(&table, frames)).collect()))
         }

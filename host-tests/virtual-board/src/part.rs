@@ -49,7 +49,6 @@ enum Model {
     None,
 }
 
-/// The microcontroller.
 #[derive(Debug)]
 pub struct Part {
     /// All that the crate's part has; its own USART2, converters, TIM1 and TIM8 are not used.
@@ -76,9 +75,6 @@ pub struct Part {
 
 impl Part {
     /// Out of power-on, the converters on a front end.
-    ///
-    /// # Errors
-    /// The part's description lacks an instance: another release of the crate.
     pub fn new(front_end: Shared) -> Result<Self, Error> {
         let chip = Stm32f427::new()?;
         let mut wiring = vec![Model::Chip; chip.bus().slots().len()];
@@ -133,7 +129,6 @@ impl Part {
         self.bus_port.wire()
     }
 
-    /// The bridge's timer and its registers.
     pub fn pwm_timer(&self) -> (&PwmTimer, &RegisterFile) {
         (&self.pwm_timer, self.chip.bus().slots()[self.pwm_slot].registers())
     }

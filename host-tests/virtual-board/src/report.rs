@@ -11,10 +11,8 @@ use rigless::soc::Width;
 use rigless::soc::stm32f427::generated::gpioa::Register;
 use rigless::soc::stm32f427::peripherals::gpio::{Gpio, Pin};
 
-/// A reset of the microcontroller.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Reset {
-    /// Virtual time.
     pub at_ns: u64,
     /// `software`, `pin`, `power`, or the name of the peripheral that asked for it: `IWDG`.
     pub cause: String,
@@ -72,7 +70,6 @@ pub struct Gap {
     pub kind: &'static str,
     /// Address in hexadecimal, or instance and register.
     pub place: String,
-    /// Details of the access.
     pub detail: String,
 }
 
@@ -181,9 +178,6 @@ impl Rig {
     }
 
     /// Checks that all gaps so far are on the allow-list.
-    ///
-    /// # Errors
-    /// Lists the gaps that are not on it.
     pub fn check_gaps(&mut self) -> Result<(), Error> {
         let unknown: Vec<String> = self
             .gaps()?
@@ -200,9 +194,7 @@ impl Rig {
 pub struct Latency {
     /// Number of frames that got a duty.
     pub frames: u64,
-    /// Longest time, ns.
     pub max_ns: u64,
-    /// Shortest time, ns.
     pub min_ns: u64,
     open: Option<(u64, u64)>,
 }
@@ -241,7 +233,6 @@ impl Latency {
 pub struct PinEdge {
     /// Number of the pin in its port.
     pub pin: usize,
-    /// Virtual time.
     pub at_ns: u64,
     /// True if the pin is high after the edge.
     pub high: bool,
@@ -250,7 +241,6 @@ pub struct PinEdge {
 /// Change of the bridge between on and off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BridgeEdge {
-    /// Virtual time.
     pub at_ns: u64,
     /// True if the bridge drives after the edge.
     pub on: bool,
@@ -263,7 +253,6 @@ pub struct Trace {
     records: u64,
 }
 
-/// Content of a record.
 #[derive(Clone, Copy, Debug)]
 pub enum Record {
     /// A value written to a register of the bridge's timer: its offset and the value.
@@ -275,7 +264,6 @@ pub enum Record {
 }
 
 impl Trace {
-    /// Adds a record.
     pub fn add(&mut self, at_ns: u64, record: Record) {
         let (kind, value) = match record {
             Record::Pwm(offset, value) => (1_u64 << 56 | u64::from(offset) << 32, value),
@@ -290,12 +278,10 @@ impl Trace {
         self.records += 1;
     }
 
-    /// Number of records in the digest.
     pub fn records(&self) -> u64 {
         self.records
     }
 
-    /// The digest, in hexadecimal.
     pub fn hash(&self) -> String {
         self.state.iter().map(|byte| format!("{byte:02x}")).collect()
     }

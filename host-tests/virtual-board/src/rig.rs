@@ -22,7 +22,6 @@ use std::path::Path;
 use std::sync::mpsc;
 use std::thread::JoinHandle;
 
-/// Settings of a run.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Addresses and bytes that memory holds beside the image, for example a parameter sector.
@@ -52,7 +51,7 @@ impl Default for Options {
 /// The image, the factory's calibration, and the presets.
 fn images(image: &Firmware, options: &Options) -> Result<Vec<Image>, Error> {
     let read = |path: &Path, bytes: Vec<u8>, at| {
-        Image::new(path, bytes, at).map_err(|why| Error::NotAnImage { path: path.into(), why: why.to_string() })
+        Image::new(path, bytes, at).map_err(|why| Error::NotAnImage(path.into(), why.to_string()))
     };
     let mut images = vec![read(image.path(), image.elf().to_vec(), None)?];
     let Factory { reference, sensor: [cold, hot] } = options.factory;
@@ -86,9 +85,6 @@ pub struct Rig {
 
 impl Rig {
     /// A board with an image and a world, a step after power-on.
-    ///
-    /// # Errors
-    /// The image cannot be read or placed.
     pub fn new(image: &Path, world: impl Into<Surroundings>, options: &Options) -> Result<Self, Error> {
         let image = Firmware::read(image)?;
         let images = images(&image, options)?;
@@ -107,7 +103,6 @@ impl Rig {
         Ok(rig)
     }
 
-    /// The image.
     pub fn image(&self) -> &Firmware {
         &self.image
     }
@@ -132,7 +127,6 @@ impl Rig {
         self.order(Order::Run(until_ns.next_multiple_of(STEP_NS)))
     }
 
-    /// Runs on for some ms.
     pub fn run_ms(&mut self, ms: u64) -> Result<(), Error> {
         self.run_until_ns(self.now_ns + ms * 1_000_000)
     }
@@ -147,9 +141,6 @@ impl Rig {
     }
 
     /// The plant, to look at or to change.
-    ///
-    /// # Errors
-    /// The emulator stopped, or the board runs in a scene.
     pub fn world<T: Send + 'static>(&mut self, job: impl FnOnce(&mut Plant) -> T + Send + 'static) -> Result<T, Error> {
         self.with(|stand| match &mut stand.bench.front_end.lock().world {
             Surroundings::Plant(world) => Ok(job(world)),
@@ -158,9 +149,6 @@ impl Rig {
     }
 
     /// The finger in its scene.
-    ///
-    /// # Errors
-    /// The emulator stopped, or there is no scene around the board.
     pub fn finger<T: Send + 'static>(
         &mut self,
         job: impl FnOnce(&mut Finger) -> T + Send + 'static,
@@ -171,7 +159,6 @@ impl Rig {
         })?
     }
 
-    /// Counts of the converters.
     pub fn scan_counts(&mut self) -> Result<ScanCounts, Error> {
         self.with(|stand| stand.bench.front_end.lock().counts)
     }
@@ -222,7 +209,7 @@ impl Rig {
             Some(Err(panic)) => panic.downcast::<String>().map_or_else(|_| "it panicked".to_owned(), |text| *text),
             None => "it had stopped before".to_owned(),
         };
-        Error::Emulator { at_ns: self.now_ns, why }
+        Error::Emulator(self.now_ns, why)
     }
 }
 
@@ -237,7 +224,7 @@ impl Drop for Rig {
 }
 
 fn failure(error: emulator::Error) -> Error {
-    Error::Emulator { at_ns: 0, why: error.to_string() }
+    Error::Emulator(0, error.to_string())
 }
 
 /// The run at a halt, between two instructions.
@@ -246,7 +233,6 @@ pub struct Stand<'a> {
     pub session: &'a mut Session<FingerBoard>,
     /// The guest's memory and interrupt lines.
     pub host: &'a mut dyn Host,
-    /// The instant.
     pub stop: Stop,
     /// All around the board.
     pub bench: &'a mut Bench,

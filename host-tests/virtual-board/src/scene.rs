@@ -51,9 +51,6 @@ const BAUD_CODE: u8 = 5;
 const WATCHDOG_MS: i64 = 20;
 
 /// Runs a scene. The times of the board and of the scene's script begin together.
-///
-/// # Errors
-/// The image does not run, or the scene cannot be simulated.
 pub fn simulate(image: &Path, scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, Error> {
     let mut boards = Boards::power_on(image, scene)?;
     let summary = boards.run(scene, watch)?;
@@ -75,9 +72,6 @@ pub struct Boards {
 
 impl Boards {
     /// Boots and tares them and enables torque: the scene begins a millisecond later.
-    ///
-    /// # Errors
-    /// Like [`simulate`].
     pub fn power_on(image: &Path, scene: &Scene) -> Result<Self, Error> {
         let begun = Instant::now();
         let params = scene.params();
@@ -103,9 +97,6 @@ impl Boards {
     }
 
     /// Runs the scene from its beginning to its end, once.
-    ///
-    /// # Errors
-    /// Like [`simulate`].
     pub fn run(&mut self, scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, Error> {
         let begun = Instant::now();
         let fingers = self.rigs.len();
@@ -138,7 +129,7 @@ impl Boards {
                 let (shown, trouble) = rig.answer(&made)?;
                 shown.iter().for_each(|shown| watch.step(&shown.step()));
                 if let Some(why) = trouble {
-                    return Err(Error::Host { at_ms: rig.now_ns() as f64 * 1e-6, why: why.into() });
+                    return Err(Error::Host(rig.now_ns(), why.into()));
                 }
             }
         }
@@ -174,7 +165,6 @@ fn set_out(rig: &mut Rig, now_ns: u64, second_s: f64, wants_pressures: bool) -> 
     })
 }
 
-/// A millisecond begins.
 fn begin(bench: &mut Bench, now_ns: u64, second_s: f64, wants_pressures: bool) {
     if let Surroundings::Scene(finger) = &mut bench.front_end.lock().world {
         finger.clock.run_at(now_ns, second_s);
@@ -190,7 +180,7 @@ fn set_up(rig: &mut Rig, scene: &Scene, start_ns: u64) -> Result<(), Error> {
     rig.run_until_ns(BOOT_NS)?;
     if let Some(reset) = rig.resets()?.first() {
         let why = format!("the board does not start: it resets, by {}", reset.cause);
-        return Err(Error::Host { at_ms: reset.at_ns as f64 * 1e-6, why });
+        return Err(Error::Host(reset.at_ns, why));
     }
     write_u8(rig, "tare", address::TARE, 1)?;
     rig.run_until_ns(start_ns - 4 * MS)?;
@@ -208,10 +198,7 @@ fn set_up(rig: &mut Rig, scene: &Scene, start_ns: u64) -> Result<(), Error> {
     write_u8(rig, "status return level", address::STATUS_RETURN_LEVEL, 1)?;
     rig.run_until_ns(start_ns - 2 * MS)?;
     if rig.now_ns() > start_ns - 2 * MS {
-        return Err(Error::Host {
-            at_ms: rig.now_ns() as f64 * 1e-6,
-            why: "setting the board up took too long".into(),
-        });
+        return Err(Error::Host(rig.now_ns(), "setting the board up took too long".into()));
     }
     Ok(())
 }
@@ -223,7 +210,7 @@ fn set_up(rig: &mut Rig, scene: &Scene, start_ns: u64) -> Result<(), Error> {
 fn frame_offset(rig: &mut Rig) -> Result<u32, Error> {
     let Some(address) = rig.image().item("scan", "SEQUENCE") else {
         let why = "the image has no counter of frames named `scan::SEQUENCE`".into();
-        return Err(Error::Host { at_ms: rig.now_ns() as f64 * 1e-6, why });
+        return Err(Error::Host(rig.now_ns(), why));
     };
     let mut offset = i32::MIN;
     // Where a frame has just ended the image is about to count it: of several looks the largest difference is the right
@@ -241,7 +228,7 @@ fn frame_offset(rig: &mut Rig) -> Result<u32, Error> {
 }
 
 fn write_u8(rig: &mut Rig, doing: &str, register: u16, value: u8) -> Result<(), Error> {
-    let at_ms = rig.now_ns() as f64 * 1e-6;
+    let at_ns = rig.now_ns();
     let written = rig.client(WAIT_NS, move |line| line.write_u8(host::ID, register, value).map(drop))?;
-    written.map_err(|why| Error::Host { at_ms, why: format!("{doing}: {why}") })
+    written.map_err(|why| Error::Host(at_ns, format!("{doing}: {why}")))
 }

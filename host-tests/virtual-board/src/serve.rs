@@ -15,15 +15,11 @@ const TARE_MS: u64 = 300;
 /// Time with torque on and a goal of 0, ms.
 const TORQUE_MS: u64 = 20;
 
-/// A board behind a port.
 pub struct Board(Rig);
 
 impl Board {
     /// Starts a board and executes all requests of clients once: the emulator compiles new code for up to 200 ms,
     /// longer than clients wait. Ends with a reboot.
-    ///
-    /// # Errors
-    /// The board does not answer, or the emulator stopped.
     pub fn warm(mut rig: Rig) -> Result<Self, Error> {
         rig.run_ms(BOOT_MS)?;
         let state = (address::PRESENT_MODE, address::LOOP_TIME_US + 2 - address::PRESENT_MODE);

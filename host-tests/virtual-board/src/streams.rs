@@ -33,7 +33,6 @@ struct Stream {
     interrupt: bool,
 }
 
-/// The controller.
 #[derive(Debug)]
 pub struct Streams {
     streams: [Stream; STREAMS],
@@ -281,7 +280,6 @@ const COMPLETE: u64 = 1 << 5;
 /// First bit of each stream's flags, RM0390 9.5.1.
 const FLAG_SHIFT: [u32; 4] = [0, 6, 16, 22];
 
-/// Source of a DMA request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Source {
     /// A converter: its words wait.
@@ -311,12 +309,10 @@ enum Row {
     Fifo = 5,
 }
 
-/// A stream's register.
 fn register(stream: usize, row: Row) -> Register {
     Register::from_index(FIRST_ROW + STREAM_ROWS * stream + row as usize).expect("eight streams of six registers")
 }
 
-/// Value of a stream's register.
 fn get(registers: &RegisterFile, stream: usize, row: Row) -> u64 {
     registers.get(register(stream, row))
 }
@@ -326,7 +322,6 @@ fn status(stream: usize) -> (Register, u32) {
     (if stream < 4 { Register::Lisr } else { Register::Hisr }, FLAG_SHIFT[stream % 4])
 }
 
-/// Sets flags of a stream.
 fn raise(registers: &mut RegisterFile, stream: usize, flags: u64) {
     let (register, shift) = status(stream);
     registers.set(register, registers.get(register) | flags << shift);

@@ -42,7 +42,6 @@ impl PwmTimer {
         Self { timer, clock_hz, awake_until_ns: 0, on: false, counts: Counts::default() }
     }
 
-    /// Counts since the reset.
     pub fn counts(&self) -> Counts {
         self.counts
     }
@@ -347,7 +346,6 @@ impl Updates {
         self.running = Some((since as u64, cycles));
     }
 
-    /// Stops the timer.
     fn stop(&mut self) {
         self.running = None;
     }
@@ -368,7 +366,6 @@ impl Updates {
         })
     }
 
-    /// Advances by `count` updates.
     fn pass(&mut self, count: usize) {
         if let Some((last, cycles)) = &mut self.running {
             *last += count as u64 * *cycles;

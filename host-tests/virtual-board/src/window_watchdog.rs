@@ -25,7 +25,6 @@ pub struct WindowWatchdog {
 }
 
 impl WindowWatchdog {
-    /// Sets the clock of APB1, Hz.
     pub fn set_clock(&mut self, hz: u64) {
         self.clock_hz = hz;
     }

@@ -15,7 +15,6 @@ use std::collections::VecDeque;
 pub struct TimedByte {
     /// Virtual time of the end of its stop bit, ns.
     pub at_ns: u64,
-    /// Value of the byte.
     pub byte: u8,
 }
 

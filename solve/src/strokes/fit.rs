@@ -35,7 +35,6 @@ const UNEVEN: f64 = 0.05;
 
 /// The fit with one form of friction.
 pub struct Fit {
-    /// The parameters.
     pub p: Parameters,
     /// Sum of squares of the residuals, rad^2.
     pub cost: f64,
@@ -70,7 +69,6 @@ struct Normal {
     follow: Vec<(Own, SMatrix<f64, 3, ALL>)>,
 }
 
-/// Parameters of the fit.
 struct Problem<'a> {
     paths: &'a [Path],
     law: Law,

@@ -48,7 +48,6 @@ pub mod index {
 
 /// Number of parameters that are fitted.
 pub const FITTED: usize = 7;
-/// Number of all parameters.
 pub const ALL: usize = 10;
 /// All parameters, see [`index`].
 pub type Parameters = [f64; ALL];

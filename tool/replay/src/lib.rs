@@ -1,6 +1,8 @@
 //! Captures on the host: reads their bytes ([`fingertip::capture`] has the layout), and feeds the frames through the core
 //! again, whose answers must be the same to the bit.
 
+#![allow(missing_docs, reason = "parts of the project's own programs: a name that says all needs no comment")]
+
 use fingertip::capture::{
     ESCAPE, Ended, Head, LAYOUT, Last, MAGIC, VERSION, digest_step, digest_words, short_digest, width,
 };
@@ -19,7 +21,6 @@ use std::cmp::Ordering;
 /// A capture that was fed through the core again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Replayed<const ROWS: usize, const COLUMNS: usize> {
-    /// Its beginning.
     pub head: Head<ROWS, COLUMNS>,
     /// First difference of the core's answers.
     pub difference: Option<Difference>,
@@ -30,11 +31,8 @@ pub struct Replayed<const ROWS: usize, const COLUMNS: usize> {
 pub struct Difference {
     /// The frame, from 0.
     pub frame: u32,
-    /// Field that differs.
     pub field: Field,
-    /// Value in the capture.
     pub captured: i64,
-    /// Value in the replay.
     pub replayed: i64,
 }
 
@@ -43,16 +41,13 @@ pub struct Difference {
 pub enum Field {
     /// The duty, Q15.
     Duty,
-    /// The mode's number.
     Mode,
-    /// The fault's number.
     Fault,
     /// The digest of the whole status.
     Digest,
 }
 
 impl Field {
-    /// Its name.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Duty => "duty",
@@ -147,11 +142,9 @@ pub enum ReplayError {
 /// A captured frame, and the answer of the board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CapturedFrame<const ROWS: usize, const COLUMNS: usize> {
-    /// The frame.
     pub frame: Frame<ROWS, COLUMNS>,
     /// Sensed values other than the frame.
     pub sense: Sense,
-    /// Command of the host.
     pub command: Command,
     /// The duty that the step answered.
     pub duty: Duty,
@@ -316,7 +309,6 @@ fn read_head<const ROWS: usize, const COLUMNS: usize>(bytes: &[u8]) -> Result<He
 struct Reader<'a> {
     bytes: &'a [u8],
     at: u32,
-    /// Number of bits.
     end: u32,
 }
 

@@ -52,7 +52,6 @@ pub struct Calibrate {
 }
 
 impl Calibrate {
-    /// Goals to hold, mN.
     fn goals_mn(&self) -> Vec<i64> {
         match (self.no_scale, self.scale_n.is_empty()) {
             (true, _) => Vec::new(),
@@ -119,9 +118,8 @@ fn scale(args: &Calibrate, modulus: &Modulus, procedure: &mut Procedure<'_>) -> 
     let scale = match solve::scale(&held) {
         Ok(scale) => scale,
         Err(why) => {
-            procedure.session.forget(HOLDS)?;
-            procedure.found.block(format!("the numbers of the scale were refused: {why}; the next run holds again"));
-            return Ok(());
+            let why = format!("the numbers of the scale were refused: {why}; the next run holds again");
+            return procedure.without(HOLDS, why);
         }
     };
     let (factor, part) = (scale.factor.value, scale.factor.relative());
@@ -153,10 +151,7 @@ fn creep(seconds: f64, args: &Calibrate, procedure: &mut Procedure<'_>) -> Resul
             found.row("creep_time_ms", 1e3 * creep.time_s.value, Some(1e3 * creep.time_s.sigma));
             found.notes.push(format!("creep leaves {:.2} % of a held reading", 100.0 * creep.left));
         }
-        Err(why) => {
-            procedure.session.forget(WEIGHT)?;
-            procedure.found.block(format!("the creep was not measured: {why}"));
-        }
+        Err(why) => return procedure.without(WEIGHT, format!("the creep was not measured: {why}")),
     }
     Ok(())
 }
@@ -175,10 +170,7 @@ fn temperature(args: &Calibrate, procedure: &mut Procedure<'_>) -> Result<(), Er
             procedure.found.row("array_gain_ppm_per_k", 1e6 * found.per_k.value, Some(1e6 * found.per_k.sigma));
             procedure.found.row("array_gain_at_c", found.chip_c[0], None);
         }
-        Err(why) => {
-            procedure.session.forget(WARM)?;
-            procedure.found.block(format!("the temperature coefficient was not measured: {why}"));
-        }
+        Err(why) => return procedure.without(WARM, format!("the temperature coefficient was not measured: {why}")),
     }
     Ok(())
 }

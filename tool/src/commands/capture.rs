@@ -1,8 +1,7 @@
 //! `fingertip capture`, and `fingertip replay` of what it wrote.
 
 use super::stop::Moving;
-use super::{Interrupt, TOUCHED, aside, no_fault_nor_motion, press, say, say_json, stopped, wait_for};
-
+use super::{Interrupt, TOUCHED, no_fault_nor_motion, press, report, say, say_json, stopped, wait_for};
 use crate::recordings::{self, About, ENDED, device};
 use crate::state::unix_ns;
 use crate::whole::Part;
@@ -84,20 +83,15 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     }
     let part = Part::begin(&args.out, args.force)?;
     let interrupt = Interrupt::catch()?;
-    let say_on = |text: &dyn std::fmt::Display| {
-        if !json {
-            aside(text);
-        }
-    };
     let count = if args.press.is_some() {
         let moving = Moving::begin(client, &interrupt)?;
-        let kept = keep(args, moving.client, &interrupt, &say_on);
+        let kept = keep(args, moving.client, &interrupt, json);
         moving.finish(kept)?
     } else {
-        keep(args, client, &interrupt, &say_on)?
+        keep(args, client, &interrupt, json)?
     };
     let ended_ns = unix_ns();
-    let bytes = fetch(client, count, &say_on)?;
+    let bytes = fetch(client, count, json)?;
     let mut touched = false;
     let replayed =
         recordings::through_the_core(&bytes, |_, status| touched |= status.limits.has(Limits::TARED_TOUCHING))
@@ -132,19 +126,14 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
 }
 
 /// Has the board keep frames: the number of the capture.
-fn keep(
-    args: &Args,
-    client: &mut Client,
-    interrupt: &Interrupt,
-    say_on: &dyn Fn(&dyn std::fmt::Display),
-) -> Result<i64, Error> {
+fn keep(args: &Args, client: &mut Client, interrupt: &Interrupt, json: bool) -> Result<i64, Error> {
     let within = Duration::from_secs_f64(args.within_s);
     let before = client.number(address::CAPTURE_COUNT)?;
     client.set(address::CAPTURE, 1)?;
     if wait_for(client, address::CAPTURE_STATE, within, |state| state == ARMED)? != ARMED {
         return Err("the controller does not arm a capture: do frames come in?".into());
     }
-    say_on(&"armed; taring, nothing may touch the tip");
+    report("armed; taring, nothing may touch the tip", json);
     client.set(address::TARE, 1)?;
     if let Some(goal_mn) = args.press {
         // During the tare, so that the approach begins right after it.
@@ -184,11 +173,7 @@ fn keep(
 }
 
 /// Reads what was kept: the bytes of the capture with this number.
-pub(super) fn fetch(
-    client: &mut Client,
-    count: i64,
-    say_on: &dyn Fn(&dyn std::fmt::Display),
-) -> Result<Vec<u8>, Error> {
+pub(super) fn fetch(client: &mut Client, count: i64, json: bool) -> Result<Vec<u8>, Error> {
     let length = client.number(address::CAPTURE_BYTES)? as usize;
     let window = table::register_at(address::CAPTURE_DATA).map_or(1, |register| register.count);
     let (mut bytes, mut said) = (Vec::with_capacity(length), Instant::now());
@@ -201,7 +186,7 @@ pub(super) fn fetch(
         bytes.extend(part.into_iter().take(length - bytes.len()));
         if said.elapsed() >= Duration::from_secs(1) {
             said = Instant::now();
-            say_on(&format_args!("read {} of {length} bytes", bytes.len()));
+            report(format_args!("read {} of {length} bytes", bytes.len()), json);
         }
     }
     let block = client.block(address::CAPTURE_STATE, address::CAPTURE_COUNT)?;

@@ -3,7 +3,7 @@
 
 pub(super) mod motion;
 
-use super::{Interrupt, aside, params, say};
+use super::{Interrupt, aside, params, report, say};
 use crate::{Client, Error, numbers, table, whole};
 use fingertip::params::Params;
 use fingertip::pressure::GAIN_ONE;
@@ -80,7 +80,7 @@ impl<'a> Procedure<'a> {
 pub(super) struct Run<'a> {
     options: &'a Options,
     interrupt: Interrupt,
-    json: bool,
+    pub json: bool,
 }
 
 /// Time without a look at the signals, ns.
@@ -90,9 +90,7 @@ const TRIES: u32 = 3;
 
 impl Run<'_> {
     pub fn report(&self, text: impl std::fmt::Display) {
-        if !self.json {
-            aside(text);
-        }
+        report(text, self.json);
     }
 
     /// Asks until the answer can be parsed, three times at most. `idle` runs every 50 ms meanwhile. `option` gives the answer
@@ -309,13 +307,11 @@ impl Session {
 pub struct Row {
     /// Name of the parameter, which ends with its unit.
     name: &'static str,
-    /// Value to write.
     after: f64,
     /// Standard uncertainty in the same unit; none for what a person said.
     sigma: Option<f64>,
 }
 
-/// Gains that were measured.
 pub struct GainRows {
     /// Gains to write, in 1/16384, row by row.
     pub after: Vec<Vec<u16>>,
@@ -323,7 +319,6 @@ pub struct GainRows {
     pub sigma: Vec<Vec<Option<f64>>>,
 }
 
-/// Everything that a procedure found.
 #[derive(Default)]
 pub struct Found {
     rows: Vec<Row>,
@@ -339,15 +334,8 @@ pub struct Found {
 }
 
 impl Found {
-    /// Adds a parameter.
     pub fn row(&mut self, name: &'static str, after: f64, sigma: Option<f64>) {
         self.rows.push(Row { name, after, sigma });
-    }
-
-    /// Records why a part has no result. Then nothing is written at all.
-    pub fn block(&mut self, why: String) {
-        self.refused.push(why);
-        self.blocked = true;
     }
 }
 
@@ -375,6 +363,13 @@ pub fn same_settings(session: &Session, client: &mut Client) -> Result<(), Error
 }
 
 impl Procedure<'_> {
+    /// Records why a part has no result, and forgets its step. Nothing is written at all then.
+    pub fn without(&mut self, step: &str, why: String) -> Result<(), Error> {
+        self.found.refused.push(why);
+        self.found.blocked = true;
+        self.session.forget(step)
+    }
+
     /// Shows the results, writes them if confirmed, and prints the JSON object. Fails if a part has no result, or the
     /// controller refuses: then nothing was changed.
     pub fn finish(mut self) -> Result<(), Error> {

@@ -4,6 +4,7 @@ use super::{say, say_json};
 use crate::state::RESTARTED;
 use crate::table::{self, name};
 use crate::{Client, Error, whole};
+use fingertip::link::settings::Saved;
 use fingertip::link::table::Register;
 use fingertip::params::Params;
 use fingertip::pressure::GAIN_ONE;
@@ -18,8 +19,8 @@ use std::time::{Duration, Instant};
 use toml_edit::Document;
 
 /// Values of `SAVED_STATE`.
-const SAME: i64 = 0;
-const CHANGED: i64 = 1;
+const SAME: i64 = Saved::Same as i64;
+const CHANGED: i64 = Saved::Changed as i64;
 /// A save makes the core wait for the flash.
 const SAVE_WITHIN: Duration = Duration::from_secs(5);
 
@@ -73,7 +74,6 @@ pub enum Command {
     },
 }
 
-/// A stored register and its value.
 pub type Value = (&'static Register, i64);
 
 /// Does it; nothing is half done without a word.
@@ -413,7 +413,6 @@ const GAINS: &str = "gains";
 /// Number of entries: a file that was cut has fewer, or a last line without an end.
 const ENTRIES: &str = "entries";
 
-/// Content of a backup.
 struct Backup {
     /// Values of registers with a name.
     values: Vec<Value>,
@@ -449,7 +448,6 @@ fn write_backup(path: &Path, force: bool, client: &mut Client, kept: &Backup) ->
     whole::write(path, force, text.as_bytes())
 }
 
-/// Reads it.
 fn read_backup(path: &Path) -> Result<Backup, Error> {
     let text = fs::read_to_string(path).map_err(|why| match why.kind() {
         ErrorKind::InvalidData => Error::file("read", path, "it is no text"),

@@ -108,7 +108,6 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     Ok(())
 }
 
-/// Tolerance of the held force, mN.
 fn tolerance_mn(args: &Args) -> f64 {
     (args.tolerance_percent * 1e-2 * args.goal_mn as f64).max(TOLERANCE_MN)
 }

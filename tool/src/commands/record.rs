@@ -66,7 +66,6 @@ trait Sink {
     fn put(&mut self, stamp: &Stamp, state: &State) -> io::Result<()>;
     /// Writes out all samples so far, so that the file is readable.
     fn flush(&mut self) -> io::Result<()>;
-    /// Ends the file.
     fn finish(self: Box<Self>) -> io::Result<()>;
 }
 

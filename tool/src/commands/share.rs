@@ -65,7 +65,6 @@ struct Bus {
 /// The client that may write.
 struct Commander {
     from: SocketAddr,
-    /// IDs to which it wrote.
     ids: BTreeSet<u8>,
     /// Shortest bus watchdog that it set, and its last packet.
     watchdog: Option<Duration>,
@@ -250,7 +249,6 @@ fn covers(packet: &Packet<'_>, register: u16) -> bool {
     packet.instruction == instruction::WRITE && packet.params.starts_with(&register.to_le_bytes())
 }
 
-/// IDs to which a packet writes.
 fn targets(packet: &Packet<'_>) -> Vec<u8> {
     let Packet { id, instruction, params, .. } = *packet;
     let entry =
@@ -265,7 +263,6 @@ fn targets(packet: &Packet<'_>) -> Vec<u8> {
     }
 }
 
-/// Status packets that answer a packet.
 fn answers(packet: &Packet<'_>) -> usize {
     match packet.instruction {
         instruction::SYNC_READ => packet.params.len().saturating_sub(4),

@@ -6,6 +6,7 @@ use crate::client::Reach;
 use crate::state::{Clock, State};
 use crate::{Client, Error, numbers, table};
 use fingertip::measure::Task;
+use fingertip::pipeline::Taring;
 use fingertip::shipped::address;
 use fingertip::state::{Limits, Mode};
 use serde_json::{Value, json};
@@ -261,8 +262,8 @@ pub fn recover(client: &mut Client, json: bool) -> Result<(), Error> {
 }
 
 /// Values of `TARE_STATE`.
-const TARE_RUNNING: i64 = 1;
-const TARE_DONE: i64 = 2;
+const TARE_RUNNING: i64 = Taring::Running as i64;
+const TARE_DONE: i64 = Taring::Done as i64;
 
 /// Options of the tare.
 #[derive(Debug, clap::Args)]
@@ -273,7 +274,6 @@ pub struct Tare {
     within_s: f64,
 }
 
-/// Tares, and reports the result.
 pub fn tare(args: &Tare, client: &mut Client, json: bool) -> Result<(), Error> {
     no_fault_nor_motion(client)?;
     if client.number(address::TORQUE_ENABLE)? != 0 {
@@ -289,7 +289,6 @@ pub fn tare(args: &Tare, client: &mut Client, json: bool) -> Result<(), Error> {
     if touched { Err(TOUCHED.into()) } else { Ok(()) }
 }
 
-/// Result of a tare.
 pub(super) struct Tared {
     /// Something seemed to touch the tip meanwhile.
     pub touched: bool,

@@ -22,7 +22,6 @@ pub struct Args {
     rate_hz: f64,
 }
 
-/// Refuses to stream.
 #[cfg(not(feature = "foxglove"))]
 pub fn run(_: &Args, _: &mut crate::Client) -> Result<(), crate::Error> {
     Err("this build does not stream: `cargo install --path tool --features foxglove` makes one that does".into())

@@ -28,7 +28,6 @@ pub struct Args {
     seconds: Option<f64>,
 }
 
-/// State of the view.
 #[derive(Debug, Default)]
 pub struct Seen {
     /// Whom it is of, for the first line.
@@ -127,7 +126,6 @@ const BRIGHT: usize = 8;
 /// Least pressure of the hottest colour, Pa.
 const HOTTEST_PA: i64 = 20_000;
 
-/// Draws what is seen.
 pub fn draw(seen: &Seen, area: Rect, buffer: &mut Buffer) {
     let [rows, columns] = SHAPE.map(|side| side as u16);
     let [head, middle, past, foot] = Layout::vertical([

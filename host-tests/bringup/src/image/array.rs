@@ -16,7 +16,6 @@ use fingertip::shipped::{Frame, Pipeline, ROWS};
 const ALL: u32 = (1 << ROWS) - 1;
 /// Time after which a slow edge has ended: 200 ns.
 const EDGE_CYCLES: u32 = 34;
-/// Number of progress lines.
 const LINES: u32 = 10;
 
 /// Watches the given number of frames.
@@ -54,7 +53,6 @@ struct Seen {
     wrong: u32,
     least: u32,
     most: u32,
-    /// Cycles of all frames.
     frame_cycles: u64,
     /// True if the rows do not move.
     stopped: bool,

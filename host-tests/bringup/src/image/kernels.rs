@@ -27,7 +27,6 @@ struct Passed {
     most: u32,
 }
 
-/// Runs all of them.
 pub fn run(config: &Config, bench: &mut Bench, pipeline: &mut Pipeline) {
     report::say(format_args!("kernels: a minute or less"));
     study::run(config, &mut Inputs::new(bench, pipeline));
@@ -76,7 +75,6 @@ impl<'a> Inputs<'a> {
         Self { place: 0, bench, pipeline }
     }
 
-    /// The next bytes.
     pub fn read(&mut self, bytes: &mut [u8]) {
         if let Some(kept) = BYTES.get(self.place..self.place + bytes.len()) {
             bytes.copy_from_slice(kept);
@@ -90,7 +88,6 @@ impl<'a> Inputs<'a> {
         self.place += bytes.len();
     }
 
-    /// The next words.
     pub fn words<const N: usize>(&mut self) -> [i32; N] {
         core::array::from_fn(|_| {
             let mut bytes = [0; 4];

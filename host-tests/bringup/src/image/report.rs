@@ -45,18 +45,15 @@ pub fn say(words: Arguments) {
     let _ = writeln!(Port, "# {words}");
 }
 
-/// A line of the report.
 fn line(words: Arguments) {
     let _ = writeln!(Checked, "{words}");
 }
 
-/// The report begins.
 pub fn begin() {
     CHECK.store(bringup::CHECK, Ordering::Relaxed);
     line(format_args!("bringup {} {}", bringup::VERSION, uid::uid_hex()));
 }
 
-/// A figure of the report.
 pub fn figure(name: impl Display, value: f32) {
     line(format_args!("figure {name} {value:.4}"));
 }
@@ -71,7 +68,6 @@ pub fn cycles(kernel: &str, median: u32, most: u32) {
     line(format_args!("cycles {median} {most} {kernel}"));
 }
 
-/// The report ends.
 pub fn end() {
     let check = CHECK.load(Ordering::Relaxed);
     let _ = writeln!(Port, "end {check:08x}");

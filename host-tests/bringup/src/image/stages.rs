@@ -10,7 +10,6 @@ use fingertip::scan::ScanTiming;
 use crate::board::guard::Watchdogs;
 use crate::{CYCLES_PER_US, passed, report};
 
-/// Next stage.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
     /// Waits for the host.
@@ -49,7 +48,6 @@ static mut KEPT: MaybeUninit<Words> = MaybeUninit::uninit();
 /// State that is kept through a reset.
 #[derive(Clone, Copy)]
 pub struct Kept {
-    /// Next stage.
     pub stage: Stage,
     /// Number of frames for which the rows are read back.
     pub frames: u32,
@@ -68,7 +66,6 @@ impl Kept {
         stage.map_or(Self::NOTHING, |stage| Self { stage: *stage, frames, cycles })
     }
 
-    /// Keeps it.
     pub fn store(self) {
         let Self { stage, frames, cycles } = self;
         let stage = STAGES.iter().position(|known| *known == stage).unwrap_or(0) as u32;

@@ -13,7 +13,6 @@ pub fn command_line(line: &mut [u8; 256]) -> &mut [u8] {
     &mut line[..=length]
 }
 
-/// A file on the host.
 pub struct File {
     /// The host's number of it.
     pub handle: usize,
@@ -30,7 +29,6 @@ impl File {
         Self { handle }
     }
 
-    /// The next bytes.
     pub fn read(&self, bytes: &mut [u8]) {
         // SAFETY: the buffer is valid for its length, and the call returns when it is filled.
         let missing = unsafe { syscall!(READ, self.handle, bytes.as_mut_ptr(), bytes.len()) };

@@ -58,11 +58,8 @@ unsafe extern "C" {
 const BYTES: usize = 4096;
 const PASSES: u32 = 5;
 
-/// Second argument of a kernel.
 enum Second {
-    /// The input.
     Input,
-    /// The number of rounds.
     Rounds(usize),
 }
 use Second::{Input, Rounds};
@@ -149,7 +146,6 @@ fn main() -> ! {
     }
 }
 
-/// True if the command line is this word.
 fn asked_for(word: &[u8]) -> bool {
     let mut line = [0u8; 256];
     let mut request = [line.as_mut_ptr() as usize, line.len()];

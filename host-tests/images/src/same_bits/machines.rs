@@ -22,7 +22,6 @@ pub type Step = (&'static str, fn(&mut Machines, &Sample, &mut Mix));
 /// The largest braking of the profile: 1000 m/s^2 in Q8 mm/s^2.
 const BRAKE_MAX: i32 = 1_000_000 << 8;
 
-/// The states.
 pub struct Machines {
     pub(super) config: Config,
     pub(super) filter: Option<Relaxation<3>>,
@@ -306,13 +305,11 @@ fn params(source: &mut Source) -> Params {
 
 // Adds the outputs of the machines to a digest, number by number.
 
-/// Adds a reference of the profile.
 pub fn add_reference(mix: &mut Mix, reference: Reference) {
     mix.add(reference.speed.to_bits());
     mix.add(reference.acceleration.to_bits());
 }
 
-/// Adds all fields of a tactile image.
 pub fn add_picture(mix: &mut Mix, picture: &TactileImage) {
     let TactileImage { taxels, sum, moment_x, moment_y, peak, bad, bad_count, bad_again, undriven_max, peak_codes } =
         picture;
@@ -323,7 +320,6 @@ pub fn add_picture(mix: &mut Mix, picture: &TactileImage) {
     mix.add(*bad_again);
 }
 
-/// Adds all fields of a contact.
 pub fn add_contact(mix: &mut Mix, contact: &Contact) {
     let Contact { force, indentation, centre_x, centre_y, radius, peak_pa, confidence, doubt, bad_taxels } = *contact;
     mix.add(force.to_bits());

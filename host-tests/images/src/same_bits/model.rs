@@ -109,29 +109,20 @@ pub struct Sample {
     pub made: Result<Tip, TipError>,
     /// The last tip that was made.
     pub tip: Tip,
-    /// An indentation.
     pub d: Millimetres,
     /// A distance from the contact's centre: inside, at the rim, outside.
     pub r: Millimetres,
-    /// A touching angle.
     pub theta: Radians,
-    /// A contact radius.
     pub radius: Millimetres,
-    /// A force.
     pub force: Newtons,
-    /// A peak pressure.
     pub peak: Kilopascals,
-    /// The area of a column.
     pub area: SquareMillimetres,
     /// Indentation, shift and tilt.
     pub displacement: Displacement,
-    /// A coefficient of friction.
     pub mu: Ratio,
-    /// A moment.
     pub moment: NewtonMillimetres,
     /// Rings of the quadrature, few: each costs as much as a pressure.
     pub rings: NonZeroU16,
-    /// A share, in 2^-32.
     pub share_q32: u32,
     /// Numbers of every size.
     pub words: [i32; 4],
@@ -159,7 +150,6 @@ impl Sample {
         }
     }
 
-    /// The next one.
     pub fn renew(&mut self, source: &mut Source) {
         let radius = source.around(RADIUS_MIN.to_bits(), RADIUS_MAX.to_bits());
         let modulus = source.around(MODULUS_MIN.to_bits(), MODULUS_MAX.to_bits());

@@ -72,7 +72,6 @@ pub fn run(kernel: &str, region: &mut u32, inputs: &mut Inputs) {
     }
 }
 
-/// Measures a case.
 fn one_case(
     region: u32,
     variant: Kernel,

@@ -8,7 +8,6 @@ use fingertip::units::{Millimetres, Newtons};
 use fixed::types::{I16F16, I32F32};
 use micromath::F32Ext;
 
-/// Force from indentation.
 pub const FORCE: &[Variant] = &[
     variant!("f32", Single f32: |d, _, tools| tools.single.pi_y * d * d),
     variant!("f32, micromath powf", Single f32: |d, _, tools| tools.single.pi_y * F32Ext::powf(d, 2.0)),
@@ -36,7 +35,6 @@ pub const FORCE: &[Variant] = &[
     }),
 ];
 
-/// Indentation from force.
 pub const INDENTATION: &[Variant] = &[
     variant!("f32, VSQRT", Single f32: |force, _, tools| hardware(force * tools.single.inverse, 0.0, tools)),
     variant!("f32, micromath", Single f32: |force, _, tools| F32Ext::sqrt(force * tools.single.inverse)),
@@ -146,7 +144,6 @@ macro_rules! variants {
     ] };
 }
 
-/// All of them.
 pub const RINGS: &[Variant] = variants!(4 8 16 32 64);
 
 /// sum of p(r) 2 pi r dr.

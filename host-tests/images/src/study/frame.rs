@@ -13,13 +13,11 @@ use fixed::types::I16F16;
 /// Sums in a format: of the taxels, weighted by -9, -7 .. 9 along the columns and along the rows, and the largest.
 #[derive(Clone, Copy, Default)]
 pub struct Sums<T> {
-    /// All taxels.
     pub sum: T,
     /// Weighted along the columns.
     pub moment_x: T,
     /// Weighted along the rows.
     pub moment_y: T,
-    /// The largest taxel.
     pub peak: T,
 }
 
@@ -29,7 +27,6 @@ pub struct Bench {
     pub config: Config,
     /// The firmware's own reading.
     pub array: Array,
-    /// The frame.
     pub frame: Frame,
     /// Q14, in pairs as the codes are.
     pub gain: [[u32; BANK_COLUMNS]; ROWS],
@@ -41,9 +38,7 @@ pub struct Bench {
     pub tare_sums: Sums<i32>,
     /// The same where gains are left out, sixteenths of a code.
     pub plain_tare: Sums<i32>,
-    /// Data in single precision.
     pub single: Float<f32>,
-    /// Data in double precision.
     pub double: Float<f64>,
     /// Data in I16F16, unit 32 codes.
     pub fixed: Float<I16F16>,

@@ -10,7 +10,6 @@ use fingertip::shipped::{BANK_COLUMNS, ROWS};
 type Pairs = [u32; BANK_COLUMNS];
 
 const ONES: u32 = lanes::pair(1, 1);
-/// A row's sums.
 struct Row {
     /// Net codes, unweighted.
     codes: i32,

@@ -16,13 +16,10 @@ const INPUT_BITS: u32 = 16;
 
 /// The tip in a format: a in mm, Y in N/mm^2.
 pub struct Constants<T> {
-    /// The radius a.
     pub radius: T,
     /// Young's modulus Y.
     pub modulus: T,
-    /// pi.
     pub pi: T,
-    /// pi Y.
     pub pi_y: T,
     /// 1 / (pi Y).
     pub inverse: T,
@@ -30,9 +27,7 @@ pub struct Constants<T> {
 
 /// RAM of a variant.
 pub struct Tools {
-    /// Model of the firmware.
     pub tip: Tip,
-    /// Constants in single precision.
     pub single: Constants<f32>,
     /// Constants in double precision, computed by software.
     pub double: Constants<f64>,
@@ -94,9 +89,7 @@ pub enum Call {
     Fixed(extern "C" fn(i32, i32, &Tools) -> i32, u32, u32),
     /// Fixed point, from 64 bits to 32.
     Wide(extern "C" fn(u64, &Tools) -> u32, u32, u32),
-    /// Single precision.
     Single(extern "C" fn(f32, f32, &Tools) -> f32),
-    /// Double precision.
     Double(extern "C" fn(f64, f64, &Tools) -> f64),
 }
 
@@ -113,7 +106,6 @@ macro_rules! variant {
 }
 pub(super) use variant;
 
-/// Variant of a kernel.
 pub type Variant = (&'static str, Call);
 
 /// Measures all variants of a kernel over the next section of inputs; the regions count on from `region`.
@@ -175,15 +167,11 @@ fn measure(region: u32, call: Call, [x, y]: [i32; 2], tools: &Tools) {
     }
 }
 
-/// A number format with its root.
 pub trait Number:
     Copy + PartialOrd + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
-    /// Square root of the number.
     fn root(self) -> Self;
-    /// A small integer.
     fn from_small(n: u16) -> Self;
-    /// The tip in it.
     fn constants(tools: &Tools) -> &Constants<Self>;
 }
 
@@ -238,7 +226,6 @@ impl Number for I16F16 {
     }
 }
 
-/// All of them.
 pub const ROOT: &[Variant] = &[
     ("f32, VSQRT", Call::Single(hardware)),
     variant!("f32, micromath", Single f32: |x, _, _| F32Ext::sqrt(x)),

@@ -51,7 +51,6 @@ struct Bench<'a> {
 
 type Kernel = extern "C" fn(&mut Bench);
 
-/// The whole step at each fit level.
 const STEPS: [(&str, FitLevel); 6] = [
     ("Pipeline::step, fit level 0", FitLevel::Sum),
     ("Pipeline::step, fit level 1", FitLevel::Moments),

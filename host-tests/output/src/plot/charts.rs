@@ -18,15 +18,11 @@ const SMOOTH_S: f64 = 0.01;
 /// The world and the controller at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sample {
-    /// When.
     pub time_s: f64,
-    /// Requested force.
     pub goal_n: f64,
     /// The contact force as it is.
     pub true_force_n: f64,
-    /// Travel of the tip.
     pub travel_mm: f64,
-    /// Indentation of the tip.
     pub indentation_mm: f64,
     /// Share of the supply at the motor, -1 to 1; positive presses.
     pub duty: f64,
@@ -35,9 +31,7 @@ pub struct Sample {
 /// A stretch of the run to look at more closely.
 #[derive(Clone, Debug)]
 pub struct Panel<'a> {
-    /// Event.
     pub title: String,
-    /// The samples.
     pub samples: &'a [Sample],
     /// The instant that counts as 0.
     pub zero_s: f64,
@@ -59,20 +53,19 @@ pub fn overview(trace: &[Sample]) -> Result<String, PlotError> {
         let frame =
             |title, unit, low, high| Frame { title, x: "time, s", unit, x_range: [0.0, end_s], range: [low, high] };
         frame("Contact force (solid) and goal (dashed)", "N", 0.0, top_n).draw(&panels[0], |chart| {
-            chart.dashed(&goal, GOAL_INK)?;
-            chart.solid(&force, INK)
+            chart.dashed(&goal)?;
+            chart.solid(&force)
         })?;
         let indentation = points(|s| s.indentation_mm);
         let top_mm = top(indentation.iter().map(|(_, mm)| *mm));
-        frame("Indentation of the fingertip", "mm", 0.0, top_mm)
-            .draw(&panels[1], |chart| chart.solid(&indentation, INK))?;
+        frame("Indentation of the fingertip", "mm", 0.0, top_mm).draw(&panels[1], |chart| chart.solid(&indentation))?;
         let duty = points(|s| 100.0 * s.duty);
         let mean = thinned(smoothed(trace.iter().map(|s| (s.time_s, 100.0 * s.duty)).collect()));
         frame("Duty of the bridge: as it was (pale) and its mean of 10 ms", "%", -100.0, 100.0).draw(
             &panels[2],
             |chart| {
                 chart.pale(&duty)?;
-                chart.solid(&mean, INK)
+                chart.solid(&mean)
             },
         )
     })
@@ -98,8 +91,8 @@ fn draw_key(area: &Area<'_>) -> Result<(), PlotError> {
     let range = [0.0, 6.0];
     let context = ChartBuilder::on(area).margin(20 * FINE).build_cartesian_2d(0.0..1.0, range[0]..range[1]);
     let mut chart = Chart { context: context.map_err(failed)?, range };
-    chart.solid(&[(0.08, 5.0), (0.22, 5.0)], INK)?;
-    chart.dashed(&[(0.08, 4.0), (0.22, 4.0)], GOAL_INK)?;
+    chart.solid(&[(0.08, 5.0), (0.22, 5.0)])?;
+    chart.dashed(&[(0.08, 4.0), (0.22, 4.0)])?;
     chart.dotted([(0.15, 2.6), (0.15, 3.4)])?;
     for (y, text) in [(5.0, "contact force"), (4.0, "goal"), (3.0, "earliest arrival that"), (2.4, "the motor allows")]
     {
@@ -123,8 +116,8 @@ fn draw_panel(panel: &Panel<'_>, area: &Area<'_>) -> Result<(), PlotError> {
         if let Some(optimal_ms) = panel.time_optimal_ms {
             chart.upright(optimal_ms)?;
         }
-        chart.dashed(&goal, GOAL_INK)?;
-        chart.solid(&force, INK)
+        chart.dashed(&goal)?;
+        chart.solid(&force)
     })
 }
 
@@ -184,8 +177,8 @@ impl Frame<'_> {
 }
 
 impl Chart<'_, '_> {
-    pub fn solid(&mut self, points: &Points, ink: RGBColor) -> Result<(), PlotError> {
-        self.line(points, ink.stroke_width(2 * FINE))
+    pub fn solid(&mut self, points: &Points) -> Result<(), PlotError> {
+        self.line(points, INK.stroke_width(2 * FINE))
     }
 
     pub fn pale(&mut self, points: &Points) -> Result<(), PlotError> {
@@ -201,8 +194,8 @@ impl Chart<'_, '_> {
         self.context.draw_series(LineSeries::new(points.iter().copied(), style)).map(drop).map_err(failed)
     }
 
-    pub fn dashed(&mut self, points: &Points, ink: RGBColor) -> Result<(), PlotError> {
-        let line = DashedLineSeries::new(points.iter().copied(), 7 * FINE, 4 * FINE, ink.stroke_width(2 * FINE));
+    pub fn dashed(&mut self, points: &Points) -> Result<(), PlotError> {
+        let line = DashedLineSeries::new(points.iter().copied(), 7 * FINE, 4 * FINE, GOAL_INK.stroke_width(2 * FINE));
         self.context.draw_series(line).map(drop).map_err(failed)
     }
 

@@ -24,7 +24,6 @@ pub struct Seen {
     pub end_ns: u64,
     /// Scene time at which its last conversion ended, s.
     pub time_s: f64,
-    /// The codes.
     pub frame: Frame,
     /// Encoder and supply.
     pub sense: Sense,
@@ -64,7 +63,6 @@ impl Clock {
     }
 }
 
-/// A scene's finger.
 pub struct Finger {
     /// The scene's time.
     pub clock: Clock,
@@ -92,9 +90,6 @@ impl std::fmt::Debug for Finger {
 
 impl Finger {
     /// All fingers of a scene, in a world that is frozen until a scene time, s.
-    ///
-    /// # Errors
-    /// The world cannot be simulated.
     pub fn all(scene: &Scene, clock: Clock, moves_from_s: f64) -> Result<Vec<Self>, SimError> {
         let setup = scene.setup();
         let fingers = scene.table("hand").whole("fingers") as usize;
@@ -150,7 +145,6 @@ impl Finger {
         self.joint.grid_ns()
     }
 
-    /// The supply at the bridge.
     pub fn supply_v(&self) -> f64 {
         self.joint.supply_v()
     }
@@ -165,7 +159,6 @@ impl Finger {
         self.joint.encoder_counts(self.clock.time_s(at_ns))
     }
 
-    /// The converters' reference.
     pub fn reference_v(&self) -> f64 {
         self.reference_v
     }
@@ -300,9 +293,6 @@ impl Drop for Joint {
 
 impl Joint {
     /// A hold for each finger of a world at scene time `now_s`.
-    ///
-    /// # Errors
-    /// The world's step is too long.
     pub fn all(scene: &Scene, world: World<Named>, now_s: f64) -> Result<Vec<Self>, SimError> {
         let longest_s = scene.table("world").number("step_us") * 1e-6;
         world.check_step(longest_s)?;
@@ -381,7 +371,6 @@ impl Joint {
         (time_s - state.now_s).max(0.0)
     }
 
-    /// The supply at the bridge.
     pub fn supply_v(&self) -> f64 {
         self.meeting.lock().world.fingers()[self.finger].supply_v()
     }
@@ -406,7 +395,6 @@ impl Joint {
         (world.sense(self.finger, 0), world.truth(self.finger, pressures))
     }
 
-    /// Costs of the effects on contact and drive.
     pub fn costs(&self, of: impl Fn(&ContactEffects, &DriveEffects) -> Vec<Cost>) -> Vec<Cost> {
         let state = self.meeting.lock();
         let finger = &state.world.fingers()[self.finger];

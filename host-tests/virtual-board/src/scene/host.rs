@@ -57,7 +57,6 @@ struct Asked {
     for_grip: bool,
 }
 
-/// A step to show.
 #[derive(Clone, Copy, Debug)]
 pub struct Shown {
     finger: usize,
@@ -67,7 +66,6 @@ pub struct Shown {
 }
 
 impl Shown {
-    /// Step for the watchers.
     pub fn step(&self) -> Step<'_> {
         Step {
             finger: self.finger,
@@ -324,7 +322,6 @@ pub const ID: u8 = 1;
 pub const BYTE_NS: u64 = 3_334;
 /// Bytes of a goal's packet, the longest that is written.
 pub const GOAL_BYTES: u64 = 16;
-/// Bytes of a read's packet.
 pub const READ_BYTES: u64 = 14;
 /// The status registers, read at once.
 const FROM: u16 = address::PRESENT_MODE;
@@ -335,12 +332,10 @@ const BYTES: u16 = address::SUPPLY_MV - FROM;
 pub enum Write {
     /// A goal, mN.
     Goal(i32),
-    /// A request of an event.
     Request(Request),
 }
 
 impl Write {
-    /// The packet that writes it.
     pub fn packet(self) -> Vec<u8> {
         let (register, value) = match self {
             Self::Goal(goal_mn) => (address::GOAL_FORCE_MN, goal_mn.to_le_bytes().to_vec()),
@@ -403,8 +398,8 @@ fn status(bytes: &[u8]) -> Option<Status> {
     Some(Status {
         sequence: word(address::FRAME_COUNTER)? as u32,
         missed_frames: word(address::MISSED_FRAMES)? as u32,
-        mode: mode(byte(address::PRESENT_MODE)?),
-        fault: fault(byte(address::FAULT)?),
+        mode: Mode::of(byte(address::PRESENT_MODE)?).unwrap_or(Mode::Fault),
+        fault: Fault::of(byte(address::FAULT)?),
         limits: Limits(half(address::LIMITS)?),
         contact: Contact {
             force: newtons(word(address::PRESENT_FORCE_MN)?),
@@ -428,12 +423,4 @@ fn status(bytes: &[u8]) -> Option<Status> {
 fn scaled(thousandths: i32, one: i64) -> i32 {
     let bits = (i64::from(thousandths) * one).div_euclid(1000);
     bits.clamp(i32::MIN.into(), i32::MAX.into()) as i32
-}
-
-fn mode(number: u8) -> Mode {
-    Mode::ALL.into_iter().find(|mode| *mode as u8 == number).unwrap_or(Mode::Fault)
-}
-
-fn fault(number: u8) -> Option<Fault> {
-    Fault::ALL.into_iter().find(|fault| *fault as u8 == number)
 }

@@ -24,7 +24,6 @@ use std::time::{Duration, Instant};
 const LOOK: Duration = Duration::from_millis(10);
 /// Time between two reports of progress.
 const REPORT: Duration = Duration::from_secs(1);
-/// Longest time for a tare.
 const TARE: Duration = Duration::from_secs(5);
 
 /// Words for an early end: reason with its number, and what to do.
@@ -68,7 +67,6 @@ impl Procedure<'_> {
         self.tare()
     }
 
-    /// Tares with torque off.
     pub fn tare(&mut self) -> Result<(), Error> {
         self.ready()?;
         self.run.report("tare: nothing may touch the tip");
@@ -95,7 +93,7 @@ impl Procedure<'_> {
             )
             .into());
         }
-        capture::fetch(self.client, now, &|text| self.run.report(text))
+        capture::fetch(self.client, now, self.run.json)
     }
 
     /// Waits until the controller's chip has this temperature.
@@ -149,7 +147,6 @@ impl Procedure<'_> {
         self.session.recorded(name, bytes)
     }
 
-    /// A press of the session.
     pub fn pressed(&self, name: &str) -> Result<Press, Error> {
         let bytes = self.session.records.get(name).ok_or_else(|| format!("the session has no {name}"))?;
         Ok(record::press(bytes, &self.session.before.params).map_err(|why| format!("{name}: {why}"))?)

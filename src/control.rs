@@ -339,7 +339,7 @@ fn share_q12(speed: i32, root: i32) -> i32 {
     (speed / root).clamp(-5120, 5120)
 }
 
-/// The estimate at the last frame.
+/// Estimate of travel, speed and disturbance at the last frame, from the encoder and the voltage.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Observer {
     /// Tip travel from where the observer was zeroed.
@@ -444,11 +444,11 @@ impl Creep {
 }
 
 /// Least temperature that is used, degrees Celsius in Q16.
-const LEAST: i32 = -64 << 16;
+const CELSIUS_MIN: i32 = -64 << 16;
 /// Largest temperature that is used, degrees Celsius in Q16.
-const MOST: i32 = 192 << 16;
+const CELSIUS_MAX: i32 = 192 << 16;
 /// A reading moves the filtered temperature by 2^-10 of the difference.
-const SLOW: u32 = 10;
+const CHIP_FILTER_BITS: u32 = 10;
 
 /// Temperatures from which the array's drift is computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -468,9 +468,9 @@ impl TemperatureDrift {
             self.chip = None;
         }
         let Some(chip) = chip.filter(|_| config.drift.on()) else { return };
-        let chip = chip.to_bits().max(LEAST).min(MOST);
+        let chip = chip.to_bits().max(CELSIUS_MIN).min(CELSIUS_MAX);
         match &mut self.chip {
-            Some(state) => *state += ((i64::from(chip) << 16) - *state) >> SLOW,
+            Some(state) => *state += ((i64::from(chip) << 16) - *state) >> CHIP_FILTER_BITS,
             state => {
                 *state = Some(i64::from(chip) << 16);
                 self.zero = chip;

@@ -127,12 +127,14 @@ impl Scan {
         start_timer();
     }
 
-    /// Copies the frame, less the slots that [`Scan::copy_so_far`] has copied to `frame`. Returns false if it is not whole: a bank is missing, banks and rows are out of step, or the
-    /// DMA wrote to this half meanwhile.
+    /// Copies the frame, less the slots that [`Scan::copy_so_far`] copied: `frame` is the same one then, and unchanged
+    /// since. Returns false if the frame is not whole: a bank is missing, banks and rows are out of step, or the DMA
+    /// wrote to this half meanwhile.
     pub fn copy(&mut self, completed: Completed, frame: &mut Frame) -> bool {
         let half = completed.sequence as usize & 1;
         let arrived = bank_a_completed(half) && !overrun() && in_step();
-        let (sequence, copied) = self.early;
+        // Whatever was copied early counts once: another copy may come before its frame's end.
+        let (sequence, copied) = core::mem::take(&mut self.early);
         let first = if sequence == completed.sequence { copied } else { 0 };
         copy_slots(half, first..SLOTS, frame);
         frame.sequence = completed.sequence;
@@ -147,10 +149,12 @@ impl Scan {
 
     /// Replaces the first slots of `frame` by those that both banks have completed in the scan under way.
     pub fn copy_so_far(&mut self, frame: &mut Frame) {
+        // First: a number that is too old lets the whole frame be copied again.
+        let sequence = newest().sequence.wrapping_add(1);
         let [half_a, half_b] = [STREAM_A, STREAM_B].map(written_half);
         if half_a == half_b {
             let stored = u16::min(stored(STREAM_A) % HALF_LEN, stored(STREAM_B) % HALF_LEN);
-            let (sequence, slots) = (newest().sequence.wrapping_add(1), usize::from(stored) / BANK_COLUMNS);
+            let slots = usize::from(stored) / BANK_COLUMNS;
             copy_slots(half_a, 0..slots, frame);
             // A frame's lowest bit is its half.
             self.early = (sequence, if sequence as usize & 1 == half_a { slots } else { 0 });

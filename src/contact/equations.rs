@@ -149,8 +149,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Prediction<ROWS, COLUMNS> {
         }
     }
 
-    /// Predicts a taxel's pressure alone, as [`Prediction::taxel`]. Not inlined: few of a row's taxels lie in a contact,
-    /// and without this the loop over the row keeps its values in registers.
+    /// Predicts a taxel's pressure alone, as [`Prediction::taxel`]. Not inlined: few taxels of a row lie in a contact, and
+    /// the loop over the row then keeps its values in registers.
     #[inline(never)]
     fn pressure(&self, square: u32, geometry: &Geometry) -> i32 {
         self.taxel(square, &geometry.nodes).pressure

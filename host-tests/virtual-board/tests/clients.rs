@@ -163,15 +163,3 @@ fn a_tcp_client_pings() {
     }
     assert!(board.interrupt());
 }
-
-#[test]
-fn a_port_that_is_taken_is_said() {
-    let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("some port is free");
-    let port = taken.local_addr().expect("it is bound").port();
-    let mut command = Command::new(env!("CARGO_BIN_EXE_virtual-board"));
-    command.arg("serve").arg("--image").arg(named("FINGERTIP_IMAGE")).args(["--tcp", &port.to_string()]);
-    let output = command.output().expect("it starts");
-    assert!(!output.status.success());
-    let complained = String::from_utf8_lossy(&output.stderr);
-    assert!(complained.contains(&format!("cannot open TCP port {port}")), "{complained}");
-}

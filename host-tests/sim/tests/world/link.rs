@@ -176,16 +176,6 @@ fn a_step_that_is_no_whole_number_of_units_counts_as_the_nearest() {
 }
 
 #[test]
-fn at_the_end_of_a_day_time_goes_on_as_at_its_start() {
-    let (mut early, mut late) = (Clock::default(), Clock::from_start(DAY_S));
-    for _ in 0..10_000 {
-        early.go_on(1523.0 / 168e6);
-        late.go_on(1523.0 / 168e6);
-        assert_eq!(early.since(Clock::default()), late.since(Clock::from_start(DAY_S)));
-    }
-}
-
-#[test]
 fn a_run_is_the_same_at_any_hour() {
     let scene =
         scene("duration_s = 0.4\n[[script]]\nat_s = 0.01\ngoal_n = 1.0\n[effects.noise]\n[effects.relaxation]\n");

@@ -25,7 +25,6 @@ fn stretch() -> impl Strategy<Value = Stretch> {
         .prop_map(|(frames, rest, spread, contact, model_q8)| Stretch { frames, rest, spread, contact, model_q8 })
 }
 
-/// A loop that takes time.
 struct Loop {
     budget: Budget,
     taken: u32,

@@ -202,7 +202,6 @@ fn missed_frames_are_counted() {
     assert!(status.limits.has(Limits::FRAME_MISSED));
 }
 
-/// Ends of a grip.
 type End = fn(&mut Bench);
 
 /// More dead taxels than allowed short a driven motor in the middle of a frame. The verdict is left to the step.

@@ -68,7 +68,6 @@ fn frames_have_true_times(rig: &mut Rig) {
     assert!((980..=1_020).contains(&force_mn), "{force_mn} mN");
 }
 
-/// A packet for all devices.
 fn broadcast(instruction: u8, params: &[u8]) -> Vec<u8> {
     let mut packet = Reply::new();
     let mut sender = Sender::new(&mut packet, 254, instruction);

@@ -103,7 +103,6 @@ impl Board {
         Self { name: name.to_owned(), child }
     }
 
-    /// Ctrl-C.
     fn interrupt(mut self) -> bool {
         let pid = i32::try_from(self.child.id()).expect("a process number");
         let pid = rustix::process::Pid::from_raw(pid).expect("a process number");

@@ -17,7 +17,6 @@ pub const FRAME_S: f64 = 0.5e-3;
 pub const FRAME_NS: u32 = 500_000;
 const TARE_FRAMES: usize = 256;
 
-/// Drawn properties of a finger.
 #[derive(Clone, Debug, Default)]
 pub struct Draw {
     pub seed: u64,
@@ -115,7 +114,6 @@ pub enum Part {
     Hold { ends_s: Vec<f64> },
 }
 
-/// A finger with its array.
 pub struct Finger {
     draw: Draw,
     setup: Setup,

@@ -424,7 +424,6 @@ struct RigReading {
     pub supply_v: f64,
 }
 
-/// The drive in motion.
 struct Rig {
     pub drive: SimulatedDrive,
     rng: fastrand::Rng,

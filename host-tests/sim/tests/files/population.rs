@@ -111,7 +111,6 @@ fn values(population: &Population, key: &str) -> Vec<f64> {
     values
 }
 
-/// Least, quartiles and largest.
 fn quartiles(values: &[f64]) -> [f64; 5] {
     [0, DRAWN / 4, DRAWN / 2, 3 * DRAWN / 4, DRAWN - 1].map(|rank| values[rank])
 }

@@ -152,7 +152,6 @@ fn values_are_shown_with_the_digits_that_count() {
 const LIBRARY: &str =
     include_str!(concat!(env!("FINGERTIP_ROOT"), "/host-tests/sim/src/report/uplot/uPlot.iife.min.js"));
 
-/// Runs a scene with its trace.
 fn traced(scene: &Scene) -> (Trace, Outcome) {
     let mut trace = Trace::new(scene.duration_s);
     let outcome = run(scene, &native::board, &mut [&mut trace]).unwrap();
@@ -336,7 +335,6 @@ fn a_recording_holds_what_viewers_look_for() {
     assert_eq!((attachment.name.as_str(), &attachment.data[..]), ("wall.toml", wall().text.as_bytes()));
 }
 
-/// A part of a recording.
 enum Part<'a> {
     Metadata(&'a mut Metadata),
     Scene(&'a mut Vec<u8>),

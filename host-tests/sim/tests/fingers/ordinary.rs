@@ -11,7 +11,6 @@ use sim::{native, population};
 use std::ops::Range;
 use std::sync::OnceLock;
 
-/// Result of a run.
 #[derive(Debug)]
 struct Ran {
     /// Script and tables.
@@ -20,7 +19,6 @@ struct Ran {
     last: Last,
 }
 
-/// The promises of `ordinary`.
 fn envelope() -> &'static [Bound] {
     static ENVELOPE: OnceLock<Vec<Bound>> = OnceLock::new();
     ENVELOPE.get_or_init(|| {
@@ -46,12 +44,10 @@ fn holds(goal_n: f64, tables: &str) -> Ran {
 }
 
 impl Ran {
-    /// A metric.
     fn of(&self, metric: &str) -> f64 {
         self.outcome.measured.get(metric).unwrap_or_else(|| panic!("no {metric}"))
     }
 
-    /// Checks that a metric is in a range.
     fn has(self, metric: &str, range: Range<f64>) -> Self {
         assert!(range.contains(&self.of(metric)), "{metric} is {}:\n{}", self.of(metric), self.finger);
         self
@@ -65,7 +61,6 @@ impl Ran {
         self
     }
 
-    /// Checks that every promise is kept.
     fn keeps_all(self) -> Self {
         self.keeps_all_but(&[])
     }
@@ -86,7 +81,6 @@ impl Ran {
     }
 }
 
-/// The last state of a run.
 #[derive(Debug, Default)]
 struct Last {
     truth: Truth,

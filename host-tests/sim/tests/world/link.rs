@@ -93,7 +93,6 @@ fn bursts_come_and_last_as_asked() {
 
 #[test]
 fn a_lost_goal_arrives_with_the_next_repetition() {
-    /// Loses the packets with these numbers.
     struct Loses(Vec<usize>, usize);
     impl Stages for Loses {
         fn pass(&mut self, sent_s: f64) -> Option<f64> {
@@ -149,7 +148,6 @@ const DAY_S: f64 = 86_400.0;
 const SLOT_TICKS: f64 = 1523.0;
 const TIMER_HZ: f64 = 168e6;
 
-/// Clock after a number of equal steps.
 fn after(steps: u32, step_s: f64) -> Clock {
     let mut clock = Clock::default();
     (0..steps).for_each(|_| clock.go_on(step_s));

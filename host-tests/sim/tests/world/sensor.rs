@@ -114,7 +114,6 @@ fn an_effects_numbers_are_its_own() {
     assert_ne!(scan(&mut stages(noise, 1), 100, 1), scan(&mut stages(noise, 2), 100, 1));
 }
 
-/// Reading of a taxel under a pressure.
 fn reads(effect: &mut dyn Pressure, time_s: f64, kpa: f64) -> f64 {
     let mut row = all(kpa);
     effect.apply(3, time_s, &mut row);

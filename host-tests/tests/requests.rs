@@ -75,10 +75,13 @@ fn tares(board: &mut Bench, frames: u32, name: &str) {
     assert_eq!(board.step().tare, Taring::Done, "{name}");
 }
 
-/// Each board with what comes in the frame of the request, and the mode after the tare.
+/// What else comes in the frame of a request.
+type Change = fn(&mut Bench);
+
+/// Each board with the mode after the tare.
 #[test]
 fn a_tare_that_comes_with_another_request_is_done() {
-    let cases: [(&str, Bench, fn(&mut Bench), Mode); 4] = [
+    let cases: [(&str, Bench, Change, Mode); 4] = [
         ("torque off", ready(), |board| board.command().torque = false, Mode::Off),
         ("torque off and on again, before the loop looks", ready(), |_| {}, Mode::Release),
         ("the clearing of a fault", faulted(), |board| board.command().clear_request += 1, Mode::Off),

@@ -254,7 +254,6 @@ fn taxels_that_are_masked_are_no_fault_any_more() {
 /// Arrays of each test.
 const ARRAYS: u64 = 120;
 
-/// A finger with a randomly drawn array.
 struct Finger {
     rng: Rng,
     pipeline: Pipeline,

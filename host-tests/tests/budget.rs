@@ -25,7 +25,6 @@ fn stretch() -> impl Strategy<Value = Stretch> {
         .prop_map(|(frames, rest, spread, contact, model_q8)| Stretch { frames, rest, spread, contact, model_q8 })
 }
 
-/// A loop that takes time.
 struct Loop {
     budget: Budget,
     taken: u32,
@@ -207,26 +206,19 @@ fn it_falls_at_once_where_the_dearest_frame_would_not_fit() {
     assert_eq!(at(FitLevel::Sum).next(FitLevel::Sum, CoreCycles(2 * TICKS), CoreCycles(TICKS)), FitLevel::Sum);
 }
 
-#[test]
-fn it_rises_where_the_next_effort_fits_with_room() {
-    for fit_level in [FitLevel::Sum, FitLevel::Moments, FitLevel::OneRow, FitLevel::TwoRows, FitLevel::FiveRows] {
-        let longest = USABLE - ROOM - most(fit_level.higher());
-        for (taken, rises) in [(longest, Some((WINDOW, fit_level.higher()))), (longest + 1, None)] {
-            let mut budget = at(fit_level);
-            assert_eq!(frames_to_change(&mut budget, FitLevel::AllRows, taken, 20 * WINDOW), rises, "{fit_level:?}");
-        }
-    }
-}
-
 /// Measured frames with a contact include at least the model's minimum, so the rest is shorter by it.
 #[test]
-fn with_a_contact_the_models_least_is_taken_off() {
-    let (fit_level, next) = (FitLevel::OneRow, FitLevel::TwoRows);
-    let longest = USABLE - ROOM - most(next) + Budget::model_cycles(fit_level)[1];
-    for (taken, rises) in [(longest, Some((WINDOW, next))), (longest + 1, None)] {
-        let mut budget = at(fit_level);
-        budget.note(Some(true));
-        assert_eq!(frames_to_change(&mut budget, FitLevel::AllRows, taken, 20 * WINDOW), rises, "{taken}");
+fn it_rises_where_the_next_effort_fits_with_room() {
+    let levels = [FitLevel::Sum, FitLevel::Moments, FitLevel::OneRow, FitLevel::TwoRows, FitLevel::FiveRows];
+    for (fit_level, contact) in levels.into_iter().flat_map(|fit_level| [(fit_level, false), (fit_level, true)]) {
+        let included = if contact { Budget::model_cycles(fit_level)[1] } else { 0 };
+        let longest = USABLE - ROOM - most(fit_level.higher()) + included;
+        for (taken, rises) in [(longest, Some((WINDOW, fit_level.higher()))), (longest + 1, None)] {
+            let mut budget = at(fit_level);
+            budget.note(Some(contact));
+            let found = frames_to_change(&mut budget, FitLevel::AllRows, taken, 20 * WINDOW);
+            assert_eq!(found, rises, "{fit_level:?}, contact {contact}, {taken} cycles");
+        }
     }
 }
 

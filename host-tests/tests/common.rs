@@ -35,7 +35,6 @@ pub fn seeded(cases: u32, seed: u64) -> ProptestConfig {
     ProptestConfig { cases, rng_seed: RngSeed::Fixed(seed), failure_persistence: None, ..ProptestConfig::default() }
 }
 
-/// Row and column of every taxel.
 pub fn places() -> impl Iterator<Item = (usize, usize)> {
     (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column)))
 }
@@ -57,7 +56,6 @@ pub fn allowed(params: Params) -> Config {
     Config::shipped(&params).expect("allowed")
 }
 
-/// Frame time of a configuration.
 pub fn frame_s(config: &Config) -> f64 {
     f64::from(config.timing.frame_ns) * 1e-9
 }
@@ -140,7 +138,6 @@ impl<const BYTES: usize> Recorded<BYTES> {
     }
 }
 
-/// True if the motor is driven in this mode.
 pub fn drives(mode: Mode) -> bool {
     !matches!(mode, Mode::Off | Mode::Tare | Mode::Fault)
 }

@@ -98,57 +98,6 @@ fn sums_are_doubted_by_what_reaches_over_the_edge_or_is_hidden() {
     assert!(both > 10, "{kinds:?}");
 }
 
-/// The parabola's share of a taxel against the model's pressure over it, for a centred contact of 1.5 mm. A taxel alone
-/// hides too little: all at the same distance are marked bad, and the four in the middle where these still hide too
-/// little.
-#[test]
-fn the_share_that_a_bad_taxel_hides_is_that_of_the_models_pressure() {
-    let mut rng = Rng::with_seed(4);
-    let pressures = crate::common::plane(PITCH_MM, 1.5, 0.0, 0.0).pressures();
-    let all: f64 = pressures.iter().flatten().sum();
-    let whole = plane(1.5, [0.0, 0.0], 0.0, NONE, &mut rng);
-    // The sums stay those of the whole contact: its radius is right.
-    let marked = |bad: [u32; ROWS]| share_of(doubt_of_sums(&TactileImage { bad, ..whole }));
-    let ring = |row: usize, column: usize| {
-        let distance = |row: usize, column: usize| (2 * row as i32 - 9).pow(2) + (2 * column as i32 - 9).pow(2);
-        let mut bad = NONE;
-        for taxel in 0..ROWS * 10 {
-            let equal = distance(taxel / 10, taxel % 10) == distance(row, column);
-            bad[taxel / 10] |= u32::from(equal) << (taxel % 10);
-        }
-        bad
-    };
-    let count = |bad: &[u32; ROWS]| f64::from(bad.iter().map(|row| row.count_ones()).sum::<u32>());
-    let middle = ring(4, 4);
-    let base = marked(middle);
-    for (row, column) in [(4, 4), (4, 3), (3, 3), (4, 2), (3, 2)] {
-        let bad = ring(row, column);
-        let right = pressures[row][column] / all;
-        let share = if count(&bad) * right > 0.15 {
-            marked(bad)
-        } else {
-            marked(core::array::from_fn(|row| bad[row] | middle[row])) - base
-        } / count(&bad);
-        assert!((0.75..1.25).contains(&(share / right)), "({row}, {column}): {share}, {right} by the model");
-    }
-}
-
-/// Half of the rows are bad under a centred contact: half of its force is hidden. Each row more hides no less.
-#[test]
-fn half_of_a_contact_is_hidden_by_half_of_the_rows() {
-    let mut rng = Rng::with_seed(7);
-    for d_mm in [0.2, 0.5, 1.0, 1.5, 2.0, 2.5] {
-        let whole = plane(d_mm, [0.0, 0.0], 0.0, NONE, &mut rng);
-        let doubts = [0, 1, 2, 3, 4, 5, 6].map(|rows| {
-            // The sums stay those of the whole contact: its radius is right.
-            let bad = core::array::from_fn(|row| if row < rows { (1 << 10) - 1 } else { 0 });
-            doubt_of_sums(&TactileImage { bad, ..whole })
-        });
-        assert!(doubts.is_sorted(), "{d_mm} mm: {doubts:?}");
-        assert!(doubts[5] > 220, "{d_mm} mm: {doubts:?}");
-    }
-}
-
 /// One bad taxel under a contact of 42 to 380 mN. The sums miss the hidden share h: their squared radius is too small,
 /// and their share too large, by the root of 1 - h; apart from that it is right to a tenth. A taxel that is not in the
 /// middle moves the estimated centre away, which makes the share smaller by up to a quarter.

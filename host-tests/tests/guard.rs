@@ -279,7 +279,6 @@ fn the_wrong_way_ends_within_half_a_millimetre() {
     }
 }
 
-/// Counts that make a travel.
 fn counts(travel_mm: f64, config: &Config) -> i32 {
     (travel_mm / count_mm(config)).round() as i32
 }
@@ -357,7 +356,6 @@ impl Finger {
         self.pushed(0)
     }
 
-    /// Advances frames without a fault.
     fn frames(&mut self, count: u32) {
         assert_eq!((0..count).find_map(|_| self.frame()), None);
     }

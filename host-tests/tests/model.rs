@@ -299,27 +299,11 @@ fn the_reference_tip_is_correctly_rounded_at_both_ends_and_in_the_middle() {
 }
 
 #[test]
-fn the_pressure_is_correctly_rounded_and_falls_with_the_distance_on_a_grid() {
+fn grids_boundaries_and_random_points_of_the_model_hold() {
     hold(&exact::pressures(&reference_tip(), 100, 1_000, &quiet));
-}
-
-#[test]
-fn the_boundaries_of_the_domain_hold() {
     hold(&random::boundaries(&quiet));
-}
-
-#[test]
-fn random_points_of_the_domain_hold() {
     hold(&random::points(0..5_000, &quiet));
-}
-
-#[test]
-fn the_touching_angle_holds_over_the_reference_tip() {
     hold(&random::touching_angles(&reference_tip(), 5_000, &quiet));
-}
-
-#[test]
-fn the_rest_of_the_model_holds() {
     hold(&reference::geometry(0..2_000, &quiet));
     hold(&reference::tilt(0..2_000, &quiet));
     hold(&reference::friction(0..2_000, &quiet));
@@ -347,7 +331,7 @@ fn a_pattern_fed_for_ever_ends_in_a_cycle_no_wider_than_the_pattern_makes_it() {
     assert!(swinging.high < 16_384.0 && swinging.high > 15_000.0, "{swinging:?}");
 }
 
-/// What `the_boundaries_of_the_domain_hold` leaves out of the functions of the depth.
+/// Functions of the depth that `random::boundaries` leaves out.
 #[test]
 fn peak_and_mean_pressure_at_the_boundaries() {
     for tip in boundary_tips() {
@@ -361,27 +345,27 @@ fn peak_and_mean_pressure_at_the_boundaries() {
 }
 
 #[test]
-fn no_depth_at_all() {
+fn a_depth_or_force_outside_the_domain_counts_as_the_nearest() {
     for tip in boundary_tips() {
         for d in [0, -1, i32::MIN] {
-            assert_eq!(tip.force(mm(d)).to_bits(), 0);
-            assert_eq!(tip.contact_radius(mm(d)).to_bits(), 0);
-            assert_eq!(tip.stiffness(mm(d)).to_bits(), 0);
-            assert_eq!(paper::touching_angle_max(&tip, mm(d)).to_bits(), 0);
-            assert_eq!(tip.pressure(mm(0), mm(d)).to_bits(), 0);
+            let (radius, angle) =
+                (tip.contact_radius(mm(d)).to_bits(), paper::touching_angle_max(&tip, mm(d)).to_bits());
+            let (force, stiffness) = (tip.force(mm(d)).to_bits(), tip.stiffness(mm(d)).to_bits());
+            assert_eq!(
+                [radius, angle, force, stiffness, tip.pressure(mm(0), mm(d)).to_bits()],
+                [0; 5],
+                "{tip:?}, d {d}"
+            );
         }
-    }
-}
-
-#[test]
-fn a_depth_beyond_the_deepest() {
-    for tip in boundary_tips() {
-        let deepest = tip.depth_max().to_bits();
-        for beyond in [deepest + 1, tip.radius().to_bits(), i32::MAX] {
-            assert_eq!(tip.force(mm(beyond)), tip.force_max());
-            assert_eq!(tip.contact_radius(mm(beyond)), tip.contact_radius(mm(deepest)));
-            assert_eq!(paper::touching_angle_max(&tip, mm(beyond)), paper::touching_angle_max(&tip, mm(deepest)));
+        let deepest = tip.depth_max();
+        for beyond in [deepest.to_bits() + 1, tip.radius().to_bits(), i32::MAX].map(mm) {
+            let at = |d| (tip.force(d), tip.contact_radius(d), paper::touching_angle_max(&tip, d));
+            assert_eq!(at(beyond), at(deepest), "{tip:?}");
+            assert_eq!(tip.force(beyond), tip.force_max(), "{tip:?}");
         }
+        let at = |force| (tip.indentation(force), tip.stiffness_at_force(force));
+        assert_eq!(at(newtons(i32::MAX)), at(tip.force_max()), "{tip:?}");
+        assert!(tip.indentation(newtons(i32::MAX)) <= deepest, "{tip:?}");
     }
 }
 
@@ -412,15 +396,6 @@ fn a_force_within_one_unit_of_zero() {
             let moved = tip.indentation(newtons(force + 1)).to_bits() - tip.indentation(newtons(force)).to_bits();
             assert!((0..=first).contains(&moved), "F {force}: {moved} of {first}");
         }
-    }
-}
-
-#[test]
-fn a_force_beyond_the_deepest() {
-    for tip in boundary_tips() {
-        assert_eq!(tip.indentation(newtons(i32::MAX)), tip.indentation(tip.force_max()));
-        assert!(tip.indentation(newtons(i32::MAX)) <= tip.depth_max());
-        assert_eq!(tip.stiffness_at_force(newtons(i32::MAX)), tip.stiffness_at_force(tip.force_max()));
     }
 }
 

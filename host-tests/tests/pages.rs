@@ -185,7 +185,6 @@ fn in_a_word(letter: char) -> bool {
     letter.is_alphanumeric() || letter == '-'
 }
 
-/// True if a help text lists a command.
 fn lists(help: &str, name: &str) -> bool {
     let commands =
         help.split("\nCommands:\n").skip(1).flat_map(|section| section.lines().take_while(|line| !line.is_empty()));

@@ -67,40 +67,32 @@ fn taring(frames: u32) -> Bench {
 }
 
 /// A tare lasts for these frames.
-fn tares(board: &mut Bench, frames: u32) {
+fn tares(board: &mut Bench, frames: u32, name: &str) {
     for _ in 0..frames {
         let Status { mode, tare, duty, .. } = board.step();
-        assert_eq!((mode, tare, duty), (Mode::Tare, Taring::Running, Duty::ZERO));
+        assert_eq!((mode, tare, duty), (Mode::Tare, Taring::Running, Duty::ZERO), "{name}");
     }
-    assert_eq!(board.step().tare, Taring::Done);
+    assert_eq!(board.step().tare, Taring::Done, "{name}");
 }
 
-#[test]
-fn a_tare_that_comes_with_torque_off_is_done() {
-    let mut board = ready();
-    assert_eq!(board.step().mode, Mode::Release);
-    board.command().torque = false;
-    board.command().tare_request += 1;
-    tares(&mut board, TARE_FRAMES);
-    assert_eq!(board.step().mode, Mode::Off);
-}
+/// What else comes in the frame of a request.
+type Change = fn(&mut Bench);
 
-/// Off, the tare and on again before the loop looks.
+/// Each board with the mode after the tare.
 #[test]
-fn a_tare_between_torque_off_and_on_is_done() {
-    let mut board = ready();
-    board.command().tare_request += 1;
-    tares(&mut board, TARE_FRAMES);
-    assert_eq!((board.status().mode, board.step().mode), (Mode::Off, Mode::Release));
-}
-
-#[test]
-fn a_tare_that_comes_with_the_clearing_of_a_fault_is_done() {
-    let mut board = faulted();
-    board.command().clear_request += 1;
-    board.command().tare_request += 1;
-    tares(&mut board, TARE_FRAMES);
-    assert_eq!(board.step().fault, None);
+fn a_tare_that_comes_with_another_request_is_done() {
+    let cases: [(&str, Bench, Change, Mode); 4] = [
+        ("torque off", ready(), |board| board.command().torque = false, Mode::Off),
+        ("torque off and on again, before the loop looks", ready(), |_| {}, Mode::Release),
+        ("the clearing of a fault", faulted(), |board| board.command().clear_request += 1, Mode::Off),
+        ("another tare under way", taring(100), |_| {}, Mode::Off),
+    ];
+    for (name, mut board, change, after) in cases {
+        change(&mut board);
+        board.command().tare_request += 1;
+        tares(&mut board, TARE_FRAMES, name);
+        assert_eq!((board.status().mode, board.step().mode), (Mode::Off, after), "{name}");
+    }
 }
 
 #[test]
@@ -127,13 +119,6 @@ fn a_fault_ends_a_tare_for_all_to_see() {
     assert_eq!(board.status().tare, Taring::Refused);
 }
 
-#[test]
-fn a_second_tare_during_a_tare_begins_anew() {
-    let mut board = taring(100);
-    board.command().tare_request += 1;
-    tares(&mut board, TARE_FRAMES);
-}
-
 /// The array is the same, so is its tare, to the rounding of its means.
 #[test]
 fn a_tare_does_not_depend_on_the_one_before() {
@@ -154,7 +139,7 @@ fn a_tare_does_not_depend_on_the_one_before() {
 fn new_parameters_during_a_tare_begin_it_anew() {
     let mut board = taring(100);
     board.pipeline().configure(&config());
-    tares(&mut board, TARE_FRAMES - 1);
+    tares(&mut board, TARE_FRAMES - 1, "new parameters");
 }
 
 #[test]
@@ -297,7 +282,8 @@ fn torque_that_was_on_before_the_tare_drives_nothing_until_it_was_off() {
         board.command().goal = newtons(1_000);
         board.frames(off_first);
         board.command().torque = true;
-        board.frames(frames);
+        let Status { mode, limits, .. } = board.frames(frames);
+        assert!(frames == 0 || mode == Mode::Off && limits.has(Limits::NOT_TARED), "{off_first}, {frames}: {mode:?}");
         board.command().tare_request += 1;
         for _ in 0..2 * TARE_FRAMES {
             let status = board.step();

@@ -312,13 +312,9 @@ fn of_values(values: &[(&str, i32)], sequence: u32) -> Vec<u8> {
 /// Difference of another firmware's records.
 #[derive(Clone, Copy, Debug)]
 enum Other {
-    /// No difference.
     None,
-    /// One more parameter.
     More,
-    /// One parameter fewer.
     Fewer,
-    /// One parameter has another name.
     Renamed,
 }
 

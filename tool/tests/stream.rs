@@ -79,7 +79,6 @@ impl Listener {
     }
 }
 
-/// Address of a stream that was started.
 fn address(child: &mut Child) -> String {
     let line = line_with("ws://", child.stderr.take().expect("a pipe"));
     line.split("ws://").nth(1).and_then(|rest| rest.split(';').next()).expect("an address").to_owned()

@@ -95,9 +95,15 @@ fn tcp_takes_one_client_after_another_and_says_so() {
     let served = Served::begin(Stdio::piped(), &["--tcp", "0"]);
     let mut first = TcpStream::connect(&served.name).expect("it listens");
     pings(&mut first);
-    let mut words = String::new();
-    TcpStream::connect(&served.name).expect("it listens").read_to_string(&mut words).expect("words, and an end");
-    assert!(words.starts_with("busy: 127.0.0.1:") && words.ends_with("one client at a time\n"), "{words}");
+    for speaks_first in [false].into_iter().chain([true; 50]) {
+        let (mut words, mut second) = (String::new(), TcpStream::connect(&served.name).expect("it listens"));
+        if speaks_first {
+            second.write_all(&PING).expect("the system takes it");
+        }
+        // The system may report a reset after the words of a connection that was closed with bytes unread.
+        let _ = second.read_to_string(&mut words);
+        assert!(words.starts_with("busy: 127.0.0.1:") && words.ends_with("one client at a time\n"), "{words}");
+    }
     pings(&mut first);
     drop(first);
     // The first client's end may be reported after the second one's connection.
@@ -110,20 +116,6 @@ fn tcp_takes_one_client_after_another_and_says_so() {
     }
     let (well, _, complained) = served.interrupt();
     assert!(well && complained.contains("refused "), "{complained}");
-}
-
-#[test]
-fn a_busy_port_says_so_also_to_who_speaks_first() {
-    let served = Served::begin(Stdio::piped(), &["--tcp", "0"]);
-    let _first = TcpStream::connect(&served.name).expect("it listens");
-    for _ in 0..50 {
-        let mut words = [0; 100];
-        let mut second = TcpStream::connect(&served.name).expect("it listens");
-        second.write_all(&PING).expect("the system takes it");
-        let count = second.read(&mut words).expect("words");
-        let words = String::from_utf8_lossy(&words[..count]);
-        assert!(words.starts_with("busy: 127.0.0.1:") && words.ends_with("at a time\n"), "{words}");
-    }
 }
 
 #[test]

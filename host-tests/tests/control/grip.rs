@@ -8,14 +8,18 @@ use fingertip::config::Config;
 use fingertip::control::Reference;
 use fingertip::grip::{Goal, Grip};
 use fingertip::touch::{Stage, Touch, TouchInputs};
+use std::sync::LazyLock;
+
+/// The reference finger.
+static CONFIG: LazyLock<Config> = LazyLock::new(config);
 
 /// Position error that a calm loop accepts: 0.4 um.
 const SLACK: Millimetres = Millimetres::from_bits((1 << 24) / 2_500);
 
 /// A contact of this force that the array sees completely.
-fn contact(force_mn: i32, config: &Config) -> Contact {
+fn contact(force_mn: i32) -> Contact {
     let force = newtons(force_mn);
-    Contact { force, indentation: config.tip.indentation(force), confidence: 255, ..Contact::default() }
+    Contact { force, indentation: CONFIG.tip.indentation(force), confidence: 255, ..Contact::default() }
 }
 
 /// The tip at rest at a travel.
@@ -26,10 +30,10 @@ fn at(travel: Millimetres) -> SpeedLoop {
 }
 
 /// The tip at rest for a while.
-fn calm_at(travel: Millimetres, config: &Config) -> SpeedLoop {
+fn calm_at(travel: Millimetres) -> SpeedLoop {
     let mut motion = at(travel);
-    for _ in 0..10 * config.settled_frames {
-        motion.schedule.note(Millimetres::ZERO, config);
+    for _ in 0..10 * CONFIG.settled_frames {
+        motion.schedule.note(Millimetres::ZERO, &CONFIG);
     }
     motion
 }
@@ -43,14 +47,8 @@ fn plus(a: Millimetres, b: Millimetres) -> Millimetres {
 }
 
 /// The reference over a distance, and the flag that the speed limit sets.
-fn over(
-    distance: Millimetres,
-    slack: Millimetres,
-    limit: MillimetresPerSecond,
-    motion: SpeedLoop,
-    config: &Config,
-) -> (Reference, u16) {
-    let (reference, limited) = { motion }.towards(distance, slack, limit, config);
+fn over(distance: Millimetres, slack: Millimetres, limit: MillimetresPerSecond, motion: SpeedLoop) -> (Reference, u16) {
+    let (reference, limited) = { motion }.towards(distance, slack, limit, &CONFIG);
     (reference, if limited { Limits::SPEED } else { 0 })
 }
 
@@ -59,8 +57,8 @@ fn is_fast(reference: Reference) -> bool {
 }
 
 /// Travel that a shorted motor coasts from this speed, mm.
-fn coasts_mm(speed: MillimetresPerSecond, config: &Config) -> f64 {
-    speed.0.to_num::<f64>() / (f64::from(config.damping_q17_per_s) / 131_072.0)
+fn coasts_mm(speed: MillimetresPerSecond) -> f64 {
+    speed.0.to_num::<f64>() / (f64::from(CONFIG.damping_q17_per_s) / 131_072.0)
 }
 
 /// A grip with its touch, frame by frame.
@@ -68,63 +66,69 @@ fn coasts_mm(speed: MillimetresPerSecond, config: &Config) -> f64 {
 struct Hand {
     grip: Grip,
     touch: Touch,
+    config: &'static Config,
 }
 
 impl Hand {
+    /// Before the first frame.
+    fn new() -> Self {
+        Self { grip: Grip::default(), touch: Touch::default(), config: &CONFIG }
+    }
+
     /// Nothing touches.
-    fn free(config: &Config) -> Self {
-        let mut hand = Self { grip: Grip::default(), touch: Touch::default() };
-        hand.see(&Contact::default(), at(mm(4.0)), config);
+    fn free() -> Self {
+        let mut hand = Self::new();
+        hand.see(&Contact::default(), at(mm(4.0)));
         hand
     }
 
-    fn pressing(config: &Config) -> (Self, Contact, Millimetres) {
-        Self::pressing_with(1_000, config)
+    fn pressing() -> (Self, Contact, Millimetres) {
+        Self::pressing_with(1_000)
     }
 
     /// Presses with this force on a surface that it found at 5 mm; the contact and the travel.
-    fn pressing_with(force_mn: i32, config: &Config) -> (Self, Contact, Millimetres) {
-        let mut hand = Self::free(config);
+    fn pressing_with(force_mn: i32) -> (Self, Contact, Millimetres) {
+        let mut hand = Self::free();
         // The weakest contact comes first: the place of a touch is known only after its force has risen.
-        let least = Contact { force: config.contact_on, ..contact(40, config) };
-        hand.frame(force_mn, &least, at(plus(mm(5.0), least.indentation)), config);
+        let least = Contact { force: CONFIG.contact_on, ..contact(40) };
+        hand.frame(force_mn, &least, at(plus(mm(5.0), least.indentation)));
         assert!(hand.touch.held() && !hand.touch.placed());
-        let held = contact(force_mn, config);
+        let held = contact(force_mn);
         let travel = plus(mm(5.0), held.indentation);
         // Two frames: one alone is no reference for a step.
         for _ in 0..2 {
-            hand.frame(force_mn, &held, at(travel), config);
+            hand.frame(force_mn, &held, at(travel));
         }
         assert!(hand.touch.placed());
         (hand, held, travel)
     }
 
-    fn see(&mut self, contact: &Contact, motion: SpeedLoop, config: &Config) {
+    fn see(&mut self, contact: &Contact, motion: SpeedLoop) {
         let presses = self.grip.mode(&self.touch) != Mode::Release;
         let felt = TouchInputs { contact, summed: contact.force, travel: motion.observer.travel, presses };
-        self.touch.observe(&felt, || Millimetres::ZERO, config);
+        self.touch.observe(&felt, || Millimetres::ZERO, self.config);
     }
 
     /// A frame; the reference, and the flags that it sets.
-    fn frame(&mut self, goal_mn: i32, contact: &Contact, motion: SpeedLoop, config: &Config) -> (Reference, u16) {
-        self.frame_of(newtons(goal_mn), contact, motion, config)
+    fn frame(&mut self, goal_mn: i32, contact: &Contact, motion: SpeedLoop) -> (Reference, u16) {
+        self.frame_of(newtons(goal_mn), contact, motion)
     }
 
-    fn frame_of(&mut self, goal: Newtons, contact: &Contact, motion: SpeedLoop, config: &Config) -> (Reference, u16) {
-        self.see(contact, motion, config);
-        self.reference(goal, contact, motion, config)
+    fn frame_of(&mut self, goal: Newtons, contact: &Contact, motion: SpeedLoop) -> (Reference, u16) {
+        self.see(contact, motion);
+        self.reference(goal, contact, motion)
     }
 
-    fn reference(&mut self, force: Newtons, contact: &Contact, motion: SpeedLoop, config: &Config) -> (Reference, u16) {
+    fn reference(&mut self, force: Newtons, contact: &Contact, motion: SpeedLoop) -> (Reference, u16) {
         let (goal, mut limits) = (Goal { force, drift: Newtons::ZERO }, Limits::default());
-        let reference = self.grip.reference(&goal, contact, &mut self.touch, &mut { motion }, config, &mut limits);
+        let reference = self.grip.reference(&goal, contact, &mut self.touch, &mut { motion }, self.config, &mut limits);
         (reference, limits.0)
     }
 
     /// The travel at which a release rests: there the reference changes its sign.
-    fn rest_mm(&self, contact: &Contact, config: &Config) -> f64 {
+    fn rest_mm(&self, contact: &Contact) -> f64 {
         let forward = |travel_mm: f64| {
-            let (reference, _) = { *self }.reference(Newtons::ZERO, contact, at(mm(travel_mm)), config);
+            let (reference, _) = { *self }.reference(Newtons::ZERO, contact, at(mm(travel_mm)));
             reference.speed > MillimetresPerSecond::ZERO
         };
         let (mut back_mm, mut front_mm) = (-60.0, 20.0);
@@ -138,14 +142,13 @@ impl Hand {
 
 #[test]
 fn an_approach_goes_slowly_and_over_its_whole_distance() {
-    let config = config();
     for force_mn in [40, 500, 7_000] {
-        for motion in [at(mm(4.0)), calm_at(mm(4.0), &config)] {
-            let mut hand = Hand::free(&config);
-            let (reference, flags) = hand.frame(force_mn, &Contact::default(), motion, &config);
-            let distance = config.tip.indentation(newtons(force_mn));
-            assert_eq!((reference, flags), over(distance, Millimetres::ZERO, config.approach, motion, &config));
-            assert!(reference.speed <= config.approach && reference.speed > MillimetresPerSecond::ZERO);
+        for motion in [at(mm(4.0)), calm_at(mm(4.0))] {
+            let mut hand = Hand::free();
+            let (reference, flags) = hand.frame(force_mn, &Contact::default(), motion);
+            let distance = CONFIG.tip.indentation(newtons(force_mn));
+            assert_eq!((reference, flags), over(distance, Millimetres::ZERO, CONFIG.approach, motion));
+            assert!(reference.speed <= CONFIG.approach && reference.speed > MillimetresPerSecond::ZERO);
             assert_eq!(hand.grip.mode(&hand.touch), Mode::Approach);
         }
     }
@@ -153,28 +156,27 @@ fn an_approach_goes_slowly_and_over_its_whole_distance() {
 
 #[test]
 fn a_hold_goes_quickly_over_what_is_left() {
-    let config = config();
-    let (hand, held, travel) = Hand::pressing(&config);
+    let (hand, held, travel) = Hand::pressing();
     assert_eq!(hand.grip.mode(&hand.touch), Mode::Force);
     for force_mn in [200, 1_000, 1_001] {
-        let distance = minus(config.tip.indentation(newtons(force_mn)), held.indentation);
-        for motion in [at(travel), calm_at(travel, &config)] {
-            let got = { hand }.frame(force_mn, &held, motion, &config);
-            assert_eq!(got, over(distance, SLACK, config.speed_max, motion, &config), "{force_mn} mN");
+        let distance = minus(CONFIG.tip.indentation(newtons(force_mn)), held.indentation);
+        for motion in [at(travel), calm_at(travel)] {
+            let got = { hand }.frame(force_mn, &held, motion);
+            assert_eq!(got, over(distance, SLACK, CONFIG.speed_max, motion), "{force_mn} mN");
         }
     }
-    assert!(is_fast({ hand }.frame(7_000, &held, at(travel), &config).0));
+    assert!(is_fast({ hand }.frame(7_000, &held, at(travel)).0));
 }
 
 /// Indentation at which a shorted motor stops: by its damping, its friction and the contact.
-fn stops_mm(from_mm: f64, speed: MillimetresPerSecond, config: &Config) -> f64 {
-    let c_per_s = f64::from(config.damping_q17_per_s) / 131_072.0;
-    let mm_per_s2_per_n = f64::from(config.bounds.acceleration_per_n) / 256.0;
-    let friction_n = 1e-6 * f64::from(config.params.friction_unm) * f64::from(config.params.reduction_mrad_per_mm);
+fn stops_mm(from_mm: f64, speed: MillimetresPerSecond) -> f64 {
+    let c_per_s = f64::from(CONFIG.damping_q17_per_s) / 131_072.0;
+    let mm_per_s2_per_n = f64::from(CONFIG.bounds.acceleration_per_n) / 256.0;
+    let friction_n = 1e-6 * f64::from(CONFIG.params.friction_unm) * f64::from(CONFIG.params.reduction_mrad_per_mm);
     let (mut d_mm, mut mm_per_s) = (from_mm, speed.0.to_num::<f64>());
     let step_s = 1e-6;
     while mm_per_s > 0.0 {
-        let force_n: f64 = config.tip.force(mm(d_mm)).0.to_num();
+        let force_n: f64 = CONFIG.tip.force(mm(d_mm)).0.to_num();
         mm_per_s -= (c_per_s * mm_per_s + mm_per_s2_per_n * (force_n + friction_n)) * step_s;
         d_mm += mm_per_s * step_s;
     }
@@ -185,31 +187,30 @@ fn stops_mm(from_mm: f64, speed: MillimetresPerSecond, config: &Config) -> f64 {
 /// the goal plus 0.4 N; the contact brakes the rest. The limit is not lower unless another one acts.
 #[test]
 fn a_shorted_motor_stops_within_three_tenths_and_four_tenths_of_a_newton() {
-    let config = config();
     let mut bounded = 0;
     for held_mn in [90, 200, 1_000, 3_000, 6_000] {
-        let (hand, held, travel) = Hand::pressing_with(held_mn, &config);
+        let (hand, held, travel) = Hand::pressing_with(held_mn);
         for goal_mn in [50, 300, 1_000, 2_000, 4_000, 7_000] {
-            let (reference, _) = { hand }.frame(goal_mn, &held, at(travel), &config);
-            if goal_mn <= held_mn || reference.speed <= config.approach {
-                assert!(reference.speed <= config.approach, "{held_mn} to {goal_mn} mN: {reference:?}");
+            let (reference, _) = { hand }.frame(goal_mn, &held, at(travel));
+            if goal_mn <= held_mn || reference.speed <= CONFIG.approach {
+                assert!(reference.speed <= CONFIG.approach, "{held_mn} to {goal_mn} mN: {reference:?}");
                 continue;
             }
             let name = format!("{held_mn} to {goal_mn} mN");
             let goal = newtons(goal_mn);
-            let most: f64 = config.tip.indentation(newtons(goal_mn * 13 / 10 + 400)).0.to_num();
+            let most: f64 = CONFIG.tip.indentation(newtons(goal_mn * 13 / 10 + 400)).0.to_num();
             let held_mm: f64 = held.indentation.0.to_num();
             let allowed_mm = 1.25 * (most - held_mm);
-            let coasts_mm = coasts_mm(reference.speed, &config);
+            let coasts_mm = coasts_mm(reference.speed);
             assert!(coasts_mm <= allowed_mm + 1e-4, "{name}: {coasts_mm} of {allowed_mm} mm");
-            let stops_mm = mm(stops_mm(held_mm, reference.speed, &config));
+            let stops_mm = mm(stops_mm(held_mm, reference.speed));
             // From a light contact the speed itself may not be stopped in time: the contact does not help enough.
             let most_n = 1.3e-3 * f64::from(goal_mn) + 0.4;
             let most_n = if held_mn < 1_000 { 1.4 * most_n } else { most_n };
-            let stops_n: f64 = config.tip.force(stops_mm).0.to_num();
+            let stops_n: f64 = CONFIG.tip.force(stops_mm).0.to_num();
             assert!(stops_n <= most_n, "{name}: {stops_n} of {most_n} N");
-            let distance = minus(config.tip.indentation(goal), held.indentation);
-            let (unbounded, _) = over(distance, SLACK, config.speed_max, at(travel), &config);
+            let distance = minus(CONFIG.tip.indentation(goal), held.indentation);
+            let (unbounded, _) = over(distance, SLACK, CONFIG.speed_max, at(travel));
             if reference != unbounded {
                 assert!(coasts_mm >= allowed_mm - 1e-4, "{name}: {coasts_mm} of {allowed_mm} mm");
                 bounded += 1;
@@ -222,16 +223,15 @@ fn a_shorted_motor_stops_within_three_tenths_and_four_tenths_of_a_newton() {
 /// The tactile image shows the middle of the scan; the tip has moved for half a frame since then.
 #[test]
 fn the_motion_since_the_scan_counts() {
-    let config = config();
-    let (mut hand, held, travel) = Hand::pressing(&config);
+    let (mut hand, held, travel) = Hand::pressing();
     for mm_per_s in [-80, 40] {
         let mut motion = at(travel);
         motion.observer.speed = MillimetresPerSecond::from_bits(mm_per_s << 16);
-        let frame_s = f64::from(config.frame_s_q37) / 2_f64.powi(37);
-        let distance = minus(config.tip.indentation(newtons(900)), held.indentation);
+        let frame_s = f64::from(CONFIG.frame_s_q37) / 2_f64.powi(37);
+        let distance = minus(CONFIG.tip.indentation(newtons(900)), held.indentation);
         let distance = minus(distance, mm(f64::from(mm_per_s) * frame_s / 2.0));
-        let (reference, _) = hand.frame(900, &held, motion, &config);
-        let (expected, _) = over(distance, Millimetres::ZERO, config.speed_max, motion, &config);
+        let (reference, _) = hand.frame(900, &held, motion);
+        let (expected, _) = over(distance, Millimetres::ZERO, CONFIG.speed_max, motion);
         assert!((reference.speed.to_bits() - expected.speed.to_bits()).abs() < 10, "{reference:?}, {expected:?}");
     }
 }
@@ -239,51 +239,48 @@ fn the_motion_since_the_scan_counts() {
 /// The share of the uncertainty of the way beyond the indentation since the touch counts as indentation.
 #[test]
 fn an_uncertain_force_takes_the_tip_to_be_as_deep_as_it_moved() {
-    let config = config();
-    let (hand, held, travel) = Hand::pressing(&config);
+    let (hand, held, travel) = Hand::pressing();
     let deeper = mm(0.25);
     let motion = at(plus(travel, deeper));
     for (doubt, reported) in [(0, false), (1, false), (64, false), (127, false), (128, true), (255, true)] {
         let doubtful = Contact { doubt, ..held };
-        let (reference, flags) = { hand }.frame(1_100, &doubtful, motion, &config);
+        let (reference, flags) = { hand }.frame(1_100, &doubtful, motion);
         assert_eq!(flags & Limits::FROM_BELOW != 0, reported, "{doubt}");
-        let distance = minus(config.tip.indentation(newtons(1_100)), held.indentation);
+        let distance = minus(CONFIG.tip.indentation(newtons(1_100)), held.indentation);
         let share = Millimetres::from_bits((i64::from(deeper.to_bits()) * i64::from(doubt) / 255) as i32);
         let distance = minus(distance, share);
         let limit = match (distance < Millimetres::ZERO, doubt) {
-            (true, 0..=127) | (false, 0..32) => config.speed_max,
-            (true, _) => slow_back(&config),
-            (false, _) => config.approach,
+            (true, 0..=127) | (false, 0..32) => CONFIG.speed_max,
+            (true, _) => slow_back(),
+            (false, _) => CONFIG.approach,
         };
-        let (expected, _) = over(distance, SLACK, limit, motion, &config);
+        let (expected, _) = over(distance, SLACK, limit, motion);
         assert_eq!(reference, expected, "{doubt}");
     }
     // A tip that moved less than its indentation cannot be deeper than that.
     let before = at(minus(travel, mm(0.1)));
-    let reference = |doubt| { hand }.frame(900, &Contact { doubt, ..held }, before, &config).0;
+    let reference = |doubt| { hand }.frame(900, &Contact { doubt, ..held }, before).0;
     assert_eq!(reference(255), reference(0));
 }
 
 #[test]
 fn more_than_an_eighth_of_uncertainty_is_slow_forward() {
-    let config = config();
-    let (hand, held, travel) = Hand::pressing(&config);
+    let (hand, held, travel) = Hand::pressing();
     for (doubt, fast) in [(31, true), (32, false), (255, false)] {
-        let (reference, _) = { hand }.frame(6_000, &Contact { doubt, ..held }, at(travel), &config);
+        let (reference, _) = { hand }.frame(6_000, &Contact { doubt, ..held }, at(travel));
         assert_eq!(is_fast(reference), fast, "{doubt}: {reference:?}");
     }
 }
 
 /// Speed limit of a retreat from a force that the array hardly shows, and behind the surface: 1.25 times the approach.
-fn slow_back(config: &Config) -> MillimetresPerSecond {
-    MillimetresPerSecond(config.approach.0 * 5 / 4)
+fn slow_back() -> MillimetresPerSecond {
+    MillimetresPerSecond(CONFIG.approach.0 * 5 / 4)
 }
 
 /// A tip moves back at full speed up to half of the uncertainty, and only in front of the surface.
 #[test]
 fn half_of_the_uncertainty_and_a_place_behind_the_surface_are_slow_back() {
-    let config = config();
-    let (hand, held, travel) = Hand::pressing(&config);
+    let (hand, held, travel) = Hand::pressing();
     let behind = Millimetres::from_bits(mm(5.0).to_bits() - 1);
     for (doubt, travel, full) in [
         (0, travel, true),
@@ -294,10 +291,10 @@ fn half_of_the_uncertainty_and_a_place_behind_the_surface_are_slow_back() {
         (0, behind, false),
         (0, mm(3.0), false),
     ] {
-        let got = { hand }.frame(40, &Contact { doubt, ..held }, at(travel), &config).0;
-        let distance = minus(config.tip.indentation(newtons(40)), held.indentation);
-        let limit = if full { config.speed_max } else { slow_back(&config) };
-        assert_eq!(got, over(distance, SLACK, limit, at(travel), &config).0, "{doubt} at {travel:?}");
+        let got = { hand }.frame(40, &Contact { doubt, ..held }, at(travel)).0;
+        let distance = minus(CONFIG.tip.indentation(newtons(40)), held.indentation);
+        let limit = if full { CONFIG.speed_max } else { slow_back() };
+        assert_eq!(got, over(distance, SLACK, limit, at(travel)).0, "{doubt} at {travel:?}");
         assert!(is_fast(got), "faster than an approach: {got:?}");
     }
 }
@@ -305,54 +302,51 @@ fn half_of_the_uncertainty_and_a_place_behind_the_surface_are_slow_back() {
 /// Depth limit at full speed: 2 times the indentation and 0.3 mm forward, 5 times and 0.3 mm in a retreat.
 #[test]
 fn a_tip_farther_in_than_the_array_confirms_is_slow() {
-    let config = config();
-    let (hand, held, travel) = Hand::pressing(&config);
+    let (hand, held, travel) = Hand::pressing();
     let depth_mm: f64 = held.indentation.0.to_num();
     for (goal_mn, times) in [(6_000, 2.0), (40, 5.0)] {
         for (deep_mm, fast) in [(times * depth_mm + 0.299, true), (times * depth_mm + 0.301, false)] {
-            let (reference, _) = { hand }.frame(goal_mn, &held, at(mm(5.0 + deep_mm)), &config);
+            let (reference, _) = { hand }.frame(goal_mn, &held, at(mm(5.0 + deep_mm)));
             assert_eq!(is_fast(reference), fast, "{deep_mm} mm in, {goal_mn} mN: {reference:?}");
         }
     }
     // A force that ends slowly ends the contact: an approach follows.
     let mut hand = hand;
     for force_mn in (14..1_000).rev().step_by(29) {
-        hand.frame(6_000, &contact(force_mn, &config), at(travel), &config);
+        hand.frame(6_000, &contact(force_mn), at(travel));
     }
-    let lost = contact(14, &config);
-    let got = hand.frame(6_000, &lost, at(travel), &config);
+    let lost = contact(14);
+    let got = hand.frame(6_000, &lost, at(travel));
     assert_eq!((hand.touch.stage(), hand.grip.mode(&hand.touch)), (Stage::Lost, Mode::Approach));
-    let distance = config.tip.indentation(newtons(6_000));
-    assert_eq!(got, over(distance, Millimetres::ZERO, config.approach, at(travel), &config));
+    let distance = CONFIG.tip.indentation(newtons(6_000));
+    assert_eq!(got, over(distance, Millimetres::ZERO, CONFIG.approach, at(travel)));
 }
 
 #[test]
 fn a_force_counts_from_the_end_of_a_contact_on() {
-    let config = config();
-    let off = config.contact_off;
-    let goal = config.tip.indentation(config.contact_on);
-    let motion = calm_at(mm(1.0), &config);
+    let off = CONFIG.contact_off;
+    let goal = CONFIG.tip.indentation(CONFIG.contact_on);
+    let motion = calm_at(mm(1.0));
     for (force, indented) in [(off, true), (Newtons::from_bits(off.to_bits() - 1), false), (Newtons::ZERO, false)] {
         let seen = Contact { force, indentation: mm(0.1), ..Contact::default() };
-        let got = Hand::free(&config).frame_of(config.contact_on, &seen, motion, &config);
+        let got = Hand::free().frame_of(CONFIG.contact_on, &seen, motion);
         let distance = if indented { minus(goal, mm(0.1)) } else { goal };
-        assert_eq!(got, over(distance, Millimetres::ZERO, config.approach, motion, &config), "{force:?}");
-        assert!(got.0.speed < config.approach, "{force:?}");
+        assert_eq!(got, over(distance, Millimetres::ZERO, CONFIG.approach, motion), "{force:?}");
+        assert!(got.0.speed < CONFIG.approach, "{force:?}");
     }
 }
 
 #[test]
 fn a_goal_is_held_between_the_least_contact_and_the_largest_force() {
-    let config = config();
-    let (hand, held, travel) = Hand::pressing(&config);
-    let most = config.force_max.min(config.force_seen);
-    let asks = |goal: Newtons| { hand }.frame_of(goal, &held, at(travel), &config);
-    for goal in [config.contact_on, most, newtons(2_000)] {
+    let (hand, held, travel) = Hand::pressing();
+    let most = CONFIG.force_max.min(CONFIG.force_seen);
+    let asks = |goal: Newtons| { hand }.frame_of(goal, &held, at(travel));
+    for goal in [CONFIG.contact_on, most, newtons(2_000)] {
         assert_eq!(asks(goal).1 & Limits::GOAL, 0, "{goal:?}");
     }
     for (goal, held) in [
-        (Newtons::from_bits(config.contact_on.to_bits() - 1), config.contact_on),
-        (Newtons::from_bits(1), config.contact_on),
+        (Newtons::from_bits(CONFIG.contact_on.to_bits() - 1), CONFIG.contact_on),
+        (Newtons::from_bits(1), CONFIG.contact_on),
         (Newtons::from_bits(most.to_bits() + 1), most),
         (Newtons::from_bits(i32::MAX), most),
     ] {
@@ -360,22 +354,22 @@ fn a_goal_is_held_between_the_least_contact_and_the_largest_force() {
         assert_eq!(asks(goal), (expected, flags | Limits::GOAL));
     }
     // The converter may saturate below the allowed force.
-    let blind = Config { force_seen: newtons(1_500), ..config.clone() };
-    let (seen, flags) = { hand }.frame(1_500, &held, at(travel), &blind);
-    let more = { hand }.frame(1_501, &held, at(travel), &blind);
+    let config = Box::leak(Box::new(Config { force_seen: newtons(1_500), ..config() }));
+    let blind = Hand { config, ..hand };
+    let (seen, flags) = { blind }.frame(1_500, &held, at(travel));
+    let more = { blind }.frame(1_501, &held, at(travel));
     assert_eq!(more, (seen, flags | Limits::GOAL));
 }
 
 #[test]
 fn no_distance_goes_beyond_the_end_of_the_travel() {
-    let config = config();
-    let distance = config.tip.indentation(newtons(5_000));
+    let distance = CONFIG.tip.indentation(newtons(5_000));
     for (left, cut) in
         [(distance, false), (Millimetres::from_bits(distance.to_bits() - 1), true), (Millimetres::ZERO, true)]
     {
-        let motion = at(minus(config.travel_max, left));
-        let (reference, flags) = Hand::free(&config).frame(5_000, &Contact::default(), motion, &config);
-        let (expected, _) = over(left, Millimetres::ZERO, config.approach, motion, &config);
+        let motion = at(minus(CONFIG.travel_max, left));
+        let (reference, flags) = Hand::free().frame(5_000, &Contact::default(), motion);
+        let (expected, _) = over(left, Millimetres::ZERO, CONFIG.approach, motion);
         assert_eq!((reference, flags & Limits::TRAVEL != 0), (expected, cut), "{left:?}");
     }
 }

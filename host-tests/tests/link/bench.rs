@@ -10,10 +10,8 @@ use fingertip::pressure::TARE_BITS;
 use fingertip::shipped::{CLOCKS, COLUMNS, Frame, REGISTERS, ROWS, Record, SLOTS, Server, Snapshot};
 use fingertip::state::{Fault, Mode};
 
-/// The ID of the device under test.
 pub const ID: u8 = 1;
 
-/// A status packet's content.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Answer {
     pub id: u8,
@@ -139,12 +137,10 @@ impl Bench {
         self.ask_as(self.server.settings().record.id, instruction, params).expect("an answer")
     }
 
-    /// Reads bytes.
     pub fn read(&mut self, address: u16, length: u16) -> Result<Vec<u8>, u8> {
         self.ask(0x02, &[address.to_le_bytes(), length.to_le_bytes()].concat()).result()
     }
 
-    /// Writes bytes.
     pub fn write(&mut self, address: u16, data: &[u8]) -> Result<(), u8> {
         self.ask(0x03, &[&address.to_le_bytes(), data].concat()).result().map(|data| assert!(data.is_empty()))
     }
@@ -162,7 +158,6 @@ impl Bench {
     }
 }
 
-/// The address of a parameter.
 pub fn param(name: &str) -> u16 {
     REGISTERS.iter().find(|register| register.name == name).map(|register| register.address).expect("a parameter")
 }
@@ -192,7 +187,6 @@ pub fn packet(id: u8, instruction: u8, params: &[u8]) -> Vec<u8> {
     bytes.to_vec()
 }
 
-/// Bytes from their hexadecimal form.
 pub fn hex(text: &str) -> Vec<u8> {
     text.split_whitespace().map(|byte| u8::from_str_radix(byte, 16).expect("hexadecimal")).collect()
 }
@@ -216,7 +210,6 @@ pub fn receive(receiver: &mut Receiver, bytes: &[u8]) -> (Vec<Content>, Vec<Even
     (packets, events)
 }
 
-/// The content of a status packet.
 pub fn answer(reply: &[u8]) -> Answer {
     let (packets, events) = receive(&mut Receiver::new(), reply);
     assert!(packets.len() == 1 && events.is_empty(), "{reply:02X?}");

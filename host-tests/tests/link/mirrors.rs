@@ -4,7 +4,7 @@ use super::bench::{Bench, owned, param, table_end};
 use crate::common::*;
 use fingertip::link::packet::StatusError;
 use fingertip::link::table::indirect::{BLOCK, COUNT};
-use fingertip::link::table::{Access, READ_MAX, mirrors};
+use fingertip::link::table::{READ_MAX, mirrors};
 use fingertip::shipped::{REGISTERS, address};
 
 fn busy() -> Bench {
@@ -265,18 +265,6 @@ fn none_leads_to_another_nor_below_64_nor_into_a_gap() {
             assert_eq!(bench.read(data + 5, 1), byte, "{target}");
         }
     }
-}
-
-/// Stored registers below 64 stay out of reach; all parameters are within it, also the last one.
-#[test]
-fn indirection_reaches_every_parameter() {
-    let mut bench = Bench::new();
-    let last = address::PARAMS + 4 * (Params::COUNT as u16 - 1);
-    let stored = REGISTERS.iter().filter(|register| register.access == Access::Stored && register.address >= 64);
-    assert_eq!(stored.count(), Params::COUNT + 1, "and the gains");
-    lead(&mut bench, BLOCKS[0].0, 0, last, 4);
-    let value = bench.read(last, 4).expect("a parameter");
-    assert_eq!(bench.write(BLOCKS[0].1, &value), Ok(()));
 }
 
 #[test]

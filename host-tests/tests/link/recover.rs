@@ -27,21 +27,6 @@ fn running() -> Bench {
     bench
 }
 
-#[test]
-fn recover_does_in_one_write_what_a_tripped_watchdog_asks_for() {
-    let mut bench = running();
-    bench.set_fault(Some(Fault::BusSilent));
-    assert_eq!(bench.number(address::BUS_WATCHDOG, 1), 0xFF);
-    assert_eq!(bench.write(RECOVER, &[1]), Ok(()));
-    assert_eq!(bench.number(RECOVER, 1), 0);
-    bench.take_up();
-    assert_eq!((bench.number(address::FAULT, 1), bench.number(address::BUS_WATCHDOG, 1)), (0, 0));
-    let command = bench.server.command();
-    assert_eq!((command.torque, command.goal, command.bus_watchdog_ms), (false, Newtons::ZERO, 0));
-    assert_eq!(bench.write(address::TORQUE_ENABLE, &[1]), Ok(()));
-    assert_eq!(goal(&mut bench, 500), Ok(()));
-}
-
 /// `recover` equals the single writes that it replaces, for every fault: a watchdog that did not trip stays.
 #[test]
 fn recover_leaves_what_the_single_writes_leave() {

@@ -117,16 +117,6 @@ fn answer_in_one_packet(devices: &mut [Bench], request: &[u8], list: &[(u8, u16,
     }
 }
 
-#[test]
-fn fast_sync_read_makes_one_packet_of_all_parts() {
-    let mut devices = [device(1), device(2), device(3)];
-    let counter = address::FRAME_COUNTER;
-    for ids in [&[1][..], &[2, 3, 1], &[3, 1], &[1, 2, 3]] {
-        let request = packet(BROADCAST, 0x8A, &[&counter.to_le_bytes()[..], &[4, 0], ids].concat());
-        answer_in_one_packet(&mut devices, &request, &ids.iter().map(|id| (*id, counter, 4)).collect::<Vec<_>>());
-    }
-}
-
 /// If one device is missing, those behind it wait; the host's next packet is not taken as the missing answer.
 #[test]
 fn who_waits_for_one_that_is_missing_does_not_speak_into_the_next_packet() {
@@ -192,9 +182,13 @@ fn a_fast_read_gives_way_to_another_packet() {
 }
 
 #[test]
-fn fast_bulk_read_makes_one_packet_of_unequal_parts() {
+fn a_fast_read_makes_one_packet_of_equal_and_unequal_parts() {
     let mut devices = [device(1), device(2), device(3)];
     let (counter, id, mode) = (address::FRAME_COUNTER, address::ID, address::PRESENT_MODE);
+    for ids in [&[1][..], &[2, 3, 1], &[3, 1], &[1, 2, 3]] {
+        let request = packet(BROADCAST, 0x8A, &[&counter.to_le_bytes()[..], &[4, 0], ids].concat());
+        answer_in_one_packet(&mut devices, &request, &ids.iter().map(|id| (*id, counter, 4)).collect::<Vec<_>>());
+    }
     for list in [
         &[(1, counter, 4)][..],
         &[(2, counter, 4), (3, id, 1), (1, mode, 7)],

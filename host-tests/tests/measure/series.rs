@@ -5,7 +5,6 @@ use fingertip::measure::Row;
 use fingertip::measure::press::{PARTS, Step};
 use fingertip::measure::series::{CHECK, Head, Out, step_bytes};
 
-/// A row of a press.
 pub struct Read {
     pub frames: [u32; 2],
     pub counts: [i32; 2],
@@ -40,7 +39,6 @@ fn number<const BYTES: usize>(bytes: &mut &[u8]) -> [u8; BYTES] {
     *first
 }
 
-/// Reads a whole record.
 pub fn decode(mut bytes: &[u8]) -> Record {
     let from = &mut bytes;
     assert_eq!(number(from), *b"FTS\x01");

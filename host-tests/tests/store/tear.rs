@@ -350,13 +350,11 @@ pub struct Cut {
 /// Content of the words that an interrupted erase did not reach.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rest {
-    /// As it was.
     Old,
     /// Erased too, but the words before are unchanged: an erase in reverse order.
     Behind,
     /// Some bits are set.
     Weak,
-    /// Anything.
     Random,
 }
 

@@ -16,7 +16,6 @@ pub const WAIT_NS: u64 = 5_000_000;
 /// An instruction packet that asks ID 1 whether it is there.
 pub const PING: [u8; 10] = [0xff, 0xff, 0xfd, 0x00, 0x01, 0x03, 0x00, 0x01, 0x19, 0x4e];
 
-/// The flash image under test.
 pub fn image() -> PathBuf {
     let path = std::env::var_os("FINGERTIP_IMAGE");
     path.expect("FINGERTIP_IMAGE must name the flash image: run `cargo xtask test`, which builds it and sets it").into()
@@ -130,7 +129,6 @@ pub fn scratch(name: &str) -> PathBuf {
     folder.join(format!("{}-{name}", program.file_stem().expect("it has a name").display()))
 }
 
-/// Writes a parameter.
 pub fn write_param(rig: &mut Rig, name: &str, value: u32) {
     write_u32(rig, register(name), value);
     // A changed parameter restarts the scan.
@@ -180,7 +178,6 @@ pub fn force_n(rig: &mut Rig) -> f64 {
     rig.world(|world| world.force_n()).expect("it runs")
 }
 
-/// Travel of the tip.
 pub fn travel_mm(rig: &mut Rig) -> f64 {
     rig.world(|world| world.travel_mm()).expect("it runs")
 }

@@ -107,7 +107,6 @@ fn hangs(rig: &mut Rig) {
     assert!(!drives(rig));
 }
 
-/// True if the bridge drives the motor.
 fn drives(rig: &mut Rig) -> bool {
     rig.bridge_edges().expect("it runs").last().is_some_and(|edge| edge.on)
 }
@@ -244,7 +243,6 @@ pub fn until_off_us(rig: &mut Rig, limit_ms: u64) -> f64 {
     off.map_or(f64::INFINITY, |edge| (edge.at_ns - from_ns) as f64 / 1e3)
 }
 
-/// Present state of the bridge.
 fn bridge(rig: &mut Rig) -> Bridge {
     rig.with(|stand| stand.session.board_mut().bridge()).expect("it runs")
 }

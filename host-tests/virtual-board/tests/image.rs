@@ -1,15 +1,13 @@
 //! The flash image on the emulated board: it boots, scans, and repeats; the trace pins show what `docs/board.md` says.
 //! The image of `cargo xtask bringup`: what the board can show passes, and all else is told.
 
-use crate::bus::read;
 use crate::common::{
-    Check, PING, WAIT_NS, away, force_n, image, read_u8, read_u16, read_u32, register, run_checks, running,
-    write_and_run_ms, write_goal, write_param, write_u8, write_u32,
+    Check, PING, WAIT_NS, away, force_n, image, read_u8, read_u16, read_u32, register, run_checks, running, write_goal,
+    write_param, write_u8, write_u32,
 };
 use bringup::judge::{Board, Verdict};
 use fingertip::params::Params;
-use fingertip::shipped::{Config, TAXELS, address};
-use fingertip::state::Limits;
+use fingertip::shipped::{Config, address};
 use sim::plant::Plant;
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -20,7 +18,7 @@ use virtual_board::{Fault, Options, Rig, bringup as emulated};
 #[test]
 fn the_image_boots_scans_and_tells_how_the_board_is() {
     let mut rig = running(&away(0.5), &Options::default());
-    let checks: [Check; 11] = [
+    let checks: [Check; 10] = [
         ("the clock", its_clock_begins_at_zero_and_never_falls_back),
         ("the scan's rate", frames_arrive_at_the_scans_rate),
         ("a ping", it_answers_a_ping_at_its_baud_rate),
@@ -30,7 +28,6 @@ fn the_image_boots_scans_and_tells_how_the_board_is() {
         ("the settle time", a_settle_time_that_is_lowered_leaves_the_rows_in_step),
         ("the bridge's period", the_bridge_keeps_step_with_the_scan),
         ("short frames", frames_shorter_than_the_three_conversions_find_the_supply_too),
-        ("the first tare", before_the_first_tare_no_force_is_told),
         ("the guard pin", the_guard_pin_pulses_where_the_guard_trips),
     ];
     run_checks(&mut rig, &checks);
@@ -93,19 +90,6 @@ fn the_bus_tells_how_the_board_is(rig: &mut Rig) {
     for count in [address::TRANSFER_BUS_ERRORS, address::TRANSFER_STREAM_ERRORS, address::LINE_FRAMING] {
         assert_eq!(read_u16(rig, count), 0);
     }
-}
-
-fn before_the_first_tare_no_force_is_told(rig: &mut Rig) {
-    let told = |rig: &mut Rig| {
-        let pressures = read(rig, address::PRESSURES, 2 * TAXELS as u16);
-        (read_u32(rig, address::PRESENT_FORCE_MN), pressures.iter().all(|&byte| byte == 0))
-    };
-    assert_eq!(told(rig), (0, true));
-    assert!(Limits(read_u16(rig, address::LIMITS)).has(Limits::NOT_TARED));
-    assert!(read(rig, address::RAW_CODES, 2) != [0, 0], "the array itself is seen");
-    write_and_run_ms(rig, address::TARE, 1, 20);
-    assert!(!Limits(read_u16(rig, address::LIMITS)).has(Limits::NOT_TARED));
-    assert!(told(rig).0 <= 20, "now it is a force: none");
 }
 
 /// A compare value below the counter triggers the converters once too often, if it is set before the timer restarts and

@@ -14,7 +14,6 @@ use replay::{Replayed, replay};
 use solve::record;
 use virtual_board::{Options, Rig};
 
-/// The longest motion, ms.
 const LONGEST_MS: u64 = 20_000;
 
 /// Makes a motion, which must complete without a fault.
@@ -90,7 +89,6 @@ const RESULT: u8 = 1;
 const ACCESS: u8 = 7;
 /// Virtual time that an answer may take while frames are kept: the loop then leaves little of the core to the bus.
 const WAIT_NS: u64 = 20_000_000;
-/// Bytes of a read.
 const WINDOW: u16 = 248;
 
 #[test]

@@ -21,7 +21,6 @@ fn scene(text: &str) -> Scene {
     read("test.toml", text, &metrics::names()).unwrap_or_else(|errors| panic!("{errors}"))
 }
 
-/// Keeps what a test asks for.
 #[derive(Debug, Default)]
 struct Kept {
     steps: u64,

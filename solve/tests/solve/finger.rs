@@ -17,7 +17,6 @@ pub const FRAME_S: f64 = 0.5e-3;
 pub const FRAME_NS: u32 = 500_000;
 const TARE_FRAMES: usize = 256;
 
-/// Drawn properties of a finger.
 #[derive(Clone, Debug, Default)]
 pub struct Draw {
     pub seed: u64,
@@ -75,26 +74,18 @@ impl Draw {
 
     fn scene(&self, place: &Place) -> Scene {
         let dead: Vec<String> = self.dead.iter().map(|[row, column]| format!("[{row}, {column}]")).collect();
+        let Self { seed, modulus_kpa, noise_codes, gains_percent, creep_percent, hysteresis_percent, .. } = self;
+        let (Self { relaxation, relaxation_s, extra, .. }, dead) = (self, dead.join(", "));
+        let Place { centre_mm: [x_mm, y_mm], tilt_deg: [columns_deg, rows_deg] } = place;
         let text = format!(
-            "about = \"a press\"\nduration_s = 1.0\nseed = {}\n[tip]\nmodulus_kpa = {:?}\n[object]\ndistance_mm = 5.0\n\
-             centre_x_mm = {:?}\ncentre_y_mm = {:?}\n[effects.tilted_plane]\nalong_columns_deg = {:?}\nalong_rows_deg = {:?}\n\
-             [effects.noise]\nrms_codes = {:?}\n[effects.gain_spread]\nrms_percent = {:?}\n\
-             [effects.creep]\nrate_percent_per_decade = {:?}\n[effects.hysteresis]\nwidth_percent = {:?}\n\
-             [effects.relaxation]\nshare = {:?}\ntau_s = {:?}\n[effects.broken_taxels]\ndead = [{}]\n{}",
-            self.seed,
-            self.modulus_kpa,
-            place.centre_mm[0],
-            place.centre_mm[1],
-            place.tilt_deg[0],
-            place.tilt_deg[1],
-            self.noise_codes,
-            self.gains_percent,
-            self.creep_percent,
-            self.hysteresis_percent,
-            self.relaxation,
-            self.relaxation_s,
-            dead.join(", "),
-            self.extra,
+            "about = \"a press\"\nduration_s = 1.0\nseed = {seed}\n[tip]\nmodulus_kpa = {modulus_kpa:?}\n\
+             [object]\ndistance_mm = 5.0\ncentre_x_mm = {x_mm:?}\ncentre_y_mm = {y_mm:?}\n\
+             [effects.tilted_plane]\nalong_columns_deg = {columns_deg:?}\nalong_rows_deg = {rows_deg:?}\n\
+             [effects.noise]\nrms_codes = {noise_codes:?}\n[effects.gain_spread]\nrms_percent = {gains_percent:?}\n\
+             [effects.creep]\nrate_percent_per_decade = {creep_percent:?}\n\
+             [effects.hysteresis]\nwidth_percent = {hysteresis_percent:?}\n\
+             [effects.relaxation]\nshare = {relaxation:?}\ntau_s = {relaxation_s:?}\n\
+             [effects.broken_taxels]\ndead = [{dead}]\n{extra}"
         );
         read("press.toml", &text, &[]).unwrap_or_else(|error| panic!("{error}\n{text}"))
     }
@@ -123,7 +114,6 @@ pub enum Part {
     Hold { ends_s: Vec<f64> },
 }
 
-/// A finger with its array.
 pub struct Finger {
     draw: Draw,
     setup: Setup,

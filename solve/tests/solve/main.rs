@@ -21,31 +21,24 @@ use std::f64::consts::TAU;
 #[test]
 fn a_scale_gives_factor_offset_and_curve() {
     let mut rng = fastrand::Rng::with_seed(3);
-    let held = |factor: f64, offset_n: f64, curve: f64, rng: &mut fastrand::Rng| -> Vec<Held> {
-        [1.0, 2.0, 3.0, 4.0, 5.0]
-            .into_iter()
-            .map(|read_n: f64| {
-                let shown_n = factor * read_n * (1.0 + curve * read_n / 5.0) + offset_n;
-                Held { shown_n: ((shown_n * (1.0 + 0.004 * (rng.f64() - 0.5))) / 0.005).round() * 0.005, read_n }
-            })
-            .collect()
+    let mut held = |factor: f64, offset_n: f64, curve: f64| {
+        [1.0, 2.0, 3.0, 4.0, 5.0].map(|read_n: f64| {
+            let shown_n = factor * read_n * (1.0 + curve * read_n / 5.0) + offset_n;
+            Held { shown_n: ((shown_n * (1.0 + 0.004 * (rng.f64() - 0.5))) / 0.005).round() * 0.005, read_n }
+        })
     };
-    let plain = scale(&held(1.1, 0.0, 0.0, &mut rng)).expect("a scale");
-    println!("{plain:?}");
-    assert!((plain.factor.value - 1.1).abs() < 2.0 * plain.factor.sigma && plain.factor.sigma < 0.01);
+    let plain = scale(&held(1.1, 0.0, 0.0)).expect("a scale");
+    assert!((plain.factor.value - 1.1).abs() < 2.0 * plain.factor.sigma && plain.factor.sigma < 0.01, "{plain:?}");
     assert!(!plain.offset_n.expect("five forces").differs() && !plain.curve.expect("five forces").differs());
-    let offset = scale(&held(1.1, 0.3, 0.0, &mut rng)).expect("a scale").offset_n.expect("five forces");
-    println!("{offset:?}");
-    assert!(offset.differs() && (offset.value - 0.3).abs() < 0.05);
-    let curved = scale(&held(0.9, 0.0, 0.25, &mut rng)).expect("a scale").curve.expect("five forces");
-    println!("{curved:?}");
-    assert!(curved.differs() && (curved.value - 0.25).abs() < 0.1);
+    let offset = scale(&held(1.1, 0.3, 0.0)).expect("a scale").offset_n.expect("five forces");
+    assert!(offset.differs() && (offset.value - 0.3).abs() < 0.05, "{offset:?}");
+    let curved = scale(&held(0.9, 0.0, 0.25)).expect("a scale").curve.expect("five forces");
+    assert!(curved.differs() && (curved.value - 0.25).abs() < 0.1, "{curved:?}");
     // One number misread by 1 N.
-    let mut misread = held(1.1, 0.0, 0.0, &mut rng);
+    let mut misread = held(1.1, 0.0, 0.0);
     misread[2].shown_n += 1.0;
     let robust = scale(&misread).expect("a scale");
-    println!("{robust:?}");
-    assert!((robust.factor.value - 1.1).abs() < 0.02);
+    assert!((robust.factor.value - 1.1).abs() < 0.02, "{robust:?}");
     assert!(scale(&[]).is_err() && scale(&[Held { shown_n: 5.0, read_n: 1.0 }]).is_err());
 }
 
@@ -61,7 +54,6 @@ fn a_hold_shows_the_creep() {
             finger.press(&[Part::Ramp { to_mm: 2.0, mm_per_s: 10.0, step_mm: 9.0 }, Part::Hold { ends_s }], 8.0);
         let readings = press.steps[1..].iter().map(|step| [step.middle_s(), step.force_n(&press.array)]).collect();
         let found = creep(&HeldSeries { readings }).expect("a hold");
-        println!("{found:?}");
         assert!(found.share.value > 0.005 * percent && found.left < 0.002 * percent, "{found:?}");
     }
 }
@@ -87,7 +79,6 @@ fn two_presses_show_the_temperature() {
     finger.tare();
     let cold = finger.press(&plan(), 8.0);
     let found = temperature(&cold, &warm).expect("two presses");
-    println!("{found:?}");
     let per_k = found.per_k;
     assert!((per_k.value - 0.0036).abs() < 3.0 * per_k.sigma && per_k.sigma < 5e-4, "{found:?}");
     assert!(temperature(&cold, &cold).is_err());

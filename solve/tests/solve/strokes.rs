@@ -359,7 +359,7 @@ fn uniform(rng: &mut fastrand::Rng, from: f64, to: f64) -> f64 {
 }
 
 impl SimulatedDrive {
-    /// As `host-tests/sim/tests/commission/drives.toml` draws them.
+    /// As `host-tests/sim/tests/fingers/drives.toml` draws them.
     pub fn ordinary(rng: &mut fastrand::Rng) -> Self {
         let winding_ohm = uniform(rng, 2.4, 3.3);
         let rad_per_mm: f64 = 43.0 / 12.0;
@@ -424,7 +424,6 @@ struct RigReading {
     pub supply_v: f64,
 }
 
-/// The drive in motion.
 struct Rig {
     pub drive: SimulatedDrive,
     rng: fastrand::Rng,

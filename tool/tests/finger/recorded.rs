@@ -23,7 +23,6 @@ fn unix_s() -> f64 {
     SystemTime::now().duration_since(UNIX_EPOCH).expect("after 1970").as_secs_f64()
 }
 
-/// Messages of a whole file.
 fn messages(bytes: &[u8]) -> Vec<mcap::Message<'_>> {
     MessageStream::new(bytes).expect("MCAP").map(|message| message.expect("whole")).collect()
 }

@@ -211,7 +211,6 @@ impl Served {
         }
     }
 
-    /// A file of this test.
     pub fn file(&self, name: &str) -> String {
         self.folder.join(name).display().to_string()
     }
@@ -265,7 +264,6 @@ impl Served {
         serde_json::from_str(&text).unwrap_or_else(|why| panic!("{why}: {text}"))
     }
 
-    /// Error of a command that fails.
     pub fn refused(&self, arguments: &[&str]) -> String {
         complained(&self.fingertip(arguments).output().expect("it starts"))
     }
@@ -283,7 +281,6 @@ impl Served {
         complained(&command.env_remove("FINGERTIP_PORT").args(arguments).output().expect("it starts"))
     }
 
-    /// Error of a command line that is not understood.
     pub fn not_understood(arguments: &[&str]) -> String {
         let mut command = Command::new(env!("CARGO_BIN_EXE_fingertip"));
         let (code, err) =
@@ -299,7 +296,6 @@ impl Served {
         }
     }
 
-    /// Waits until a file is there.
     pub fn begun(file: &str) {
         Self::wait_for(|| std::fs::metadata(file).is_ok());
     }
@@ -309,7 +305,6 @@ impl Served {
         Self::wait_for(|| std::fs::read_to_string(part).is_ok_and(|text| text.lines().count() > 10));
     }
 
-    /// Ctrl-C.
     pub fn interrupt(child: &Child) {
         Self::signal(child, Signal::INT);
     }
@@ -338,12 +333,10 @@ impl Served {
         }
     }
 
-    /// The finger's clock, s.
     pub fn now_s(&self) -> f64 {
         self.command("now").parse().expect("a time")
     }
 
-    /// Packets that the finger heard.
     pub fn heard(&self) -> u64 {
         self.command("heard").parse().expect("a number")
     }
@@ -369,7 +362,6 @@ pub fn client(port: &str) -> Client {
     Client::open(&reach).expect("it listens")
 }
 
-/// An instruction packet.
 pub fn packet(id: u8, instruction: u8, params: &[u8]) -> Vec<u8> {
     let mut packet = Reply::new();
     let mut sender = packet::Sender::new(&mut packet, id, instruction);

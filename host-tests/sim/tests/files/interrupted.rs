@@ -25,7 +25,6 @@ const TOUCHING: &str = concat!(env!("FINGERTIP_ROOT"), "/host-tests/sim/tests/fi
 struct Job {
     name: &'static str,
     place: PathBuf,
-    /// Program and arguments.
     words: Vec<&'static str>,
     out: PathBuf,
     /// Grows while the command runs; its last size in an undisturbed run.
@@ -38,7 +37,6 @@ struct Job {
 }
 
 impl Job {
-    /// All three kinds.
     fn all(campaign: &str) -> [Self; 3] {
         let place = folder(&format!("interrupted/{campaign}"));
         let sweep = "--set duration_s=0.02 --set object.distance_mm=0.2 --set effects.noise.rms_codes=1.5 \

@@ -1,8 +1,6 @@
-//! The library of scenes: each holds its bounds, and the paper's compression test has its forces and pressures. The
-//! demonstration on the native board.
+//! The library of scenes: each holds its bounds, and each bound can break. The demonstration on the native board.
 
 use crate::{folder, scene};
-use fingertip::shipped::{COLUMNS, ROWS, SLOTS};
 use output::plot;
 use sim::demo::{self, Forces, Run, Taxels, Trace, draw, missed, table};
 use sim::metrics::Verdict;
@@ -125,65 +123,6 @@ fn the_library_shows_every_effect() {
     assert!(missing.is_empty(), "everything.toml does not name {missing:?}");
 }
 
-/// Readings of the array at the end of each hold of the compression test.
-#[derive(Default)]
-struct Gauge {
-    until_s: Vec<f64>,
-    shown: Vec<Shown>,
-}
-
-struct Shown {
-    depth_mm: f64,
-    sensed_n: f64,
-    kpa: [[f64; COLUMNS]; ROWS],
-}
-
-impl Watch for Gauge {
-    fn step(&mut self, step: &Step) {
-        if self.until_s.first().is_some_and(|until_s| step.time_s >= *until_s) {
-            self.until_s.remove(0);
-            let net = |row, column| {
-                let codes = |slot| f64::from(step.frame.code(slot, column));
-                // By the scene's array: 40 codes of preload, 24 codes for each kPa.
-                (codes(row) - codes(SLOTS - 1) - 40.0) / 24.0
-            };
-            self.shown.push(Shown {
-                depth_mm: step.truth.indentation_mm,
-                sensed_n: step.status.contact.force.0.to_num(),
-                kpa: core::array::from_fn(|row| core::array::from_fn(|column| net(row, column))),
-            });
-        }
-    }
-}
-
-#[test]
-fn figures_10_and_11_of_the_paper_come_out_of_the_compression_test() {
-    const PARTS: usize = 40;
-    let (a, modulus_kpa) = (10.0_f64, 250.0);
-    let mut gauge = Gauge { until_s: vec![0.399, 0.649, 0.899], shown: Vec::new() };
-    native::simulate(&scene("compression", &[], None), &mut gauge).expect("it runs");
-    assert_eq!(gauge.shown.len(), 3);
-    for (shown, asked_mm) in gauge.shown.iter().zip([1.0, 2.0, 3.0]) {
-        let d = shown.depth_mm;
-        assert!((d - asked_mm).abs() < 0.005, "{d} mm instead of {asked_mm}");
-        // Figure 11: F = pi Y d^2, here read off the array.
-        let force_n = core::f64::consts::PI * modulus_kpa * 1e-3 * d * d;
-        let off = shown.sensed_n / force_n - 1.0;
-        assert!(off.abs() < 0.01, "{} N instead of {force_n} at {d} mm", shown.sensed_n);
-        // Figure 10: each taxel's mean of p = Y (1 - (a - d) / sqrt(a^2 - r^2)), 0 beyond the rim.
-        let pressure =
-            |x: f64, y: f64| modulus_kpa * (1.0 - (a - d) / (a * a - x * x - y * y).max(1.0).sqrt()).max(0.0);
-        for (row, column) in (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column))) {
-            let place = |taxel: usize, part: usize| 1.5 * (taxel as f64 - 5.0 + (part as f64 + 0.5) / PARTS as f64);
-            let points =
-                (0..PARTS * PARTS).map(|point| pressure(place(column, point % PARTS), place(row, point / PARTS)));
-            let mean = points.sum::<f64>() / (PARTS * PARTS) as f64;
-            let kpa = shown.kpa[row][column];
-            assert!((kpa - mean).abs() < 0.1, "{kpa} kPa instead of {mean} at row {row}, column {column}, {d} mm deep");
-        }
-    }
-}
-
 fn demonstrated() -> Run {
     let scene = demo::scene(true).unwrap();
     let mut trace = Trace::new(&scene);
@@ -198,27 +137,18 @@ fn drawn(run: &Run, name: &str) -> Vec<(String, String)> {
 }
 
 #[test]
-fn every_bound_holds() {
-    let forces = Forces::of(&demonstrated()).unwrap();
+fn the_demonstration_holds_its_bounds_and_draws_the_same_pictures_each_time() {
+    let run = demonstrated();
+    let forces = Forces::of(&run).unwrap();
     let checks = forces.checks();
     assert_eq!((missed(&checks), checks.len()), (0, 26), "\n{}", table(&checks, &forces));
-}
-
-#[test]
-fn the_same_run_gives_the_same_pictures() {
-    let pictures = drawn(&demonstrated(), "demo/once");
+    let pictures = drawn(&run, "demo/once");
     assert_eq!(pictures, drawn(&demonstrated(), "demo/again"));
     for (name, svg) in &pictures {
         assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"), "{name}");
         assert!(!svg.contains("NaN") && !svg.contains("inf"), "{name}");
     }
-}
-
-#[test]
-fn axes_have_units() {
-    let [(_, overview), (_, steps), (_, maps)] = &drawn(&demonstrated(), "demo/axes")[..] else {
-        panic!("three pictures")
-    };
+    let [(_, overview), (_, steps), (_, maps)] = &pictures[..] else { panic!("three pictures") };
     for unit in ["time, s", "\nN\n", "\nmm\n", "\n%\n"] {
         assert!(overview.contains(unit), "{unit:?}");
     }

@@ -27,7 +27,6 @@ fn scene(name: &str, keys: &[&str], seed: Option<u64>) -> Scene {
     sim::cli::load(name, &keys, seed).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// An empty folder.
 fn folder(name: &str) -> PathBuf {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
     let _ = fs::remove_dir_all(&folder);

@@ -12,7 +12,7 @@ use sim::metrics::{Measured, Meter};
 use sim::population::load;
 use sim::watch::Truth;
 use std::collections::BTreeSet;
-use std::ops::Range;
+use std::ops::{Range, RangeBounds};
 
 /// Travel at the touch, mm, and indentation per force.
 const TOUCH_MM: f64 = 5.0;
@@ -83,15 +83,18 @@ fn sign(made: &Made) -> f64 {
     if made.steps.is_multiple_of(2) { 1.0 } else { -1.0 }
 }
 
+/// Changes the states with this goal at these times since the goal, s.
+fn while_held(goal_n: f64, since_s: impl RangeBounds<f64>, change: impl Fn(&mut Made, f64)) -> impl Fn(&mut Made, f64) {
+    move |made, value| {
+        if made.goal_n == goal_n && since_s.contains(&made.since_s) {
+            change(made, value);
+        }
+    }
+}
+
 #[test]
 fn over_force() {
-    let at = |goal_n: f64, since_s: Range<f64>| {
-        move |made: &mut Made, force_n: f64| {
-            if made.goal_n == goal_n && since_s.contains(&made.since_s) {
-                made.force_n = force_n;
-            }
-        }
-    };
+    let at = |goal_n, since_s: Range<f64>| while_held(goal_n, since_s, |made, force_n| made.force_n = force_n);
     two_sided(at(4.0, 0.0..0.00005), 1.3 * 4.0 + 0.149, 1.3 * 4.0 + 0.151, &["over_force_mn"]);
     // At the least goal, and with none.
     two_sided(at(1.0, 0.45..0.4501), 1.449, 1.451, &["over_force_mn"]);
@@ -124,49 +127,31 @@ fn running_away() {
 #[test]
 fn fast_in_the_air() {
     let approach_mm_per_s = f64::from(Params::DEFAULT.approach_um_per_s) * 1e-3;
-    for way in [1.0, -1.0] {
-        let flies = |made: &mut Made, share: f64| {
-            if made.goal_n == 0.0 && (0.03..0.031).contains(&made.since_s) {
-                made.speed_mm_per_s = way * share * approach_mm_per_s;
-            }
-        };
+    for way in [approach_mm_per_s, -approach_mm_per_s] {
+        let flies = while_held(0.0, 0.03..0.031, |made, share| made.speed_mm_per_s = way * share);
         two_sided(flies, 1.499, 1.501, &["air_speed_percent"]);
     }
     // What a contact throws back has 20 ms.
     let thrown = |made: &mut Made, until_s: f64| {
-        if made.goal_n == 0.0 && made.since_s < until_s {
-            made.speed_mm_per_s = -200.0;
-        }
+        while_held(0.0, ..until_s, |made, mm_per_s| made.speed_mm_per_s = mm_per_s)(made, -200.0);
     };
     two_sided(thrown, 0.0195, 0.0205, &["air_speed_percent"]);
 }
 
 #[test]
 fn no_rest_after_letting_go() {
-    let wanders = |made: &mut Made, width_mm: f64| {
-        if made.goal_n == 0.0 && made.since_s < 0.9 {
-            made.travel_mm -= 0.5 * width_mm * sign(made);
-        } else if made.goal_n == 0.0 {
-            made.travel_mm += 0.5 * width_mm * sign(made);
-        }
-    };
+    let wanders = while_held(0.0, .., |made, width_mm| {
+        made.travel_mm += 0.5 * width_mm * sign(made) * if made.since_s < 0.9 { -1.0 } else { 1.0 };
+    });
     two_sided(wanders, 0.0499, 0.0501, &["rest_travel_um"]);
 }
 
 #[test]
 fn a_stop_that_leaves_a_force() {
-    let stays = |made: &mut Made, until_s: f64| {
-        if made.goal_n == 0.0 && made.since_s < until_s {
-            made.force_n = 0.041;
-        }
-    };
+    let remains = while_held(0.0, .., |made, force_n| made.force_n = force_n);
+    let stays = |made: &mut Made, until_s: f64| while_held(0.0, ..until_s, &remains)(made, 0.041);
     two_sided(stays, 0.499, 0.501, &["stop_force_mn"]);
-    let remains = |made: &mut Made, force_n: f64| {
-        if made.goal_n == 0.0 {
-            made.force_n = force_n;
-        }
-    };
-    two_sided(remains, 0.0399, 0.0401, &["stop_force_mn"]);
+    two_sided(&remains, 0.0399, 0.0401, &["stop_force_mn"]);
     // A force that friction holds while torque is off does not count against the controller.
     let held = |made: &mut Made, friction_n: f64| {
         made.torque_off = made.time_s > 0.3;
@@ -183,23 +168,20 @@ fn a_stop_that_leaves_a_force() {
 }
 
 #[test]
-fn swinging() {
-    let swings = |made: &mut Made, width_n: f64| {
-        if made.goal_n == 2.0 && made.since_s > 0.45 {
-            made.force_n += 0.5 * width_n * sign(made);
-        }
-    };
+fn a_force_that_swings_or_is_not_held() {
+    let swings = while_held(2.0, 0.45.., |made, width_n| made.force_n += 0.5 * width_n * sign(made));
     two_sided(swings, 0.249, 0.251, &["hold_swing_mn"]);
+    for way in [1.0, -1.0] {
+        let off = while_held(2.0, 0.3.., |made, off_n| made.force_n += way * off_n);
+        two_sided(off, 0.399, 0.401, &["hold_error_mn"]);
+    }
 }
 
 #[test]
 fn hunting() {
     for holds in [true, false] {
         let hunts = |made: &mut Made, deviation: f64| {
-            made.duty = 0.2;
-            if (made.goal_n > 0.0) == holds {
-                made.duty += deviation * sign(made);
-            }
+            made.duty = 0.2 + if (made.goal_n > 0.0) == holds { deviation * sign(made) } else { 0.0 };
         };
         two_sided(hunts, 0.0499, 0.0501, &["rest_duty_percent"]);
     }
@@ -222,23 +204,10 @@ fn any_fault() {
 }
 
 #[test]
-fn force_not_held() {
-    for way in [1.0, -1.0] {
-        let off = |made: &mut Made, off_n: f64| {
-            if made.goal_n == 2.0 && made.since_s > 0.3 {
-                made.force_n += way * off_n;
-            }
-        };
-        two_sided(off, 0.399, 0.401, &["hold_error_mn"]);
-    }
-}
-
-#[test]
 fn a_touch_that_is_missed() {
     let misses = |made: &mut Made, until_s: f64| {
         if made.time_s > 3.0 && made.time_s < until_s && made.goal_n > 0.0 {
-            made.force_n = 0.0;
-            made.travel_mm = TOUCH_MM;
+            (made.force_n, made.travel_mm) = (0.0, TOUCH_MM);
         }
     };
     two_sided(misses, 3.5, 3.9, &["hold_error_mn", "touches_missed_count"]);

@@ -96,7 +96,6 @@ fn show(record: &mut Record, codes: &Frame) {
     record.frame = Frame { sequence: record.frame.sequence, ..*codes };
 }
 
-/// Steps until the tip touches.
 fn touch(finger: &mut Finger) {
     let until_s = finger.time_s() + 2.0;
     while finger.truth().force_n == 0.0 {
@@ -150,12 +149,10 @@ fn judge(name: &str, unit: &str, cases: &[Case]) {
     );
 }
 
-/// Draws a number from a log-uniform distribution.
 fn log_uniform(rng: &mut Rng, least: f64, most: f64) -> f64 {
     least * (most / least).powf(rng.f64())
 }
 
-/// Draws a number between two.
 fn uniform(rng: &mut Rng, least: f64, most: f64) -> f64 {
     least + (most - least) * rng.f64()
 }

@@ -79,7 +79,6 @@ fn print(name: &str, made: &[Made]) {
     println!("  {force_n:.3} N and {travel_mm:.2} mm at most");
 }
 
-/// Fingers of a population.
 fn fingers(text: &str, seed: u64, numbers: impl Iterator<Item = usize>) -> Vec<Finger> {
     let population = read("drawn.toml", text).unwrap_or_else(|errors| panic!("{errors}"));
     numbers.map(|number| population.finger(seed, number).unwrap_or_else(|errors| panic!("{errors}"))).collect()

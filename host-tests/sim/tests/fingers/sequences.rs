@@ -169,7 +169,6 @@ fn keep_the_rules(seeds: Range<u64>) {
     assert!(failed.is_empty(), "{} of {count} sequences break a rule, such as\n{}", failed.len(), shown.join("\n"));
 }
 
-/// Something that the host or the surroundings do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Event {
     /// A goal, N.
@@ -177,7 +176,6 @@ enum Event {
     Torque(bool),
     Tare,
     Clear,
-    /// A motion that measures.
     Measure(Task),
     /// The object's surface moves, towards the tip where `by_mm` is below 0.
     Move {

@@ -11,7 +11,6 @@ use sim::native;
 use sim::run::{Outcome, run};
 use sim::watch::{Step, Truth, Watch};
 
-/// Record of a step.
 struct Kept {
     time_s: f64,
     truth: Truth,

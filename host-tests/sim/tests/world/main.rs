@@ -204,7 +204,6 @@ fn part(tables: &str, seed: u64) -> Part {
     effects::build(&scene(&format!("duration_s = 1.0\n{tables}")).effects, seed, 0).next().expect("an effect").1
 }
 
-/// Keeps the last step.
 #[derive(Debug, Default)]
 struct Last {
     steps: u64,

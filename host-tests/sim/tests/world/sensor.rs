@@ -114,7 +114,6 @@ fn an_effects_numbers_are_its_own() {
     assert_ne!(scan(&mut stages(noise, 1), 100, 1), scan(&mut stages(noise, 2), 100, 1));
 }
 
-/// Reading of a taxel under a pressure.
 fn reads(effect: &mut dyn Pressure, time_s: f64, kpa: f64) -> f64 {
     let mut row = all(kpa);
     effect.apply(3, time_s, &mut row);
@@ -260,19 +259,6 @@ fn ghosted(hold: &str, row: usize, array: &[Row; ROWS]) -> Row {
     seen
 }
 
-#[test]
-fn an_unguarded_array_of_equal_resistances_reads_19_hundredths() {
-    for siemens in [2e-6, 1e-4, 0.1] {
-        for row in [0, 4, 9] {
-            for seen in ghosted("1e12", row, &[all(siemens); ROWS]) {
-                let share = siemens / seen;
-                let exact = (ROWS + COLUMNS - 1) as f64 / (ROWS * COLUMNS) as f64;
-                assert!((share - exact).abs() < 1e-6, "reads {share} of R");
-            }
-        }
-    }
-}
-
 /// By Kirchhoff on all 20 lines: the driven row at 1 V, the read column at 0, the others held; Gauss with pivots.
 fn kirchhoff(driven: usize, read: usize, hold: f64, array: &[Row; ROWS]) -> f64 {
     const LINES: usize = ROWS + COLUMNS;
@@ -308,7 +294,7 @@ fn kirchhoff(driven: usize, read: usize, hold: f64, array: &[Row; ROWS]) -> f64 
 #[test]
 fn ghosting_obeys_kirchhoff_and_lies_between_guarded_and_the_column() {
     let mut rng = fastrand::Rng::with_seed(3);
-    for hold_ohm in [10.0, 1e3, 1e5, 1e7] {
+    for hold_ohm in [10.0, 1e3, 1e5, 1e7, 1e12] {
         for _ in 0..30 {
             let array = [(); ROWS].map(|()| all(0.0).map(|_| 2e-6 + 1e-4 * rng.f64() * rng.f64()));
             let row = rng.usize(0..ROWS);
@@ -363,18 +349,6 @@ fn a_column_settles_with_the_exponential() {
         let edge = 2.3 - 2.0 * f64::exp(-9.0 / tau_us);
         assert!((sample(2, 1009.0, 1.3) - (1.3 + (edge - 1.3) * left)).abs() < 1e-11);
     }
-}
-
-#[test]
-fn half_a_bit_of_twelve_takes_nine_time_constants() {
-    let missing = |after_us: f64| {
-        let mut effect = volts("settling", &format!("tau_us = 1\nafter_us = {after_us}"));
-        let (mut low, mut high) = (all(0.0), all(4096.0));
-        effect(0, 0.0, &mut low);
-        effect(1, 1.0, &mut high);
-        4096.0 - high[0]
-    };
-    assert!(missing(8.99) > 0.5 && missing(9.03) < 0.5 && missing(9.03) > 0.48);
 }
 
 #[test]

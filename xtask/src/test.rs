@@ -27,7 +27,7 @@ pub struct Args {
 pub fn run(args: &Args, choice: Choice) -> Result<()> {
     let mut stages = Stages::default();
     if args.long {
-        return long(stages);
+        return long(stages, choice);
     }
     stages.stage("core and host tests", |console| host::test(&mut host::tests(&["--no-fail-fast"]), console));
     stages.stage("fit of a sensor to recordings", |console| {
@@ -73,9 +73,14 @@ pub fn run(args: &Args, choice: Choice) -> Result<()> {
 
 /// Runs the remaining cases of the tests with two sizes (their names begin with `long_`), and checks the tables of proofs
 /// and fits.
-fn long(mut stages: Stages) -> Result<()> {
+fn long(mut stages: Stages, choice: Choice) -> Result<()> {
     stages.stage("long core and host tests", |console| {
         host::test(&mut host::tests(&["--no-fail-fast", "--", "--ignored", "long_"]), console)
+    });
+    stages.stage("long tests on the virtual board", |console| {
+        let image = image::firmware(choice, console)?;
+        let mut command = host::tests(&["--test", "board", "--", "--ignored", "long_"]);
+        host::test(command.env("FINGERTIP_IMAGE", &image.elf), console)
     });
     stages.stage("proofs of the model's error bounds", |console| host::run_tool("prove", &["--check"], console));
     stages.stage("fit of thousands of tactile images", |console| host::run_tool("fit", &["--check"], console));

@@ -136,12 +136,13 @@ pub fn lint(choice: Choice) -> Result<()> {
     stages.stage("lints, microcontroller", |console| {
         let toolchain = toolchain::ensure(choice, console)?;
         ensure!(toolchain == Toolchain::Native, "Debian's Rust has no clippy for {TARGET}: rustup's target is needed");
-        console.run(clippy(toolchain.cargo("clippy").args(IMAGES)))?;
+        // The images' own profile: their macros are compiled already where the images are.
+        console.run(clippy(toolchain.cargo("clippy").arg("--release").args(IMAGES)))?;
         let target = cores::TARGET_OF_EXAMPLE;
         let toolchain =
             toolchain::ensure_for(choice, &[target], "programs of other boards are checked for it", console)?;
         for folder in APART {
-            console.run(clippy(&mut image::apart(toolchain, "clippy", folder, target, &[])))?;
+            console.run(clippy(image::apart(toolchain, "clippy", folder, target, &[]).arg("--release")))?;
         }
         Ok(())
     });

@@ -1,8 +1,8 @@
 #!/bin/sh
 # A sweep in shares by GNU parallel, on this machine or, with --sshlogin in PARALLEL, on others:
 #
-#   cargo xtask sweep --help                       # builds target/host/sweep
-#   export SWEEP="$PWD/target/host/sweep"
+#   cargo xtask sweep --help                       # builds target/debug/sweep
+#   export SWEEP="$PWD/target/debug/sweep"
 #   examples/cluster/parallel.sh 64 raspberry.toml --seeds 100000 --out "$PWD/sweep"
 #   "$SWEEP" merge sweep/runs-*-of-64.csv --out sweep
 #
@@ -11,4 +11,4 @@ set -eu
 shares=$1
 shift
 seq "$shares" | parallel --will-cite --halt soon,fail=1 \
-    "${SWEEP:?name the program: export SWEEP=.../target/host/sweep}" "$@" --shard "{}/$shares"
+    "${SWEEP:?name the program: export SWEEP=.../target/debug/sweep}" "$@" --shard "{}/$shares"

@@ -4,8 +4,8 @@
 #SBATCH --output=%x-%A_%a.log
 # A share of a sweep in each task of a Slurm array:
 #
-#   cargo xtask sweep --help                       # builds target/host/sweep
-#   export SWEEP="$PWD/target/host/sweep"
+#   cargo xtask sweep --help                       # builds target/debug/sweep
+#   export SWEEP="$PWD/target/debug/sweep"
 #   sbatch --wait --array=1-64 examples/cluster/slurm.sh raspberry.toml --seeds 100000 --out "$PWD/sweep"
 #   "$SWEEP" merge sweep/runs-*-of-64.csv --out sweep
 #
@@ -19,5 +19,5 @@ if [ -z "${SHARES-}" ] && [ "$array" != "1-$SLURM_ARRAY_TASK_COUNT of $SLURM_ARR
     echo "the array has the tasks $array: it begins at 1 and has no gaps, or SHARES says how many there are in all" >&2
     exit 2
 fi
-exec "${SWEEP:?name the program: export SWEEP=.../target/host/sweep}" "$@" \
+exec "${SWEEP:?name the program: export SWEEP=.../target/debug/sweep}" "$@" \
     --shard "$SLURM_ARRAY_TASK_ID/${SHARES:-$SLURM_ARRAY_TASK_COUNT}"

@@ -371,7 +371,7 @@ fn fingers<const ROWS: usize, const COLUMNS: usize>(pitch_um: i32, frames_per_s:
     (inside, worst)
 }
 
-/// More with `FINGERS=100 cargo test -p host-tests --profile host --test all the_envelope -- --nocapture`.
+/// More with `FINGERS=100 cargo test -p host-tests --test all the_envelope -- --nocapture`.
 #[test]
 fn the_envelope_holds_for_other_arrays_and_rates() {
     let count = std::env::var("FINGERS").map_or(4, |count| count.parse().expect("a number of fingers"));

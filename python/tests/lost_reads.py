@@ -1,6 +1,6 @@
 """Counts the reads that get no answer in time on a busy machine, with the cause of each: not a test, it takes minutes.
 
-    python lost_reads.py --serve target/host/serve --tool target/host/fingertip --reads 100000 package sdk tool
+    python lost_reads.py --serve target/debug/serve --tool target/debug/fingertip --reads 100000 package sdk tool
 
 Serves a finger, keeps some processes busy beside it, and reads 54 bytes of the state again and again without a pause:
 by this package, by `dynamixel-sdk` alone, by `fingertip latency`. Needs Linux: `/proc/PID/schedstat` has the time

@@ -31,7 +31,7 @@ class Package(OnServed):
             python = folder / "venv" / "bin" / "python"
             pip, offline = [sys.executable, "-m", "pip"], ["--quiet", "--no-index", "--no-deps"]
             # With the profile of the other tests, so that little is compiled.
-            maturin = [sys.executable, "-m", "maturin", "build", "--quiet", "--profile", "host", "--offline", "--locked"]
+            maturin = [sys.executable, "-m", "maturin", "build", "--quiet", "--profile", "dev", "--offline", "--locked"]
             self.done(*maturin, "--out", folder, cwd=PYTHON)
             self.done(sys.executable, "-m", "venv", "--without-pip", folder / "venv")
             self.done(*pip, "--python", python, "install", *offline, "--no-compile", *folder.glob("*.whl"))

@@ -36,7 +36,7 @@ pub fn ensure(console: &mut Console) -> Result<PathBuf> {
 pub fn run(console: &mut Console) -> Result<()> {
     let python = ensure(console)?;
     Program::sim("sweep").build(console)?;
-    let sweep = host::target().join("host").join("sweep");
+    let sweep = host::target().join(host::PROGRAMS).join("sweep");
     let folder = host::target().join("cluster");
     if folder.is_dir() {
         fs::remove_dir_all(&folder).with_context(|| format!("cannot empty {}", host::shown(&folder)))?;

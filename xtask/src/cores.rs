@@ -9,7 +9,6 @@ use anyhow::{Context, Result, ensure};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
-use std::process::Command;
 
 /// The page with the table of cores, and the example that runs the images and prints it.
 pub const PAGE: (&str, &str) = ("docs/porting.md", "porting-page");
@@ -121,11 +120,7 @@ pub fn page(choice: Choice, console: &mut Console) -> Result<String> {
     }
     let file = folder.join("list.tsv");
     fs::write(&file, list).with_context(|| host::shown(&file))?;
-    // Built with what the other programs select; `cargo run` takes one package only.
-    let mut build = host::cargo("build", "host-tests");
-    console.build(build.args(host::SHARED).args(["--example", PAGE.1]), PAGE.1, console::HOST)?;
-    let program = host::target().join(host::PROFILE).join("examples").join(PAGE.1);
-    console::output(Command::new(program).arg(&file))
+    console::output(host::example(PAGE.1, console)?.arg(&file))
 }
 
 /// Builds the example for another board, which links for its chip.
@@ -200,10 +195,7 @@ pub fn run_m4(args: &QemuArgs, choice: Choice, console: &mut Console) -> Result<
 /// The image does not build, or a test fails.
 pub fn test_m4(choice: Choice, console: &mut Console) -> Result<()> {
     let image = prepare(choice, console)?;
-    // Of all packages, like `cargo test`: so nothing is compiled again with other features.
-    let mut command = console::cargo("test");
-    command.args(["--test", "qemu", "--", "--ignored"]).env("FINGERTIP_QEMU_IMAGE", image);
-    host::test(&mut command, console)
+    host::test(host::tests(&["--test", "qemu", "--", "--ignored"]).env("FINGERTIP_QEMU_IMAGE", image), console)
 }
 
 /// Makes sure of the emulator.

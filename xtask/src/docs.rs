@@ -42,7 +42,7 @@ pub struct Args {
 pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     let mut stale = Vec::new();
     for (path, example) in GENERATED {
-        renew(path, &print(example, Some(Path::new(path)))?, args.check, &mut stale, console)?;
+        renew(path, &print(example, Some(Path::new(path)), console)?, args.check, &mut stale, console)?;
     }
     let mut budget = Program::sim("budget").build(console)?;
     renew(BUDGET.0, &console::output(budget.args(["--fingers", BUDGET.1]))?, args.check, &mut stale, console)?;
@@ -67,7 +67,7 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     let mut command = host::SCENE_BOARD.build(console)?;
     command.args(["demo", "--image"]).arg(&image.elf).arg("--json").arg(&json).arg("--out").arg(&pictures);
     console.run(&mut command)?;
-    renew(README.0, &print(README.1, Some(&json))?, args.check, &mut stale, console)?;
+    renew(README.0, &print(README.1, Some(&json), console)?, args.check, &mut stale, console)?;
 
     if !stale.is_empty() {
         bail!("stale: {}; renew them with `cargo xtask docs`", stale.join(", "));
@@ -76,10 +76,8 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
 }
 
 /// The text that a program prints.
-fn print(example: &str, argument: Option<&Path>) -> Result<String> {
-    let mut command = console::cargo("run");
-    command.args(["--quiet", "--example", example, "--"]).args(argument);
-    console::output(&mut command)
+fn print(example: &str, argument: Option<&Path>, console: &mut Console) -> Result<String> {
+    console::output(host::example(example, console)?.args(argument))
 }
 
 /// Writes a file that is not fresh, or adds it to the stale ones.

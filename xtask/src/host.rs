@@ -7,11 +7,12 @@ use std::process::Command;
 use std::sync::OnceLock;
 use std::{env, fs};
 
-/// Profile of all programs that run here; see `Cargo.toml`.
-pub const PROFILE: &str = "host";
+/// Folder of all programs that run here, in the build folder: that of cargo's own profile `dev`, which tests have too.
+pub const PROGRAMS: &str = "debug";
 
-/// Selects what the tests around an image or a served finger are built of. Programs select it too: cargo gives the crates
-/// that all of them share one set of features, and compiles them once.
+/// Selects all tests, with the features that [`SHARED`] gives to programs: crates that both use are compiled once.
+pub const TESTS: [&str; 3] = ["--workspace", "--features=fingertip-cli/foxglove", "--ignore-rust-version"];
+/// Selects the packages that bring most dependencies, next to a program's own: cargo unifies their features.
 pub const SHARED: &[&str] = &[
     "--package=virtual-board",
     "--package=serve",
@@ -59,7 +60,7 @@ impl Program {
         let mut command = cargo("build", self.package);
         command.args(["--bin", self.name]).args(self.with);
         console.build(&mut command, self.name, slow(self.package))?;
-        Ok(Command::new(target().join(PROFILE).join(self.name)))
+        Ok(Command::new(target().join(PROGRAMS).join(self.name)))
     }
 }
 
@@ -76,7 +77,21 @@ fn slow(package: &str) -> Slow {
 /// `cargo <subcommand>` for a package of this machine. The emulator's crate asks for a newer compiler than it needs.
 pub fn cargo(subcommand: &str, package: &str) -> Command {
     let mut command = console::cargo(subcommand);
-    command.args(["--profile", PROFILE, "--package", package, "--ignore-rust-version"]);
+    command.args(["--package", package, "--ignore-rust-version"]);
+    command
+}
+
+/// Builds one of the examples, and returns the command that starts it.
+pub fn example(name: &str, console: &mut Console) -> Result<Command> {
+    let mut build = cargo("build", "host-tests");
+    console.build(build.arg("--package=sim").args(SHARED).args(["--example", name]), name, HOST)?;
+    Ok(Command::new(target().join(PROGRAMS).join("examples").join(name)))
+}
+
+/// Builds tests, selected by these words, and returns the command that runs them.
+pub fn tests(words: &[&str]) -> Command {
+    let mut command = console::cargo("test");
+    command.args(TESTS).args(words);
     command
 }
 
@@ -86,8 +101,7 @@ pub fn test(command: &mut Command, console: &mut Console) -> Result<()> {
     // What follows `--` is for the tests.
     build.args(command.get_args().take_while(|word| *word != "--").filter(|word| *word != "--no-fail-fast"));
     build.arg("--no-run");
-    let package = command.get_args().find(|word| *word == BOARD.package);
-    console.build(&mut build, "the tests", slow(package.and_then(|word| word.to_str()).unwrap_or_default()))?;
+    console.build(&mut build, "the tests", EMULATOR)?;
     console.run(command)
 }
 

@@ -27,9 +27,9 @@ pub struct Args {
 pub fn run(args: &Args, choice: Choice) -> Result<()> {
     let mut stages = Stages::default();
     if args.long {
-        return long(stages);
+        return long(stages, choice);
     }
-    stages.stage("core and host tests", |console| host::test(console::cargo("test").arg("--no-fail-fast"), console));
+    stages.stage("core and host tests", |console| host::test(&mut host::tests(&["--no-fail-fast"]), console));
     stages.stage("fit of a sensor to recordings", |console| {
         let mut command = install::script("test_fit.py", console)?;
         console.run(&mut command)
@@ -51,7 +51,7 @@ pub fn run(args: &Args, choice: Choice) -> Result<()> {
     stages.stage("timing model against published measurements", |console| timing::check(choice, console));
     stages.stage("virtual board", |console| {
         let python = install::bus_python(console)?;
-        let mut command = on_a_board(&["--lib", "--test", "board"]);
+        let mut command = host::tests(&["--test", "board"]);
         let checking = image::checking(toolchain::ensure(choice, console)?, flash::BRINGUP, console)?;
         command.env("FINGERTIP_IMAGE", &image()?.elf).env("FINGERTIP_PYTHON", &python);
         command.env("FINGERTIP_BRINGUP", &checking.elf);
@@ -61,34 +61,30 @@ pub fn run(args: &Args, choice: Choice) -> Result<()> {
         let python = install::bus_python(console)?;
         // The wheel's builder reads the sources of every platform, also those that no build here needs.
         console.prepare(console::cargo("fetch").args(["--locked", "--quiet"]))?;
-        let mut command = on_a_board(&["--test", "served"]);
-        command.env("FINGERTIP_PYTHON", &python).args(["--", "--ignored"]);
-        host::test(&mut command, console)
+        let mut command = host::tests(&["--test", "served", "--", "--ignored"]);
+        host::test(command.env("FINGERTIP_PYTHON", &python), console)
     });
-    stages.stage("stream to Foxglove", |console| host::test(&mut on_a_board(&["--test", "stream"]), console));
     stages.stage("reports in a browser", |console| {
         let program = install::browser(console)?;
-        host::test(on_a_board(&["--test", "report"]).env("FINGERTIP_CHROMIUM", &program), console)
+        host::test(host::tests(&["--test", "report"]).env("FINGERTIP_CHROMIUM", &program), console)
     });
     stages.finish("test")
 }
 
 /// Runs the remaining cases of the tests with two sizes (their names begin with `long_`), and checks the tables of proofs
 /// and fits.
-fn long(mut stages: Stages) -> Result<()> {
+fn long(mut stages: Stages, choice: Choice) -> Result<()> {
     stages.stage("long core and host tests", |console| {
-        host::test(console::cargo("test").args(["--no-fail-fast", "--", "--ignored", "long_"]), console)
+        host::test(&mut host::tests(&["--no-fail-fast", "--", "--ignored", "long_"]), console)
+    });
+    stages.stage("long tests on the virtual board", |console| {
+        let image = image::firmware(choice, console)?;
+        let mut command = host::tests(&["--test", "board", "--", "--ignored", "long_"]);
+        host::test(command.env("FINGERTIP_IMAGE", &image.elf), console)
     });
     stages.stage("proofs of the model's error bounds", |console| host::run_tool("prove", &["--check"], console));
     stages.stage("fit of thousands of tactile images", |console| host::run_tool("fit", &["--check"], console));
     stages.finish("test --long")
-}
-
-/// Tests of the packages that stand around an image or a served finger.
-fn on_a_board(targets: &[&str]) -> Command {
-    let mut command = host::cargo("test", host::BOARD.package);
-    command.args(host::SHARED).args(targets);
-    command
 }
 
 // Format, lints, documentation and licences.
@@ -131,17 +127,22 @@ pub fn lint(choice: Choice) -> Result<()> {
         }
         Ok(())
     });
-    stages.stage("lints, host", |console| console.run(clippy(console::cargo("clippy").args(ALL).arg("--all-targets"))));
+    stages.stage("lints, host", |console| {
+        console.run(clippy(console::cargo("clippy").args(ALL).arg("--all-targets")))?;
+        // `--all-targets` passes over tests that plain `cargo test` does not run.
+        console.run(clippy(console::cargo("clippy").args(ALL).args(["--test=board", "--test=report"])))
+    });
     stages.stage("lints, least features", |console| console.run(clippy(console::cargo("clippy").args(LEAST))));
     stages.stage("lints, microcontroller", |console| {
         let toolchain = toolchain::ensure(choice, console)?;
         ensure!(toolchain == Toolchain::Native, "Debian's Rust has no clippy for {TARGET}: rustup's target is needed");
-        console.run(clippy(toolchain.cargo("clippy").args(IMAGES)))?;
+        // The images' own profile: their macros are compiled already where the images are.
+        console.run(clippy(toolchain.cargo("clippy").arg("--release").args(IMAGES)))?;
         let target = cores::TARGET_OF_EXAMPLE;
         let toolchain =
             toolchain::ensure_for(choice, &[target], "programs of other boards are checked for it", console)?;
         for folder in APART {
-            console.run(clippy(&mut image::apart(toolchain, "clippy", folder, target, &[])))?;
+            console.run(clippy(image::apart(toolchain, "clippy", folder, target, &[]).arg("--release")))?;
         }
         Ok(())
     });

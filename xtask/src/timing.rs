@@ -94,8 +94,7 @@ pub fn check(choice: Choice, console: &mut Console) -> Result<()> {
     ensure(console)?;
     let plugin = plugin(console)?;
     let image = image::build(toolchain::ensure(choice, console)?, "timing-check", "timing", console)?;
-    let mut command = console::cargo("test");
-    command.args(["--test", "silicon", "--", "--ignored", "--nocapture", "--test-threads=1"]);
+    let mut command = host::tests(&["--test", "silicon", "--", "--ignored", "--nocapture", "--test-threads=1"]);
     host::test(command.env("M4_TIMING_PLUGIN", plugin).env("M4_TIMING_IMAGE", image), console)
 }
 
@@ -106,9 +105,8 @@ pub fn check(choice: Choice, console: &mut Console) -> Result<()> {
 pub fn kernels(choice: Choice, console: &mut Console) -> Result<Run> {
     let image = image::build(toolchain::ensure(choice, console)?, "timing", "timing", console)?;
     let recording = host::made("timing")?.join("recording.bin");
-    let mut command = console::cargo("run");
-    command.args(["--quiet", "--example", "recording", "--"]);
-    console.run(command.arg(&recording))?;
+    let mut recorder = host::example("recording", console)?;
+    console.run(recorder.arg(&recording))?;
     measure(&image, Some(&recording), console)
 }
 
@@ -171,7 +169,7 @@ fn version() -> Option<u32> {
 fn plugin(console: &mut Console) -> Result<PathBuf> {
     let mut command = host::cargo("build", "m4-timing");
     console.build(command.args(["--features", "plugin"]), "the timing plugin", console::HOST)?;
-    let file = host::target().join(host::PROFILE).join(format!("{DLL_PREFIX}m4_timing{DLL_SUFFIX}"));
+    let file = host::target().join(host::PROGRAMS).join(format!("{DLL_PREFIX}m4_timing{DLL_SUFFIX}"));
     fs::canonicalize(&file).with_context(|| host::shown(&file))
 }
 

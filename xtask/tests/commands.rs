@@ -9,7 +9,7 @@ use std::process::{Command, Output, Stdio};
 fn folder(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(folder.join("host")).expect("a folder");
+    fs::create_dir_all(folder.join("debug")).expect("a folder");
     let bar = "    Building [=====>  ] 1/2: model(bin)";
     let artifact = r#"{"package_id":"path+file:///host-tests#0.1.0","fresh":false}"#;
     script(&folder.join("cargo"), &format!("touch {}/built; echo '{bar}' >&2; echo '{artifact}'", folder.display()));
@@ -30,7 +30,7 @@ fn xtask(folder: &Path, arguments: &[&str]) -> Output {
 #[test]
 fn progress_stays_out_of_the_results() {
     let folder = folder("progress");
-    script(&folder.join("host/model"), "echo force_n; echo 1.5");
+    script(&folder.join("debug/model"), "echo force_n; echo 1.5");
     let output = xtask(&folder, &["model"]);
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success() && said.contains("built    model: 2 crates"), "{said}");

@@ -124,7 +124,7 @@ pub fn run_checks(rig: &mut Rig, checks: &[Check]) {
 /// A file of this test program's in the build folder.
 pub fn scratch(name: &str) -> PathBuf {
     let program = std::env::current_exe().expect("it runs");
-    let folder = program.parent().and_then(Path::parent).expect("target/host/deps").join("scratch");
+    let folder = program.parent().and_then(Path::parent).expect("target/debug/deps").join("scratch");
     std::fs::create_dir_all(&folder).expect("the build folder can be written");
     folder.join(format!("{}-{name}", program.file_stem().expect("it has a name").display()))
 }

@@ -164,12 +164,21 @@ fn broken(name: &str) -> Vec<String> {
     verdicts.map(|verdict| format!("{name}: {:?} is {:?}", verdict.bound, verdict.value)).collect()
 }
 
+/// Scenes of the usual size: all effects at once, a free object lifted by two fingers, a fast approach, a slip.
+const USUAL: [&str; 4] = ["everything", "grasp", "impact", "slip_and_recovery"];
+
 #[test]
-fn every_scene_of_the_library_holds_its_bounds_on_the_image() {
+fn scenes_of_the_library_hold_their_bounds_on_the_image() {
+    assert_eq!(cores::map(&USUAL, |name| broken(name)).concat(), [""; 0]);
+}
+
+#[test]
+#[ignore = "long: cargo xtask test --long"]
+fn long_every_other_scene_of_the_library_holds_its_bounds_on_the_image() {
     let mut names = scene::library_names().expect("the library is there");
     assert!(names.len() >= 14, "{names:?}");
     // Judged below, and in full by `cargo xtask docs --check`.
-    names.retain(|name| name != "demo");
+    names.retain(|name| name != "demo" && !USUAL.contains(&name.as_str()));
     // The longest begins first: it takes as long as all others together.
     names.sort_by_key(|name| name != "hot_hour");
     let broken = cores::map(&names, |name| broken(name)).concat();

@@ -229,7 +229,7 @@ const FRICTION_N: f64 = 0.12e-3 * 43.0 / 12e-3;
 
 /// An instant of an end of each procedure, drawn with a fixed seed: no force is left, the parameters are those before or
 /// all of the new ones, and the same session gives the same result. All ends, at more instants, with
-/// `INSTANTS=42 cargo test -p fingertip-cli --profile host --test finger ends_at_any -- --nocapture`.
+/// `INSTANTS=42 cargo test -p fingertip-cli --test finger ends_at_any -- --nocapture`.
 #[test]
 fn a_procedure_that_ends_at_any_instant_resumes() {
     let instants = std::env::var("INSTANTS").ok().map(|text| text.parse::<usize>().expect("a number of instants"));

@@ -90,7 +90,7 @@ fn a_killed_command_leaves_no_force_and_the_fault_of_the_watchdog() {
 const ENDS: [Option<Signal>; 5] = [Some(Signal::INT), Some(Signal::TERM), Some(Signal::HUP), Some(Signal::KILL), None];
 
 /// One instant of every motion and end, drawn with a fixed seed. More with
-/// `INSTANTS=50 cargo test -p fingertip-cli --profile host --test finger any_instant -- --nocapture`.
+/// `INSTANTS=50 cargo test -p fingertip-cli --test finger any_instant -- --nocapture`.
 #[test]
 fn a_program_that_ends_at_any_instant_leaves_no_force() {
     let instants = std::env::var("INSTANTS").map_or(1, |text| text.parse().expect("a number of instants"));

@@ -1,7 +1,7 @@
 //! Fingers under the controller: unusual orders of events at exact times, contacts that the array measures badly,
 //! measuring motions, worn sensors, heat, and the bus.
 //!
-//! The tests judge the true state of the simulated finger. `cargo test -p sim --profile host --test fingers --
+//! The tests judge the true state of the simulated finger. `cargo test -p sim --test fingers --
 //! --nocapture` prints the largest value of each group of cases.
 
 mod goals;

@@ -1,7 +1,7 @@
 //! Random sequences of requests and of motions of the object, judged by the true force and the table of modes.
 //!
 //! The first sequences that fail are shortened and printed. `SEQUENCES=n` tries n in all, the first 75 of them without
-//! `--ignored`. Without `--profile host` the core also checks its arithmetic for overflow:
+//! `--ignored`. The core checks its arithmetic for overflow:
 //! `SEQUENCES=2000 cargo test -p sim --test fingers sequences -- --ignored --nocapture`
 
 use crate::{
@@ -344,7 +344,7 @@ fn check_mode(before: Mode, now: Mode, command: &Command) -> Option<String> {
 
 // One event at each of many instants of a press: torque off, goal 0, a fault of the bridge, a lost signal, a silent bus.
 // Every 100th of the 500 instants of each press is tried, every 20th by `cargo xtask test --long`, and all by
-// `INSTANTS_STEP=1 cargo test -p sim --profile host --test fingers instant -- --ignored --nocapture`
+// `INSTANTS_STEP=1 cargo test -p sim --test fingers instant -- --ignored --nocapture`
 
 /// Instants of the press for each goal.
 const INSTANTS: u64 = 500;

@@ -268,7 +268,7 @@ fn calibration_leaves_a_few_percent_of_the_force() {
 }
 
 /// Ordinary fingers, uncalibrated and calibrated: error of a hold, relative to 3 % plus 20 mN, and to 8 % plus 50 mN.
-/// More with `FINGERS=20 cargo test -p sim --profile host --test fingers closer -- --ignored --nocapture`.
+/// More with `FINGERS=20 cargo test -p sim --test fingers closer -- --ignored --nocapture`.
 #[test]
 #[ignore = "long: cargo xtask test --long"]
 fn long_ordinary_fingers_hold_closer_once_they_are_calibrated() {

@@ -52,6 +52,8 @@ pub mod grip;
 
 pub mod safety;
 
+pub mod activity;
+
 pub mod status;
 
 pub mod pipeline;

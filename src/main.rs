@@ -5,13 +5,14 @@
 mod board;
 
 use board::analogue::Analogue;
-use board::bridge::{Bridge, Encoder};
+use board::bridge::Bridge;
 use board::control::{self, Control};
+use board::encoder::Encoder;
 use board::flash::Store;
-use board::guard::{self, Watchdogs};
 use board::log::{log_boot, log_refusal, log_remark, log_save_error, log_unfit};
 use board::scan::Scan;
-use board::{bus, clocks, crash, link_task, log, pins, stack, trace};
+use board::watchdog::Watchdogs;
+use board::{bus, clocks, crash, guard, link_task, log, pins, stack, trace};
 use defmt::{info, unwrap, warn};
 use defmt_rtt as _;
 use embassy_executor::{InterruptExecutor, Spawner};

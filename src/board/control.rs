@@ -1,5 +1,4 @@
-//! The control task: a turn at half of each frame and one at its end, on an executor that only the guard, the scan and
-//! the bus interrupt.
+//! The control task: one turn a frame, on an executor that only the guard, the scan and the bus interrupt.
 //!
 //! Nothing here waits, allocates, logs or holds a lock for longer than a copy of a snapshot.
 //! A capture's start, a new configuration, new gains and a save take longer than a frame: the scan stops for them and
@@ -15,12 +14,14 @@ use fingertip::state::{Fault, Mode};
 use fingertip::units::CoreCycles;
 
 use super::analogue::Analogue;
-use super::bridge::{self, Bridge, Encoder};
+use super::bridge::{self, Bridge};
 use super::capture::Keeper;
+use super::encoder::Encoder;
 use super::exchange::{GAINS, HEARD, Heard, LOOP_STATE, LoopState, NotSaved, PARAMS, PICTURE, Report, SAVE, SAVED};
 use super::flash::Store;
-use super::guard::{self, Stopwatch, Watchdogs};
+use super::guard::{self, Stopwatch};
 use super::scan::{Completed, Scan, WAKE};
+use super::watchdog::Watchdogs;
 use super::{health, trace};
 
 /// The guard waits this many times as long for the first frame of a start as for a later one.

@@ -331,7 +331,7 @@ fn a_pattern_fed_for_ever_ends_in_a_cycle_no_wider_than_the_pattern_makes_it() {
     assert!(swinging.high < 16_384.0 && swinging.high > 15_000.0, "{swinging:?}");
 }
 
-/// Functions of the depth that `random::boundaries` leaves out.
+/// Checks the functions of depth that `random::boundaries` does not check.
 #[test]
 fn peak_and_mean_pressure_at_the_boundaries() {
     for tip in boundary_tips() {

@@ -75,7 +75,7 @@ fn tares(board: &mut Bench, frames: u32, name: &str) {
     assert_eq!(board.step().tare, Taring::Done, "{name}");
 }
 
-/// What else comes in the frame of a request.
+/// Another change in the frame of a request.
 type Change = fn(&mut Bench);
 
 /// Each board with the mode after the tare.

@@ -136,7 +136,7 @@ pub fn lint(choice: Choice) -> Result<()> {
     stages.stage("lints, microcontroller", |console| {
         let toolchain = toolchain::ensure(choice, console)?;
         ensure!(toolchain == Toolchain::Native, "Debian's Rust has no clippy for {TARGET}: rustup's target is needed");
-        // The images' own profile: their macros are compiled already where the images are.
+        // In the profile of the images, whose proc macros are compiled already.
         console.run(clippy(toolchain.cargo("clippy").arg("--release").args(IMAGES)))?;
         let target = cores::TARGET_OF_EXAMPLE;
         let toolchain =

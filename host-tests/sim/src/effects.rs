@@ -129,7 +129,7 @@ pub(crate) struct Metered<T: ?Sized> {
     calls: u64,
     timed_calls: u64,
     timed: Duration,
-    /// Calls that were left out as their results were known.
+    /// Number of calls that were skipped because their results are known.
     pub repeated: i64,
     part: Box<T>,
 }

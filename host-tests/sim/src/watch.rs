@@ -100,7 +100,7 @@ pub trait Watch {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cost {
     pub effect: &'static str,
-    /// Calls, with those left out as their results were known.
+    /// Number of calls, including those skipped because their results are known.
     pub evaluations: u64,
     /// Wall time, estimated from a sample of the calls.
     pub seconds: f64,

@@ -17,7 +17,7 @@ use std::process::ExitCode;
 enum Command {
     /// Write the inputs for the image
     Inputs { file: PathBuf },
-    /// Write the few inputs that the image of `cargo xtask bringup` keeps, and the same with the records that it makes itself
+    /// Write the inputs stored in the image of `cargo xtask bringup`, and the same inputs with the records that the image computes
     Few { kept: PathBuf, full: PathBuf },
     /// Judge two runs, of the image built as the firmware is and built for speed, and the lines of `budget --whole-loop`
     Report {

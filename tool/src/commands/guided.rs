@@ -363,7 +363,7 @@ pub fn same_settings(session: &Session, client: &mut Client) -> Result<(), Error
 }
 
 impl Procedure<'_> {
-    /// Records why a part has no result, and forgets its step. Nothing is written at all then.
+    /// Records why a part has no result, and drops its step. The procedure then writes no parameter.
     pub fn without(&mut self, step: &str, why: String) -> Result<(), Error> {
         self.found.refused.push(why);
         self.found.blocked = true;

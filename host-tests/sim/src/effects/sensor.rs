@@ -65,7 +65,7 @@ pub trait Stages {
     fn network(&mut self, _row: usize, _array: &[Row; ROWS], _seen: &mut Row) {}
     fn volts(&mut self, _slot: usize, _time_s: f64, _volts: &mut Row) {}
     fn codes(&mut self, _slot: usize, _time_s: f64, _codes: &mut Row) {}
-    /// Counts calls that were left out as their results were known; negative for a call too many.
+    /// Counts calls that were skipped because their results are known; negative for an extra call.
     fn repeat(&mut self, _rows: i64, _slots: i64) {}
 }
 

@@ -69,7 +69,7 @@ impl Floating {
     }
 }
 
-/// Adds a floating row to a part of A.
+/// Adds the conductances of one floating row to a sum that A is made of.
 fn float(a: &mut Matrix, siemens: &Row, hold: f64) {
     let per_line = 1.0 / (hold + siemens.iter().sum::<f64>());
     for (c, g) in siemens.iter().enumerate() {

@@ -150,12 +150,13 @@ impl Bench {
         self.encoder_ns = now_ns;
     }
 
-    /// The part had something to do at an instant between two of the grid. Where that was the end of a frame the image
-    /// looks at the encoder next.
+    /// The part had something to do at an instant between two of the grid: a new duty may be in use. Where that was the
+    /// end of a frame the image looks at the encoder next.
     pub fn stopped(&mut self, board: &mut FingerBoard, at_ns: u64) {
         if !self.follows_frames {
             return;
         }
+        self.watch_bridge(board, at_ns);
         let frames = self.front_end.lock().counts.frames;
         if frames != self.frames {
             self.frames = frames;

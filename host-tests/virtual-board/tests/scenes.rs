@@ -31,6 +31,8 @@ struct Kept {
     travel_max_mm: f64,
     error_n: f64,
     every_frame: bool,
+    /// Duty at the motor at the end of each frame in the air.
+    duties: Vec<f64>,
 }
 
 impl Watch for Kept {
@@ -46,6 +48,9 @@ impl Watch for Kept {
         self.sensed_n = step.status.contact.force.0.to_num();
         self.travel_max_mm = self.travel_max_mm.max(step.truth.travel_mm);
         self.error_n = self.error_n.max((self.sensed_n - self.force_n).abs());
+        if step.truth.speed_mm_per_s > 0.0 && step.truth.force_n == 0.0 {
+            self.duties.push(step.truth.duty);
+        }
     }
 }
 
@@ -114,6 +119,18 @@ fn every_frame_is_shown_once_where_that_is_wanted_and_a_goal_that_is_lost_moves_
     assert!(kept.times_s.windows(2).all(|pair| (95e-6..105e-6).contains(&(pair[1] - pair[0]))));
     assert_eq!(kept.goal_n, 0.0);
     assert!(kept.travel_max_mm < 1e-3, "{} mm", kept.travel_max_mm);
+}
+
+/// Each answer's duty acts from the PWM's next period on: none is skipped while another one acts twice. A duty once waited
+/// for the world's next step: a beat of 100 us against a frame's 99.8 us, in which the guard felt an object in the air.
+#[test]
+fn each_duty_acts_for_a_frame() {
+    let mut kept = Kept { every_frame: true, ..Kept::default() };
+    // In the air for twice the beat. The speed law answers each count of the encoder, so no two duties are equal.
+    let far = WALL.replace("distance_mm = 1.0", "distance_mm = 4.0\n[controller]\napproach_um_per_s = 15000");
+    run(&scene(&far), &mut kept);
+    let twice = kept.duties.windows(2).filter(|pair| pair[0] == pair[1]).count();
+    assert!(kept.duties.len() > 950 && twice == 0, "{twice} of {}: {:?}", kept.duties.len(), kept.duties);
 }
 
 /// Holds 1 N on a thing along which the hand then moves, with a host that reads or does not.

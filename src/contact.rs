@@ -8,7 +8,6 @@
 
 mod equations;
 mod fit;
-mod prediction;
 
 pub use fit::Fit;
 
@@ -16,16 +15,15 @@ use crate::config::Config;
 use crate::frame::Shape;
 use crate::pressure::TactileImage;
 use crate::units::{Millimetres, Newtons};
-use equations::{Bits, Misfit};
+use equations::{Bits, Misfit, PeakScale};
 use fixed::types::I8F24;
-use prediction::PeakScale;
 
 /// Parts of the fit, for other methods that are compared with it. They may change at any time.
 #[doc(hidden)]
 pub mod parts {
-    pub use super::equations::{Comparison, Equations, Misfit};
-    pub use super::prediction::{
-        CENTRE_BITS, Guess, PEAK_BITS, PeakScale, Prediction, SLOPE_BITS, ScaledImage, interval,
+    pub use super::equations::{
+        CENTRE_BITS, Comparison, Equations, Guess, Misfit, PEAK_BITS, PeakScale, Prediction, SLOPE_BITS, ScaledImage,
+        interval,
     };
     pub use super::{TAXELS_MIN, confidence, covers};
     pub use crate::arith::{Divisor, between, clamp_to, high, root};

@@ -41,20 +41,56 @@
 //! becomes quicker at once; when it was half as long for four of the loop's own time constants, the loop becomes
 //! calmer. So a loop that swings slows down, whatever made it swing. Only gains change, never the state of observer and
 //! drive, so a change of the gain set moves nothing.
+//!
+//! # Observer
+//!
+//! A third-order observer whose poles lie together at beta in the z plane. Prediction, then correction by the error
+//! e = x_measured - x:
+//!
+//! ```text
+//! x += v T + (u - c v + w) T^2 / 2,   v += (u - c v + w) T
+//! x += l1 e,   v += l2 e,   w += l3 e
+//! l1 = 1 - beta^3,   l2 = 1.5 (1 - beta)^2 (1 + beta) / T,   l3 = (1 - beta)^3 / T^2
+//! ```
+//!
+//! An error beyond what motion can make in a frame is a jump of the encoder: the observer starts again at the new
+//! place, at rest. A limited correction would not work: three integrators behind a limited error swing for ever.
+//!
+//! # Compensation
+//!
+//! Compensates what a held force only seems to be: the array's creep, and its drift with temperature. Both are added to
+//! the goal, not subtracted from the reading: the guard, the monitor and the model see what the array reads.
+//!
+//! ## Creep
+//!
+//! Under a constant force F the reading grows to F (1 + k) with the time constant tau. So a part c of a reading S is
+//! creep, c' = (k (S - c) - c) / tau: a lag towards S k / (1 + k) with tau / (1 + k). The lag has one state of first
+//! order and moves at most half of the difference in a frame, so it stays between 0 and the largest target, and cannot
+//! ring.
+//!
+//! ## Temperature
+//!
+//! A force F on a drifting array reads
+//!
+//! ```text
+//! S = F (1 + a (T - T_gain)) + b A (T - T_zero)
+//! ```
+//!
+//! with a and b the array's coefficients, A its area, T_gain the temperature at its calibration and T_zero the
+//! temperature at which the taxels' zero was last learnt. T is the temperature of the microcontroller: a proxy, which
+//! does not show a heat source that warms only one of the two, or one of them sooner. The compensation moves a goal by
+//! half of it at most, whatever the temperature.
 
-mod compensation;
 mod drive;
-mod observer;
 
-pub use compensation::{Creep, TemperatureDrift};
 pub use drive::{Drive, WINDING_WORDS, Winding};
-pub use observer::Observer;
 
-use crate::arith::{clamp_bits, high, product};
+use crate::arith::{clamp_bits, high, nearest_product, nearest_share, product};
 use crate::config::{BRAKE_SHARE_Q8, Config, GAIN_SETS, Gains};
 use crate::state::Limits;
-use crate::units::{Duty, Millimetres, MillimetresPerSecond, MillimetresPerSecond2};
+use crate::units::{Celsius, Duty, Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons};
 use drive::SHARE_BITS;
+use fixed::types::I16F16;
 
 /// The state of the speed loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -301,4 +337,164 @@ fn share_q12(speed: i32, root: i32) -> i32 {
     // Never 0, nor the -1 by which a division can overflow.
     let root = (root.cast_unsigned() >> 10 | 1).cast_signed();
     (speed / root).clamp(-5120, 5120)
+}
+
+/// Estimate of travel, speed and disturbance at the last frame, from the encoder and the voltage.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Observer {
+    /// Tip travel from where the observer was zeroed.
+    pub travel: Millimetres,
+    /// Tip speed.
+    pub speed: MillimetresPerSecond,
+    /// Acceleration by everything but voltage and back-EMF: contact, friction, and errors of the parameters.
+    pub disturbance: MillimetresPerSecond2,
+    origin: i32,
+}
+
+impl Observer {
+    /// Observer at rest at zero.
+    pub const fn new() -> Self {
+        Self {
+            travel: Millimetres::ZERO,
+            speed: MillimetresPerSecond::ZERO,
+            disturbance: MillimetresPerSecond2::ZERO,
+            origin: 0,
+        }
+    }
+
+    /// Observer at rest, with zero travel at this count.
+    pub const fn zeroed_at(encoder: i32) -> Self {
+        Self { origin: encoder, ..Self::new() }
+    }
+
+    /// Makes this count the zero of the travel, without a change of the motion. Returns the travel there before.
+    pub fn zero(&mut self, encoder: i32, config: &Config) -> Millimetres {
+        let travel = self.measured(encoder, config);
+        self.travel = Millimetres(self.travel.0.saturating_sub(travel.0));
+        self.origin = encoder;
+        travel
+    }
+
+    /// Encoder count at which the travel is zero.
+    pub fn origin(&self) -> i32 {
+        self.origin
+    }
+
+    /// Travel at an encoder count, limited to the type's range less a count.
+    pub fn measured(&self, encoder: i32, config: &Config) -> Millimetres {
+        config.travel(encoder.wrapping_sub(self.origin))
+    }
+
+    /// Advances by a frame; `acceleration` is that by voltage and back-EMF since the last frame (Q8 mm/s^2).
+    #[inline(always)]
+    pub fn update(&mut self, encoder: i32, acceleration: i32, gains: &Gains, config: &Config) {
+        // Q8 mm/s^2 times T (Q37) to Q16 mm/s, and the mean speed over the frame times T to Q24 mm.
+        let pushed = acceleration.saturating_add(self.disturbance.to_bits());
+        let gained = nearest_product(pushed, config.frame_s_q37, 29);
+        let before = self.speed.to_bits();
+        let moved = nearest_product(before.saturating_add(gained / 2), config.frame_s_q37, 29);
+        let travel = self.travel.to_bits().saturating_add(moved);
+        let speed = before.saturating_add(gained);
+
+        let measured = self.measured(encoder, config);
+        let error = measured.to_bits().saturating_sub(travel);
+        if error.unsigned_abs() > config.jump {
+            *self = Self { travel: measured, origin: self.origin, ..Self::new() };
+            return;
+        }
+        let [l1_q31, l2_per_s_q16, l3_per_s2] = gains.observer;
+        let disturbance = self.disturbance.to_bits().saturating_add(nearest_product(error, l3_per_s2, 16));
+        self.travel = Millimetres::from_bits(travel.saturating_add(nearest_share(error, l1_q31)));
+        self.speed = MillimetresPerSecond::from_bits(speed.saturating_add(nearest_product(error, l2_per_s_q16, 24)));
+        self.disturbance = MillimetresPerSecond2::from_bits(disturbance);
+    }
+}
+
+/// Estimate of the creep of the held force.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Creep {
+    /// Creep, Q48 N, not below 0.
+    state: i64,
+}
+
+impl Creep {
+    /// Takes a frame's reading. While no force is held the creep is 0: the baseline learns what remains of it.
+    #[inline(always)]
+    pub fn observe(&mut self, held: bool, force: Newtons, config: &Config) {
+        if config.creep_share_q32 == 0 || !held {
+            self.state = 0;
+            return;
+        }
+        let target = (i64::from(force.to_bits().max(0)) * i64::from(config.creep_share_q32)) >> 32;
+        let way = target - (self.state >> 32);
+        self.state = self.state.saturating_add(way * i64::from(config.creep_leak_q32));
+    }
+
+    /// Returns a reading less its creep.
+    #[inline(always)]
+    pub fn less(&self, reading: Newtons) -> Newtons {
+        Newtons(reading.0.saturating_sub(self.force().0))
+    }
+
+    /// Creep in the reading.
+    #[inline(always)]
+    pub fn force(&self) -> Newtons {
+        Newtons(I16F16::from_bits((self.state >> 32) as i32))
+    }
+}
+
+/// Least temperature that is used, degrees Celsius in Q16.
+const CELSIUS_MIN: i32 = -64 << 16;
+/// Largest temperature that is used, degrees Celsius in Q16.
+const CELSIUS_MAX: i32 = 192 << 16;
+/// A reading moves the filtered temperature by 2^-10 of the difference.
+const CHIP_FILTER_BITS: u32 = 10;
+
+/// Temperatures from which the array's drift is computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TemperatureDrift {
+    /// Filtered temperature of the microcontroller, degrees Celsius in Q32; none before the first reading, and while
+    /// the compensation is off.
+    chip: Option<i64>,
+    /// Temperature when the zero was last learnt, degrees Celsius in Q16.
+    zero: i32,
+}
+
+impl TemperatureDrift {
+    /// Takes a frame's reading of the microcontroller's temperature. Without a reading the last one is kept.
+    #[inline(always)]
+    pub fn observe(&mut self, chip: Option<Celsius>, config: &Config) {
+        if !config.drift.on() {
+            self.chip = None;
+        }
+        let Some(chip) = chip.filter(|_| config.drift.on()) else { return };
+        let chip = chip.to_bits().max(CELSIUS_MIN).min(CELSIUS_MAX);
+        match &mut self.chip {
+            Some(state) => *state += ((i64::from(chip) << 16) - *state) >> CHIP_FILTER_BITS,
+            state => {
+                *state = Some(i64::from(chip) << 16);
+                self.zero = chip;
+            }
+        }
+    }
+
+    /// Takes note that a share of the zero, Q16 from 0 to 1, was learnt at the present temperature.
+    pub fn zero(&mut self, share: i32) {
+        let way = self.chip.map_or(0, |chip| (chip >> 16) - i64::from(self.zero));
+        self.zero += ((way * i64::from(share)) >> 16) as i32;
+    }
+
+    /// Returns by how much a held force reads more than it is; at most half of the force, up or down.
+    #[inline(always)]
+    pub fn force(&self, held: Newtons, config: &Config) -> Newtons {
+        let Some(chip) = self.chip else { return Newtons::ZERO };
+        let drift = &config.drift;
+        let [warmer, since] = [drift.gain_at_q16, self.zero].map(|then| (chip >> 16) - i64::from(then));
+        let share = (warmer * i64::from(drift.gain_q32_per_k)) >> 16;
+        let held = i64::from(held.to_bits().max(0));
+        let half = held >> 1;
+        let gain = (held * share.max(-1 << 31).min(1 << 31)) >> 32;
+        let zero = (since * i64::from(drift.zero_q24_per_k)) >> 24;
+        Newtons(I16F16::from_bits((gain + zero).max(-half).min(half) as i32))
+    }
 }

@@ -1,4 +1,4 @@
-//! One scan of the array, as the converters leave it in memory.
+//! One scan of the array: a row's codes in pairs, as two converters read them at the same instant.
 //!
 //! Every type that depends on the array's shape has the rows and columns as parameters: `ROWS` driven rows and
 //! `COLUMNS` sensed columns, a [`Shape`]. A scan has a slot for each row and one with no row driven. The last slot
@@ -26,8 +26,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Shape<ROWS, COLUMNS> {
     pub const TAXELS: usize = ROWS * COLUMNS;
     /// Steps of a scan.
     pub const SLOTS: usize = ROWS + 1;
-    /// Columns that the first converter reads, which is the number of pairs of codes read at the same instant. With
-    /// an odd number of columns the second converter reads one fewer.
+    /// Columns of the first bank, which is the number of pairs of codes read at the same instant. With an odd number of
+    /// columns the second bank has one fewer.
     pub const BANK_COLUMNS: usize = lanes::pairs(COLUMNS);
     /// The larger of rows and columns.
     pub(crate) const SIDE: usize = if ROWS > COLUMNS { ROWS } else { COLUMNS };

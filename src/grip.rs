@@ -253,8 +253,8 @@ fn sensed(contact: &Contact, touch: &Touch, motion: &SpeedLoop, config: &Config,
     Millimetres(sensed)
 }
 
-/// Returns the speed from which a shorted motor stops before the force is three tenths and 0.4 N above the goal: it
-/// would roll out by v / c, of which the contact takes a fifth.
+/// Returns the largest speed from which a shorted motor stops before the force is above 1.3 times the goal and 0.4 N:
+/// it would roll out by v / c, and the contact shortens that by a fifth.
 #[inline(always)]
 fn stopping_speed(goal: Newtons, sensed: Millimetres, config: &Config) -> MillimetresPerSecond {
     let most = goal.0.saturating_add(goal.0 / 4).saturating_add(goal.0 / 20).saturating_add(STOPPED.0);

@@ -52,8 +52,6 @@ pub mod grip;
 
 pub mod safety;
 
-pub mod activity;
-
 pub mod status;
 
 pub mod pipeline;

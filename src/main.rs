@@ -5,14 +5,13 @@
 mod board;
 
 use board::analogue::Analogue;
-use board::bridge::Bridge;
+use board::bridge::{Bridge, Encoder};
 use board::control::{self, Control};
-use board::encoder::Encoder;
 use board::flash::Store;
+use board::guard::{self, Watchdogs};
 use board::log::{log_boot, log_refusal, log_remark, log_save_error, log_unfit};
 use board::scan::Scan;
-use board::watchdog::Watchdogs;
-use board::{bus, clocks, crash, guard, link_task, log, pins, stack, trace};
+use board::{bus, clocks, crash, link_task, log, pins, stack, trace};
 use defmt::{info, unwrap, warn};
 use defmt_rtt as _;
 use embassy_executor::{InterruptExecutor, Spawner};

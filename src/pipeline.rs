@@ -3,24 +3,23 @@
 //! | stage | file | from | to |
 //! | --- | --- | --- | --- |
 //! | fit level | `pipeline/budget.rs` | time of the last answer | rows of the fit in this frame |
-//! | motion | `control/observer.rs` | encoder count, last g V - c v (Q8 mm/s^2) | travel (Q24 mm), speed (Q16 mm/s), disturbance (Q8 mm/s^2) |
+//! | motion | `control.rs` | encoder count, last g V - c v (Q8 mm/s^2) | travel (Q24 mm), speed (Q16 mm/s), disturbance (Q8 mm/s^2) |
 //! | array | `pressure.rs`, by the pass of `lanes/src/rows.rs` | codes | sixteenths of a code above the tare, their sum and moments, flags |
 //! | contact | `contact.rs`, `contact/fit.rs` | sums; a row of taxels | force (Q16 N), centre (Q24 mm), uncertainty |
-//! | requests | `pipeline/requests.rs` | the command | tare, clear, another activity |
+//! | requests | `pipeline/activity.rs` | the command | tare, clear, another activity |
 //! | faults | `safety/monitor.rs`, `safety/guard.rs` | array, supply, bus; encoder, force, last g V | a fault, or none |
-//! | touch | `touch.rs` | force, travel | the surface, and how well it is known |
-//! | goal | `activity.rs`, `grip.rs`, `control/compensation.rs` | goal less force (Q16 N) | distance to go (Q24 mm), largest speed |
+//! | touch | `touch.rs` | force, travel | the surface, how well it is known, and a withheld force |
+//! | goal | `grip.rs`, `control.rs` | goal less force (Q16 N) | distance to go (Q24 mm), largest speed |
 //! | law | `control.rs` | distance, speed, disturbance | requested g V (Q8 mm/s^2) |
 //! | limits | `control/drive.rs` | requested g V, supply (mV) | g V within slew, current and voltage; duty (Q15) |
 //! | last check | `safety/guard.rs` | duty | the duty, or 0 |
 //! | result | `status.rs` | mode, duty | state of the bridge: driven by the duty, shorted, or open |
 
+mod activity;
 pub mod budget;
-mod requests;
 
 pub use crate::status::{AcknowledgedRequests, Bridge, Status, Taring};
 
-use crate::activity::{Activity, Halt};
 use crate::command::Command;
 use crate::config::Shaped;
 use crate::contact::{self, Contact, Fit};
@@ -35,6 +34,7 @@ use crate::safety::monitor::{self, Monitor, MonitorInputs};
 use crate::state::{Fault, Limits};
 use crate::touch::{Touch, TouchInputs};
 use crate::units::{Duty, Newtons};
+use activity::{Activity, Halt};
 use budget::Budget;
 
 /// Steps in a row without a new frame that are a fault. At the second one the newest frame is two frame times old; the
@@ -140,7 +140,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         let requested = self.act(&contact, [readable, no_new_tare], sense, command, &mut limits);
         let duty = if readable { self.guard.permit(requested, &mut limits) } else { Duty::ZERO };
         if duty != requested {
-            self.motion.drive.cut();
+            self.motion.drive.block();
         }
 
         self.report(duty, &contact, sense, command, limits);
@@ -357,14 +357,14 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         }
     }
 
-    /// Checks a frame that is still being scanned, filled up from the frame before. Shorts the motor if its array
+    /// Checks a frame that is still being scanned; its later rows are older. Shorts the motor if its array
     /// seems broken, and returns true. A taxel that fails just after it was read is seen a frame later; without this
     /// check the motor would be driven until that frame's end. The step decides if it is a fault.
     pub fn check_part(&mut self, frame: &Frame<ROWS, COLUMNS>) -> bool {
         let broken = self.activity.drives()
             && self.array.bad_taxels(frame, &self.config) > self.config.params.bad_taxels_max.max(0) as u32;
         if broken {
-            self.motion.drive.cut();
+            self.motion.drive.block();
             self.status.duty = Duty::ZERO;
         }
         broken

@@ -11,8 +11,8 @@
 //! | 6 press | backs off, seeks the contact, presses twice to 0.3 a or 7/8 of the largest force, to measure tip and array | done, refused or stopped: as from off |
 //! | 5 fault | brakes; a bridge that reports a fault sleeps | the fault is cleared with torque off: off |
 //!
-//! Strokes are requested in off, with torque off; a press in approach, force or release. [`crate::activity`] owns the
-//! state behind each mode.
+//! Strokes are requested in off, with torque off; a press in approach, force or release. `pipeline/activity.rs` owns
+//! the state behind each mode.
 //!
 //! Torque off leads to off from every mode but fault. A requested tare leads to tare from every mode but fault, and
 //! from a fault that is cleared in the same frame. A fault (stop) is latched until it is cleared; a limit (a present

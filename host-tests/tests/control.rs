@@ -139,9 +139,9 @@ fn a_cut_takes_the_voltage_and_leaves_the_back_emf() {
     let mut drive = Drive::new();
     for (wanted, back_emf) in [(5_000, 300), (-2_000, -70), (40, 0)] {
         apply(&mut drive, wanted, back_emf, &config);
-        drive.cut();
+        drive.block();
         assert_eq!((drive.given(), drive.acceleration()), (0, -back_emf));
-        drive.cut();
+        drive.block();
         assert_eq!((drive.given(), drive.acceleration()), (0, -back_emf), "once is enough");
     }
     assert_eq!(drive.duty(SUPPLY_MV, &config), Duty::ZERO);

@@ -131,7 +131,7 @@ pub enum NoDrift {
 
 /// Creep by a hold.
 ///
-/// The chip knows one term: under a force F the reading goes to F (1 + k) with a time constant tau (`src/control/compensation.rs`).
+/// The chip knows one term: under a force F the reading goes to F (1 + k) with a time constant tau (`src/control.rs`).
 /// Ink creeps with the logarithm of time instead, so k and tau are those that serve this hold best; `left` shows how well.
 pub fn creep(series: &HeldSeries) -> Result<Creep, NoDrift> {
     let readings = &series.readings;

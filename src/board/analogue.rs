@@ -1,4 +1,4 @@
-//! The first converter, which the scan leaves alone: the bridge's supply, and behind each conversion of it, as the
+//! ADC1, which the scan leaves alone: the bridge's supply, and behind each conversion of it, as the
 //! injected group, the internal reference and the microcontroller's temperature.
 //!
 //! Software starts it once a frame and takes its codes in the next. All three take 51 us, the supply the first 5; where

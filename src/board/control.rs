@@ -1,4 +1,5 @@
-//! The control task: one turn a frame, on an executor that only the guard, the scan and the bus interrupt.
+//! The control task: a turn at half of each frame and one at its end, on an executor that only the guard, the scan and
+//! the bus interrupt.
 //!
 //! Nothing here waits, allocates, logs or holds a lock for longer than a copy of a snapshot.
 //! A capture's start, a new configuration, new gains and a save take longer than a frame: the scan stops for them and
@@ -14,14 +15,12 @@ use fingertip::state::{Fault, Mode};
 use fingertip::units::CoreCycles;
 
 use super::analogue::Analogue;
-use super::bridge::{self, Bridge};
+use super::bridge::{self, Bridge, Encoder};
 use super::capture::Keeper;
-use super::encoder::Encoder;
 use super::exchange::{GAINS, HEARD, Heard, LOOP_STATE, LoopState, NotSaved, PARAMS, PICTURE, Report, SAVE, SAVED};
 use super::flash::Store;
-use super::guard::{self, Stopwatch};
+use super::guard::{self, Stopwatch, Watchdogs};
 use super::scan::{Completed, Scan, WAKE};
-use super::watchdog::Watchdogs;
 use super::{health, trace};
 
 /// The guard waits this many times as long for the first frame of a start as for a later one.

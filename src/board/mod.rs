@@ -10,7 +10,6 @@ pub mod clocks;
 pub mod control;
 mod copy;
 pub mod crash;
-pub mod encoder;
 pub mod exchange;
 pub mod flash;
 pub mod guard;
@@ -21,7 +20,6 @@ pub mod pins;
 pub mod scan;
 pub mod stack;
 pub mod trace;
-pub mod watchdog;
 
 /// Sets every priority of the table in `docs/firmware.md`; embassy leaves most of them at the highest.
 ///

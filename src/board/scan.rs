@@ -4,6 +4,7 @@
 //! wakes the control task. That of the rows' stream, when half of them are driven, wakes it for a check of the partial
 //! frame. The two halves of the buffers take turns, so the lowest bit of the sequence number names the half.
 
+use core::ops::Range;
 use core::sync::atomic::{AtomicBool, AtomicU16, AtomicU32, Ordering, fence};
 
 use embassy_stm32::interrupt::InterruptExt;
@@ -73,7 +74,10 @@ fn take_halfway_flag() -> bool {
 }
 
 /// The scan's hardware.
-pub struct Scan(());
+pub struct Scan {
+    /// Number of the frame of which the first slots were copied before its end, and how many.
+    early: (u32, usize),
+}
 
 impl Scan {
     /// Takes the hardware; nothing moves yet.
@@ -88,7 +92,7 @@ impl Scan {
         rcc::enable_and_reset::<TIM8>();
         rcc::enable_and_reset::<ADC3>();
         rcc::enable_and_reset::<ADC2>();
-        Self(())
+        Self { early: (0, 0) }
     }
 
     /// Stops, with no row driven.
@@ -100,7 +104,8 @@ impl Scan {
     pub fn start(&mut self, timing: ScanTiming) {
         const { assert!(CLOCKS.frame_ns.is_none(), "this scan has no idle time") };
         stop();
-        // Not before: the register is the first converter's, whose clock is on by now.
+        self.early = (0, 0);
+        // Not before: the register belongs to ADC1, whose clock is on by now.
         analogue::set_clock();
         // First of the scan, while no converter listens: a compare that is set below the counter is a trigger.
         set_timer(timing);
@@ -122,12 +127,16 @@ impl Scan {
         start_timer();
     }
 
-    /// Copies the frame. Returns false if it is not whole: a bank is missing, banks and rows are out of step, or the
-    /// DMA wrote to this half meanwhile.
+    /// Copies the frame, less the slots that [`Scan::copy_so_far`] copied: `frame` is the same one then, and unchanged
+    /// since. Returns false if the frame is not whole: a bank is missing, banks and rows are out of step, or the DMA
+    /// wrote to this half meanwhile.
     pub fn copy(&mut self, completed: Completed, frame: &mut Frame) -> bool {
         let half = completed.sequence as usize & 1;
         let arrived = bank_a_completed(half) && !overrun() && in_step();
-        copy_slots(half, SLOTS, frame);
+        // Whatever was copied early counts once: another copy may come before its frame's end.
+        let (sequence, copied) = core::mem::take(&mut self.early);
+        let first = if sequence == completed.sequence { copied } else { 0 };
+        copy_slots(half, first..SLOTS, frame);
         frame.sequence = completed.sequence;
         let untouched = [STREAM_A, STREAM_B].into_iter().all(|stream| written_half(stream) != half);
         // Twice: for the last part of a slot, banks that are one slot behind seem to be in step.
@@ -138,12 +147,17 @@ impl Scan {
         whole
     }
 
-    /// Replaces the slots of `frame` that the scan has already read again.
+    /// Replaces the first slots of `frame` by those that both banks have completed in the scan under way.
     pub fn copy_so_far(&mut self, frame: &mut Frame) {
+        // First: a number that is too old lets the whole frame be copied again.
+        let sequence = newest().sequence.wrapping_add(1);
         let [half_a, half_b] = [STREAM_A, STREAM_B].map(written_half);
         if half_a == half_b {
             let stored = u16::min(stored(STREAM_A) % HALF_LEN, stored(STREAM_B) % HALF_LEN);
-            copy_slots(half_a, usize::from(stored) / BANK_COLUMNS, frame);
+            let slots = usize::from(stored) / BANK_COLUMNS;
+            copy_slots(half_a, 0..slots, frame);
+            // A frame's lowest bit is its half.
+            self.early = (sequence, if sequence as usize & 1 == half_a { slots } else { 0 });
         }
     }
 }
@@ -170,14 +184,16 @@ pub fn note_transfers() {
     health::note_transfers(bus, stream);
 }
 
-/// Copies the first slots of a half.
+/// Copies slots of a half.
 #[inline(never)]
-fn copy_slots(half: usize, slots: usize, frame: &mut Frame) {
-    let banks = BUFFERS[0][half].iter().zip(&BUFFERS[1][half]);
-    for (slot, (bank_a, bank_b)) in banks.enumerate().take(slots) {
-        let Some(codes) = frame.codes.slot_mut(slot) else { break };
+fn copy_slots(half: usize, slots: Range<usize>, frame: &mut Frame) {
+    let [bank_a, bank_b] = [&BUFFERS[0][half], &BUFFERS[1][half]];
+    for slot in slots {
+        let (Some(a), Some(b), Some(codes)) = (bank_a.get(slot), bank_b.get(slot), frame.codes.slot_mut(slot)) else {
+            break;
+        };
         lanes::each_pair::<COLUMNS>(|at| {
-            let pair = [bank_a[at].load(Ordering::Relaxed), bank_b[at].load(Ordering::Relaxed)];
+            let pair = [a[at].load(Ordering::Relaxed), b[at].load(Ordering::Relaxed)];
             (codes[2 * at], codes[2 * at + 1]) = pair.into();
         });
     }
@@ -205,7 +221,7 @@ fn DMA2_STREAM2() {
     pac::DMA2.ifcr(0).write(|w| {
         w.set_htif(STREAM_B, first);
         w.set_tcif(STREAM_B, second);
-        // The half that comes next has yet to be completed by the first bank's stream.
+        // Bank A's flag of the half that begins now: it must not show that half's last round.
         w.set_htif(STREAM_A, half == 1);
         w.set_tcif(STREAM_A, half == 0);
     });

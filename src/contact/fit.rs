@@ -6,8 +6,7 @@
 //! changes slowly, while the sum follows every frame. So the force is the sum times the last ratio, as quick as the
 //! sum itself.
 
-use super::equations::{Comparison, Equations};
-use super::prediction::{Guess, PeakScale, Prediction, ScaledImage};
+use super::equations::{Comparison, Equations, Guess, PeakScale, Prediction, ScaledImage};
 use super::{
     CONFIDENCE_LEAST, Contact, FitLevel, TAXELS_MIN, confidence, contact_of_force, covers, from_sums, hidden, overhang,
 };
@@ -164,12 +163,11 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
         }
         // The sums are needed at the beginning of a refinement, and while there is no result.
         let begins = !self.begun;
-        let sums = (begins || self.fitted.is_none()).then(|| from_sums(picture, config));
-        if let (true, Some(sums)) = (begins, &sums)
-            && !self.start(sums, picture, config)
-        {
+        let by_sums = begins || self.fitted.is_none();
+        let mut contact = if by_sums { from_sums(picture, config) } else { Contact::default() };
+        if begins && !self.start(&contact, picture, config) {
             self.lose();
-            return *sums;
+            return contact;
         }
         self.at_work = true;
         // A refinement that is spread over frames starts in a separate frame.
@@ -179,14 +177,15 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
                 self.refine(force, config);
             }
         }
-        let contact = match (self.fitted, sums) {
-            (Some(fitted), _) => fitted.contact(force, picture, config),
-            (None, Some(sums)) => sums,
-            // A fit that was given up in this frame.
-            (None, None) => from_sums(picture, config),
-        };
+        if let Some(fitted) = self.fitted {
+            contact = fitted.contact(force, picture, config);
+        } else if !by_sums {
+            // The fit was given up in this frame.
+            contact = from_sums(picture, config);
+        }
         self.doubt = follow_doubt(self.doubt, self.target_doubt(&contact, picture, config));
-        Contact { confidence: self.confidence, doubt: (self.doubt >> 8) as u8, ..contact }
+        (contact.confidence, contact.doubt) = (self.confidence, (self.doubt >> 8) as u8);
+        contact
     }
 
     /// Begins a refinement. Returns false if the peak is too low for the model.
@@ -215,7 +214,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
 
     /// Adds the frame's share of the rows.
     fn take(&mut self, force: Newtons, picture: &TactileImage<ROWS, COLUMNS>, config: &Shaped<ROWS, COLUMNS>) {
-        let view = ScaledImage { picture, scale: self.scale };
+        let view = ScaledImage { picture, scale: &self.scale };
         self.prediction.height = self.followed(&self.guess, force);
         let comparison = Comparison { prediction: &self.prediction, view: &view, geometry: &config.geometry };
         let (rows, frame) = (self.fit_level.rows(ROWS), usize::from(self.frames));

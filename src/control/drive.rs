@@ -64,7 +64,7 @@ impl Drive {
     }
 
     /// Takes note that the guard blocked the voltage: the bridge shorts the motor.
-    pub fn cut(&mut self) {
+    pub fn block(&mut self) {
         (self.given, self.net) = (0, self.net.saturating_sub(self.given));
     }
 

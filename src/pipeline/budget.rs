@@ -20,7 +20,7 @@ pub struct Budget<const ROWS: usize, const COLUMNS: usize> {
     fit_level: FitLevel,
     /// Last requested fit level, and last deadline in cycles.
     asked: (FitLevel, u32),
-    /// True if the model was used in the frame whose time comes next; none if that time is not weighed.
+    /// True if the frame whose time comes next used the model; none if its time is not weighed.
     modelled: Option<bool>,
     /// Longest time of a frame without the model, cycles.
     without_model: u32,

@@ -60,7 +60,7 @@ pub fn read<const ROWS: usize, const COLUMNS: usize>(
     let Some(scale) = PeakScale::new(picture.peak, geometry) else {
         return sums;
     };
-    let view = ScaledImage { picture, scale };
+    let view = ScaledImage { picture, scale: &scale };
     let guess = Guess::from_lengths(sums.indentation, sums.centre_x, sums.centre_y, geometry);
     if covers(&sums, picture, config) {
         let confidence = confidence::<ROWS, COLUMNS>(&misfit(&guess, &view, config), &scale);
@@ -92,7 +92,7 @@ fn misfit<const ROWS: usize, const COLUMNS: usize>(
     config: &Shaped<ROWS, COLUMNS>,
 ) -> Misfit {
     let mut misfit = Misfit::NONE;
-    let prediction = &Prediction::new(guess, &view.scale, config);
+    let prediction = &Prediction::new(guess, view.scale, config);
     let comparison = Comparison { prediction, view, geometry: &config.geometry };
     (0..ROWS).for_each(|row| misfit.compare_row(comparison, row));
     misfit
@@ -128,11 +128,11 @@ fn step<const ROWS: usize, const COLUMNS: usize>(
     config: &Shaped<ROWS, COLUMNS>,
 ) -> (Guess, u32) {
     let geometry = &config.geometry;
-    let prediction = &Prediction::new(&guess, &view.scale, config);
+    let prediction = &Prediction::new(&guess, view.scale, config);
     let comparison = Comparison { prediction, view, geometry };
     let mut equations = Equations::<ROWS, COLUMNS>::NONE;
     if closely {
-        let rim = Rim::new(&guess, &view.scale, geometry);
+        let rim = Rim::new(&guess, view.scale, geometry);
         for row in 0..ROWS {
             equations.take_row_by(comparison, row, |model, (square, place)| {
                 if square >= prediction.inside {
@@ -144,7 +144,7 @@ fn step<const ROWS: usize, const COLUMNS: usize>(
     } else {
         (0..ROWS).for_each(|row| equations.take_row(comparison, row));
     }
-    let next = equations.solve(&guess, &view.scale, geometry);
+    let next = equations.solve(&guess, view.scale, geometry);
     let height = (guess.height >> (SQUARE_BITS - CENTRE_BITS)).abs_diff(next.height >> (SQUARE_BITS - CENTRE_BITS));
     (next, height.max(guess.x.abs_diff(next.x)).max(guess.y.abs_diff(next.y)))
 }

@@ -318,7 +318,7 @@ fn stays_within<const ROWS: usize, const COLUMNS: usize>(poses: u32) {
         let peak = between(&mut rng, 16, 4_095 * 16 * i32::from(GAIN_MAX >> 14));
         let Some(scale) = PeakScale::new(peak, geometry) else { continue };
         picture.taxels.as_flattened_mut().fill_with(|| between(&mut rng, 0, peak));
-        let view = ScaledImage { picture: &picture, scale };
+        let view = ScaledImage { picture: &picture, scale: &scale };
         for _ in 0..500 {
             let [x, y] = [COLUMNS, ROWS].map(|side| {
                 let reach = (geometry.pitch >> (SQUARE_BITS - CENTRE_BITS)) * side as i32 / 2 + (1 << CENTRE_BITS);
@@ -365,7 +365,7 @@ fn stays_within_along_the_rim<const ROWS: usize, const COLUMNS: usize>() {
             let guess = Guess::new(height, 0, rim - off - pitch / 2 * (ROWS as i32 - 1), geometry);
             let mut prediction = Prediction::new(&guess, &scale, &config);
             prediction.height -= FOLLOWED;
-            take(&prediction, &ScaledImage { picture: &picture, scale }, geometry);
+            take(&prediction, &ScaledImage { picture: &picture, scale: &scale }, geometry);
         }
     }
 }

@@ -7,7 +7,7 @@ use embassy_stm32::peripherals::{IWDG, WWDG};
 use fingertip::link::snapshot::ResetCause;
 use fingertip::scan::ScanTiming;
 
-use crate::board::watchdog::Watchdogs;
+use crate::board::guard::Watchdogs;
 use crate::{CYCLES_PER_US, passed, report};
 
 #[derive(Clone, Copy, PartialEq, Eq)]

@@ -15,7 +15,6 @@ use crate::metrics;
 use crate::setup::Setup;
 use core::f64::consts::TAU;
 use fingertip::pipeline::{self, Status};
-use serde::{Deserialize, Serialize};
 
 /// exp(-x) for x of 0 or more, from the four operations alone, so that every machine gives the same bits.
 ///
@@ -35,7 +34,7 @@ pub fn decay(x: f64) -> f64 {
 }
 
 /// Bridge of the motor, as the world sees it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Bridge {
     /// Both half bridges open.
     #[default]
@@ -76,7 +75,7 @@ pub struct Finger<D> {
 }
 
 /// State of the motion. A finger of the same setup continues from it to the bit.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug)]
 pub struct Motion {
     /// Shaft before and after the last step.
     before: Shaft,

@@ -1,7 +1,7 @@
 //! Plant: the reference finger of `docs/board.md` with its array, moved step by step.
 //!
 //! The plant is a finger in the world of scenes, with these differences: its effects are part of its [`Setup`], it can
-//! be broken during a run ([`Faults`]), its rows are driven pin by pin, and a snapshot by serde restores every bit.
+//! be broken during a run ([`Faults`]), and its rows are driven pin by pin.
 
 pub use crate::setup::Setup;
 
@@ -9,32 +9,20 @@ use crate::effects::drive::{self, Circuit, Friction};
 use crate::effects::sensor::{self, Readout, Settling};
 use crate::effects::{Parts, Set, contact};
 use crate::mechanics::rotor::Shaft;
-use crate::mechanics::{Bridge, Finger, Motion, decay};
+use crate::mechanics::{Bridge, Finger, decay};
 use crate::scene::Scene;
 use crate::setup::Array;
 use crate::world::{Surroundings, World};
 use fingertip::frame::Sense;
 use fingertip::shipped::{COLUMNS, Frame, ROWS, SLOTS};
-use serde::{Deserialize, Serialize};
 
 /// Finger and its array at one instant.
-#[derive(Serialize, Deserialize)]
-#[serde(from = "Kept", into = "Kept")]
 pub struct Plant {
     /// Defects; may be changed at any time.
     pub faults: Faults,
     world: World<Reference>,
     sensor: Sensor,
     readout: Readout,
-}
-
-/// Contents of a snapshot. Everything else follows from them.
-#[derive(Serialize, Deserialize)]
-struct Kept {
-    setup: Setup,
-    faults: Faults,
-    motion: Motion,
-    counts: i32,
 }
 
 impl Plant {
@@ -179,38 +167,13 @@ fn driven_in(slot: usize) -> [bool; ROWS] {
     core::array::from_fn(|row| row == slot)
 }
 
-impl From<&Plant> for Kept {
-    fn from(plant: &Plant) -> Self {
-        let finger = plant.finger();
-        Self {
-            setup: finger.setup().clone(),
-            faults: plant.faults,
-            motion: finger.motion(),
-            counts: finger.drive.counts,
-        }
-    }
-}
-
-impl From<Plant> for Kept {
-    fn from(plant: Plant) -> Self {
-        Self::from(&plant)
-    }
-}
-
-impl From<Kept> for Plant {
-    fn from(kept: Kept) -> Self {
-        let mut plant = Self::new(&kept.setup);
-        plant.faults = kept.faults;
-        let finger = plant.finger_mut();
-        finger.resume(&kept.motion);
-        finger.drive.counts = kept.counts;
-        plant
-    }
-}
-
 impl Clone for Plant {
     fn clone(&self) -> Self {
-        Kept::from(self).into()
+        let (mut plant, finger) = (Self::new(self.setup()), self.finger());
+        plant.faults = self.faults;
+        plant.finger_mut().resume(&finger.motion());
+        plant.finger_mut().drive.counts = finger.drive.counts;
+        plant
     }
 }
 
@@ -220,7 +183,7 @@ impl core::fmt::Debug for Plant {
     }
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Taxel {
     #[default]
     Sound,
@@ -230,7 +193,7 @@ pub enum Taxel {
 }
 
 /// State of the switch of a row.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Row {
     #[default]
     Sound,
@@ -240,7 +203,7 @@ pub enum Row {
     StuckLow,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ArrayFaults {
     pub taxels: [[Taxel; COLUMNS]; ROWS],
     pub rows: [Row; ROWS],
@@ -260,7 +223,7 @@ impl ArrayFaults {
 }
 
 /// Defects of the board.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Faults {
     pub array: ArrayFaults,
     pub encoder_frozen: bool,

@@ -1,9 +1,7 @@
 //! Components of the simulated board: plain data in the units of their names.
 
-use serde::{Deserialize, Serialize};
-
 /// Everything around the microcontroller. The defaults are the reference finger of `docs/board.md`.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Setup {
     pub tip: Tip,
     pub wall: Wall,
@@ -15,7 +13,7 @@ pub struct Setup {
 }
 
 /// The hemispherical fingertip of Park, Kim and Hirai (2003).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tip {
     pub radius_mm: f64,
     /// Young's modulus Y.
@@ -29,7 +27,7 @@ impl Default for Tip {
 }
 
 /// Rigid plane in front of the tip, and the place of the contact on the array.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wall {
     /// Travel at which the tip touches.
     pub distance_mm: f64,
@@ -46,7 +44,7 @@ impl Default for Wall {
 }
 
 /// A resistive array read at zero potential: one row driven, each column into a transimpedance amplifier.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Array {
     /// Distance from taxel to taxel; the taxels are squares that touch.
     pub pitch_mm: f64,
@@ -116,7 +114,7 @@ impl Default for Array {
 }
 
 /// A brushed motor with its encoder. The defaults are the data sheet of the FAULHABER 1331 T 006 SR with an IE2-400.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motor {
     pub resistance_ohm: f64,
     /// Torque constant; also the back-EMF constant in V s/rad.
@@ -140,7 +138,7 @@ impl Default for Motor {
 }
 
 /// Gearhead, drum and tendon, rigid and without play.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transmission {
     /// Motor turns for one turn of the drum.
     pub ratio: f64,
@@ -157,7 +155,7 @@ impl Default for Transmission {
 }
 
 /// An ideal source behind a resistance, and the bridge.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Supply {
     /// Voltage without load.
     pub source_v: f64,

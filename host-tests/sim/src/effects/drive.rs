@@ -11,10 +11,9 @@ use crate::mechanics::decay;
 use crate::scene::tables::Key;
 use crate::setup::Setup;
 use crate::watch::{Cost, Truth};
-use serde::{Deserialize, Serialize};
 
 /// Circuit of the winding during a step.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Circuit {
     pub source_v: f64,
     /// Resistance of the source. The motor sees duty^2 of it.

@@ -8,10 +8,9 @@
 use crate::effects::drive::{Circuit, Friction, Stages};
 use crate::mechanics::decay;
 use crate::setup::Setup;
-use serde::{Deserialize, Serialize};
 
 /// Angle and speed of the motor's shaft.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Shaft {
     /// Angle, 0 at travel 0 of the tip.
     pub angle_rad: f64,

@@ -322,27 +322,6 @@ fn friction_holds_inside_its_band_and_not_outside() {
     }
 }
 
-proptest! {
-    #![proptest_config(cases(256))]
-
-    #[test]
-    fn a_snapshot_restores_every_bit(d in 0.0..4.0f64, duty in -1.0..1.0f64) {
-        let mut world = pressed(d);
-        run(&mut world, 1e-3, Bridge::Driven { duty });
-        world.pressure_kpa(5, 5);
-        let bytes = postcard::to_stdvec(&world).unwrap();
-        let mut restored: Plant = postcard::from_bytes(&bytes).unwrap();
-        prop_assert_eq!(&postcard::to_stdvec(&restored).unwrap(), &bytes);
-        for _ in 0..100 {
-            for side in [&mut world, &mut restored] {
-                side.advance(STEP_S, Bridge::Driven { duty: -duty });
-            }
-            prop_assert_eq!(world.shaft(), restored.shaft());
-            prop_assert_eq!(world.slot_codes(5), restored.slot_codes(5));
-        }
-    }
-}
-
 #[test]
 fn the_encoder_counts_down_to_the_lower_edge() {
     let mut world = Plant::new(&free());

@@ -121,13 +121,6 @@ impl Console {
         Ok(text.into_owned())
     }
 
-    /// Adds what another console captured.
-    pub fn take(&mut self, other: &Self) {
-        if let Some(text) = &mut self.captured {
-            text.push_str(other.text());
-        }
-    }
-
     /// Output of a stage's programs so far.
     pub fn text(&self) -> &str {
         self.captured.as_deref().unwrap_or_default()

@@ -92,39 +92,17 @@ pub fn example(name: &str, console: &mut Console) -> Result<Command> {
 pub fn tests(words: &[&str]) -> Command {
     let mut command = console::cargo("test");
     command.args(TESTS).args(words);
-    // Tests of served fingers wait most of their time.
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    if env::var_os("RUST_TEST_THREADS").is_none() {
-        command.env("RUST_TEST_THREADS", (4 * cores).to_string());
-    }
     command
 }
 
 /// Builds the tests of a command `cargo test ...`, then runs them.
 pub fn test(command: &mut Command, console: &mut Console) -> Result<()> {
-    build_tests(command, console)?;
-    console.run(command)
-}
-
-/// Builds the tests of two commands `cargo test ...`, then runs both at the same time: neither keeps all cores busy.
-pub fn test_both([first, second]: [&mut Command; 2], console: &mut Console) -> Result<()> {
-    build_tests(first, console)?;
-    build_tests(second, console)?;
-    let mut other = Console::captured();
-    let results = std::thread::scope(|scope| {
-        let second = scope.spawn(|| other.run(second));
-        [console.run(first), second.join().expect("it does not panic")]
-    });
-    console.take(&other);
-    results.into_iter().collect()
-}
-
-fn build_tests(command: &Command, console: &mut Console) -> Result<()> {
     let mut build = Command::new(command.get_program());
     // What follows `--` is for the tests.
     build.args(command.get_args().take_while(|word| *word != "--").filter(|word| *word != "--no-fail-fast"));
     build.arg("--no-run");
-    console.build(&mut build, "the tests", EMULATOR)
+    console.build(&mut build, "the tests", EMULATOR)?;
+    console.run(command)
 }
 
 /// The repository's root, wherever it lies now: as cargo says, or else around the folder that the user is in.

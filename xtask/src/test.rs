@@ -49,16 +49,20 @@ pub fn run(args: &Args, choice: Choice) -> Result<()> {
     stages.stage("emulated Cortex-M4F against this machine", |console| cores::test_m4(choice, console));
     stages.stage("example for another board", |console| cores::example(choice, console));
     stages.stage("timing model against published measurements", |console| timing::check(choice, console));
-    stages.stage("virtual board; Python package on a served finger", |console| {
+    stages.stage("virtual board", |console| {
+        let python = install::bus_python(console)?;
+        let mut command = host::tests(&["--test", "board"]);
+        let checking = image::checking(toolchain::ensure(choice, console)?, flash::BRINGUP, console)?;
+        command.env("FINGERTIP_IMAGE", &image()?.elf).env("FINGERTIP_PYTHON", &python);
+        command.env("FINGERTIP_BRINGUP", &checking.elf);
+        host::test(&mut command, console)
+    });
+    stages.stage("Python package on a served finger", |console| {
         let python = install::bus_python(console)?;
         // The wheel's builder reads the sources of every platform, also those that no build here needs.
         console.prepare(console::cargo("fetch").args(["--locked", "--quiet"]))?;
-        let mut board = host::tests(&["--test", "board"]);
-        let checking = image::checking(toolchain::ensure(choice, console)?, flash::BRINGUP, console)?;
-        board.env("FINGERTIP_IMAGE", &image()?.elf).env("FINGERTIP_PYTHON", &python);
-        board.env("FINGERTIP_BRINGUP", &checking.elf);
-        let mut served = host::tests(&["--test", "served", "--", "--ignored"]);
-        host::test_both([&mut board, served.env("FINGERTIP_PYTHON", &python)], console)
+        let mut command = host::tests(&["--test", "served", "--", "--ignored"]);
+        host::test(command.env("FINGERTIP_PYTHON", &python), console)
     });
     stages.stage("reports in a browser", |console| {
         let program = install::browser(console)?;

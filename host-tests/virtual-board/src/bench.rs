@@ -153,10 +153,10 @@ impl Bench {
     /// The part had something to do at an instant between two of the grid: a new duty may be in use. Where that was the
     /// end of a frame the image looks at the encoder next.
     pub fn stopped(&mut self, board: &mut FingerBoard, at_ns: u64) {
+        self.watch_bridge(board, at_ns);
         if !self.follows_frames {
             return;
         }
-        self.watch_bridge(board, at_ns);
         let frames = self.front_end.lock().counts.frames;
         if frames != self.frames {
             self.frames = frames;

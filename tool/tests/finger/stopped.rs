@@ -89,13 +89,13 @@ fn a_killed_command_leaves_no_force_and_the_fault_of_the_watchdog() {
 /// Ends of a program: its signal, or a cable that is pulled out.
 const ENDS: [Option<Signal>; 5] = [Some(Signal::INT), Some(Signal::TERM), Some(Signal::HUP), Some(Signal::KILL), None];
 
-/// One instant of every motion and end, drawn with a fixed seed; the motions side by side. More with
+/// One instant of every motion and end, drawn with a fixed seed. More with
 /// `INSTANTS=50 cargo test -p fingertip-cli --test finger any_instant -- --nocapture`.
 #[test]
 fn a_program_that_ends_at_any_instant_leaves_no_force() {
     let instants = std::env::var("INSTANTS").map_or(1, |text| text.parse().expect("a number of instants"));
-    let ends_anywhere = |arguments: &[&str], seed: u64| {
-        let mut random = fastrand::Rng::with_seed(seed);
+    let mut random = fastrand::Rng::with_seed(28);
+    for (arguments, _) in MOTIONS {
         // Long enough to be ended while the force is held.
         let short = arguments.iter().map(|word| if *word == "1000000" { "0.5" } else { *word });
         let arguments: Vec<&str> = short.collect();
@@ -106,12 +106,7 @@ fn a_program_that_ends_at_any_instant_leaves_no_force() {
             }
         }
         println!("{arguments:?}: no force left at {instants} instants of {} ends, {packets} packets", ENDS.len());
-    };
-    std::thread::scope(|scope| {
-        for ((arguments, _), seed) in MOTIONS.iter().zip(28..) {
-            scope.spawn(move || ends_anywhere(arguments, seed));
-        }
-    });
+    }
 }
 
 /// Its file, where a command writes one.

@@ -8,7 +8,9 @@ import tempfile
 from pathlib import Path
 from typing import Optional
 
-from served import PYTHON, OnServed
+from served import PATIENT_MS, PYTHON, OnServed
+
+PATIENT = ["--timeout-ms", str(int(PATIENT_MS))]  # on a busy machine an answer takes longer than by default
 
 
 class Package(OnServed):
@@ -38,11 +40,11 @@ class Package(OnServed):
             [installed] = folder.glob("venv/lib/*/site-packages/fingertip")
             files = [sorted(path.name for path in place.glob("*.*")) for place in [PYTHON / "fingertip", installed]]
             self.assertEqual(files[0], files[1])
-            shown = self.done(python, PYTHON / "examples" / "parameters.py", "--port", self.served.port)
+            shown = self.done(python, PYTHON / "examples" / "parameters.py", "--port", self.served.port, *PATIENT)
             self.assertIn("modulus_pa", shown)
             # The program of the wheel, run by the package of the wheel.
-            asks = f"from fingertip import run; print(run('info', port={self.served.port!r})['model_number'])"
+            asks = f"from fingertip import run; print(run('info', *{PATIENT}, port={self.served.port!r})['model_number'])"
             self.assertEqual("21574", self.done(python, "-c", asks).strip())
-            wrong = f"from fingertip import run; run('press', '99', port={self.served.port!r})"
+            wrong = f"from fingertip import run; run('press', '99', *{PATIENT}, port={self.served.port!r})"
             told = subprocess.run([python, "-c", wrong], env={**os.environ, "PYTHONPATH": sysconfig.get_path("purelib")}, stderr=subprocess.PIPE, text=True)
             self.assertIn("FingertipError", told.stderr)

@@ -134,7 +134,7 @@ fn the_duty_is_the_voltages_share_of_the_supply() {
 }
 
 #[test]
-fn a_cut_takes_the_voltage_and_leaves_the_back_emf() {
+fn a_blocked_drive_loses_its_voltage_and_keeps_the_back_emf() {
     let config = free();
     let mut drive = Drive::new();
     for (wanted, back_emf) in [(5_000, 300), (-2_000, -70), (40, 0)] {

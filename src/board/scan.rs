@@ -133,7 +133,7 @@ impl Scan {
     pub fn copy(&mut self, completed: Completed, frame: &mut Frame) -> bool {
         let half = completed.sequence as usize & 1;
         let arrived = bank_a_completed(half) && !overrun() && in_step();
-        // Whatever was copied early counts once: another copy may come before its frame's end.
+        // Every copy discards the early rows: a late copy of the frame before has overwritten them.
         let (sequence, copied) = core::mem::take(&mut self.early);
         let first = if sequence == completed.sequence { copied } else { 0 };
         copy_slots(half, first..SLOTS, frame);

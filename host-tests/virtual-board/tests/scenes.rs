@@ -121,8 +121,8 @@ fn every_frame_is_shown_once_where_that_is_wanted_and_a_goal_that_is_lost_moves_
     assert!(kept.travel_max_mm < 1e-3, "{} mm", kept.travel_max_mm);
 }
 
-/// Each answer's duty acts from the PWM's next period on: none is skipped while another one acts twice. A duty once waited
-/// for the world's next step: a beat of 100 us against a frame's 99.8 us, in which the guard felt an object in the air.
+/// Each duty acts for one frame, from the next PWM period on. On a board that applies duties only at the world's steps of
+/// 100 us, against frames of 99.8 us, some act for two frames and others never: the guard then takes the air for an object.
 #[test]
 fn each_duty_acts_for_a_frame() {
     let mut kept = Kept { every_frame: true, ..Kept::default() };

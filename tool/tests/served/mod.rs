@@ -54,6 +54,9 @@ struct Line {
     /// Time of the last packet, s, and the number of packets.
     heard_s: f64,
     heard: u64,
+    /// Time by which a patient finger's clock differs from the one that its server sees, s: more while it waits, less with
+    /// each packet, behind which it is late and thus as fast as the machine.
+    waited_s: f64,
 }
 
 /// Simulated time that a patient finger goes on after a packet, s.
@@ -87,7 +90,7 @@ impl serve::Finger for Told {
     type Error = std::convert::Infallible;
 
     fn now_s(&self) -> f64 {
-        self.native.now_s()
+        self.native.now_s() + self.line.waited_s
     }
 
     fn run_until(&mut self, time_s: f64) -> Result<(), Self::Error> {
@@ -95,7 +98,7 @@ impl serve::Finger for Told {
             // A look leaves the finger's clock alone.
             let look = match command.as_str() {
                 "look" => Some(self.native.command("state")),
-                "now" => Some(Ok(self.now_s().to_string())),
+                "now" => Some(Ok(self.native.now_s().to_string())),
                 "heard" => Some(Ok(self.line.heard.to_string())),
                 _ => None,
             };
@@ -112,8 +115,14 @@ impl serve::Finger for Told {
         if let Some((_, number)) = self.line.trap.take_if(|(word, _)| in_state(word)) {
             self.native.0.hear(&instruction(number));
         }
-        let last_s = if self.line.patient { self.line.heard_s + PATIENT_S } else { time_s };
-        self.native.run_until(time_s.min(last_s))
+        let line = &mut self.line;
+        let last_s = if line.patient { line.heard_s + PATIENT_S } else { f64::INFINITY };
+        self.native.run_until(last_s.min(time_s - line.waited_s))?;
+        // While it waits it keeps up, so that its server sleeps.
+        if time_s - line.waited_s > last_s {
+            line.waited_s = time_s - self.native.now_s();
+        }
+        Ok(())
     }
 
     fn hear(&mut self, bytes: &[u8]) -> Result<(), Self::Error> {
@@ -124,6 +133,7 @@ impl serve::Finger for Told {
         }
         line.heard_s = self.native.now_s();
         line.heard += 1;
+        line.waited_s -= if line.patient { PATIENT_S } else { 0.0 };
         if let Some((left, lost, unheard)) = &mut line.ears {
             if *left > 0 {
                 *left -= 1;
@@ -145,7 +155,7 @@ impl serve::Finger for Told {
     }
 
     fn due_s(&self) -> Option<f64> {
-        self.native.due_s()
+        self.native.due_s().map(|due_s| due_s + self.line.waited_s)
     }
 
     fn baud(&self) -> Option<u32> {
@@ -328,7 +338,7 @@ impl Served {
     fn until_by(&self, look: &str, word: &str) {
         let begun = Instant::now();
         while !self.command(look).contains(word) {
-            assert!(begun.elapsed() < Duration::from_secs(60), "no {word} in {}", self.command(look));
+            assert!(begun.elapsed() < Duration::from_secs(600), "no {word} in {}", self.command(look));
             std::thread::sleep(Self::LOOK);
         }
     }

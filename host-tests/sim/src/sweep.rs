@@ -213,8 +213,8 @@ impl Rows {
     pub fn open(plan: &Plan, out: &Path, head: Head) -> Result<Self, RunError> {
         let file = out.join(runs_name(plan));
         let name = format!("the sweep {} of {} runs", head.id, head.runs);
-        let (part, lines) = part::Part::open(&file, &name)?;
         refuse_others(&file, &head.id)?;
+        let (part, lines) = part::Part::open(&file, &name)?;
         let (mut rows, width) = (BTreeMap::new(), head.columns.len());
         for line in lines {
             let mut reader = ReaderBuilder::new().has_headers(false).from_reader(line.as_bytes());

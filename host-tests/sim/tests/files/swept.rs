@@ -162,6 +162,7 @@ fn the_results_of_another_sweep_stay() {
     let (out, runs, part) = swept("others");
     let other = ["--vary", "tip.radius_mm=9..10:2"];
     refused(&mut sweep_command(&out, &other), "holds the sweep wall-");
+    assert!(!fs::exists(out.join("runs.csv.part")).unwrap(), "it would keep out the sweep whose folder this is");
     fs::remove_file(out.join("runs.csv")).unwrap();
     fs::write(out.join("runs.csv.part"), &part).unwrap();
     refused(&mut sweep_command(&out, &other), "holds what is done of the sweep wall-");

@@ -430,12 +430,6 @@ impl Creep {
         self.state = self.state.saturating_add(way * i64::from(config.creep_leak_q32));
     }
 
-    /// Returns a reading less its creep.
-    #[inline(always)]
-    pub fn less(&self, reading: Newtons) -> Newtons {
-        Newtons(reading.0.saturating_sub(self.force().0))
-    }
-
     /// Creep in the reading.
     #[inline(always)]
     pub fn force(&self) -> Newtons {

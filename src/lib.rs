@@ -19,47 +19,25 @@ extern crate std;
 pub use fixed;
 
 pub mod units;
-
 pub mod arith;
-
 pub mod params;
-
 pub mod model;
-
 pub mod frame;
-
 pub mod scan;
-
 pub mod chip;
-
 pub mod config;
-
 pub mod state;
-
 pub mod pressure;
-
 pub mod contact;
-
 pub mod touch;
-
 pub mod command;
-
 pub mod control;
-
 pub mod measure;
-
 pub mod grip;
-
 pub mod safety;
-
 pub mod status;
-
 pub mod pipeline;
-
 pub mod capture;
-
 pub mod store;
-
 pub mod link;
-
 pub mod shipped;

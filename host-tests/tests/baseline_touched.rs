@@ -349,18 +349,6 @@ const MODULI_KPA: [f64; 3] = [100.0, 250.0, 700.0];
 const FORCES_N: [f64; 7] = [0.2, 0.3, 0.5, 1.0, 2.0, 4.0, 7.0];
 
 #[test]
-fn a_tare_on_a_free_tip_is_never_flagged() {
-    for seed in 0..ARRAYS {
-        let mut finger = Finger::new(seed, 250.0);
-        assert!(!finger.tare(0.0, [0.0; 2]), "the first of array {seed}");
-        for again in 1..4 {
-            finger.warm();
-            assert!(!finger.tare(0.0, [0.0; 2]), "number {again} after it, of array {seed}");
-        }
-    }
-}
-
-#[test]
 fn a_first_tare_under_two_tenths_of_a_newton_and_more_is_flagged() {
     for seed in 0..ARRAYS {
         let modulus_kpa = MODULI_KPA[seed as usize % 3];

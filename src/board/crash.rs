@@ -12,6 +12,7 @@ use embassy_stm32::pac::rcc::regs::Csr;
 use fingertip::link::snapshot::{Crash, CrashCause, ResetCause};
 
 use super::bridge;
+use super::stack::{_stack_end, _stack_start};
 
 const MAGIC: u32 = 0x4649_4E47;
 
@@ -30,13 +31,6 @@ struct Record {
 
 #[unsafe(link_section = ".uninit.crash")]
 static mut RECORD: MaybeUninit<Record> = MaybeUninit::uninit();
-
-unsafe extern "C" {
-    /// The stack's lower end; from memory.x.
-    static _stack_end: u32;
-    /// Upper end of the stack, where it starts.
-    static _stack_start: u32;
-}
 
 /// Reason of this start.
 #[derive(Clone, Copy)]

@@ -95,15 +95,38 @@ impl Scan {
         Self { early: (0, 0) }
     }
 
-    /// Stops, with no row driven.
+    /// Stops the timer first, which requests the DMA, then converters and streams. No row stays driven.
     pub fn stop(&mut self) {
-        stop();
+        pac::TIM8.cr1().write(|w| w.set_cen(false));
+        pac::TIM8.dier().write(|_| ());
+        for adc in SCANNING {
+            adc.cr2().write(|_| ());
+            adc.sr().write(|_| ());
+        }
+        for stream in [STREAM_A, STREAM_ROWS, STREAM_B] {
+            let stream = pac::DMA2.st(stream);
+            stream.cr().modify(|w| w.set_en(false));
+            // A transfer under way is finished first: a few cycles.
+            while stream.cr().read().en() {}
+        }
+        pac::DMA2.ifcr(0).write(|w| {
+            for stream in [STREAM_A, STREAM_ROWS, STREAM_B] {
+                w.set_htif(stream, true);
+                w.set_tcif(stream, true);
+                w.set_teif(stream, true);
+                w.set_dmeif(stream, true);
+                w.set_feif(stream, true);
+            }
+        });
+        interrupt::DMA2_STREAM1.unpend();
+        interrupt::DMA2_STREAM2.unpend();
+        pac::GPIOB.bsrr().write(|w| w.0 = ALL_PINS << 16);
     }
 
     /// Restarts from the first row. The first frame must not be used: the converters have just woken.
     pub fn start(&mut self, timing: ScanTiming) {
         const { assert!(CLOCKS.frame_ns.is_none(), "this scan has no idle time") };
-        stop();
+        self.stop();
         self.early = (0, 0);
         // Not before: the register belongs to ADC1, whose clock is on by now.
         analogue::set_clock();
@@ -180,8 +203,19 @@ fn what_broke(half: usize) -> Broken {
 
 /// Counts the errors of the transfers since the last call.
 pub fn note_transfers() {
-    let (bus, stream) = take_errors();
-    health::note_transfers(bus, stream);
+    let flags = pac::DMA2.isr(0).read();
+    let streams = [STREAM_A, STREAM_ROWS, STREAM_B];
+    pac::DMA2.ifcr(0).write(|w| {
+        for stream in streams {
+            w.set_teif(stream, true);
+            w.set_dmeif(stream, true);
+            w.set_feif(stream, true);
+        }
+    });
+    let any =
+        |failed: fn(&pac::dma::regs::Ixr, usize) -> bool| streams.into_iter().any(|stream| failed(&flags, stream));
+    let stream_failed = any(|flags, stream| flags.dmeif(stream) || flags.feif(stream));
+    health::note_transfers(any(|flags, stream| flags.teif(stream)), stream_failed);
 }
 
 /// Copies slots of a half.
@@ -264,34 +298,6 @@ static ROW_WORDS: [AtomicU32; SLOTS] = {
 };
 /// The rows, and the frame's trace pin.
 const ALL_PINS: u32 = ((1 << ROWS) - 1) | (1 << trace::FRAME);
-
-/// Stops the timer first, which requests the DMA, then converters and streams. No row stays driven.
-fn stop() {
-    pac::TIM8.cr1().write(|w| w.set_cen(false));
-    pac::TIM8.dier().write(|_| ());
-    for adc in SCANNING {
-        adc.cr2().write(|_| ());
-        adc.sr().write(|_| ());
-    }
-    for stream in [STREAM_A, STREAM_ROWS, STREAM_B] {
-        let stream = pac::DMA2.st(stream);
-        stream.cr().modify(|w| w.set_en(false));
-        // A transfer under way is finished first: a few cycles.
-        while stream.cr().read().en() {}
-    }
-    pac::DMA2.ifcr(0).write(|w| {
-        for stream in [STREAM_A, STREAM_ROWS, STREAM_B] {
-            w.set_htif(stream, true);
-            w.set_tcif(stream, true);
-            w.set_teif(stream, true);
-            w.set_dmeif(stream, true);
-            w.set_feif(stream, true);
-        }
-    });
-    interrupt::DMA2_STREAM1.unpend();
-    interrupt::DMA2_STREAM2.unpend();
-    pac::GPIOB.bsrr().write(|w| w.0 = ALL_PINS << 16);
-}
 
 fn start_converter(adc: Adc, set_sequence: impl FnOnce()) {
     adc.cr1().write(|w| w.set_scan(true));
@@ -405,20 +411,4 @@ fn bank_a_completed(half: usize) -> bool {
 /// A converter that was not read in time stops asking for DMA.
 fn overrun() -> bool {
     SCANNING.into_iter().any(|adc| adc.sr().read().ovr())
-}
-
-/// Returns if a transfer failed on the memory's bus, and if a stream failed, since the last call.
-fn take_errors() -> (bool, bool) {
-    let flags = pac::DMA2.isr(0).read();
-    let streams = [STREAM_A, STREAM_ROWS, STREAM_B];
-    pac::DMA2.ifcr(0).write(|w| {
-        for stream in streams {
-            w.set_teif(stream, true);
-            w.set_dmeif(stream, true);
-            w.set_feif(stream, true);
-        }
-    });
-    let any =
-        |failed: fn(&pac::dma::regs::Ixr, usize) -> bool| streams.into_iter().any(|stream| failed(&flags, stream));
-    (any(|flags, stream| flags.teif(stream)), any(|flags, stream| flags.dmeif(stream) || flags.feif(stream)))
 }

@@ -19,9 +19,9 @@ const PAINT: u32 = 0xCCCC_CCCC;
 
 unsafe extern "C" {
     /// The stack's lower end; from memory.x.
-    static _stack_end: u32;
+    pub(super) static _stack_end: u32;
     /// Upper end of the stack, where it starts.
-    static _stack_start: u32;
+    pub(super) static _stack_start: u32;
 }
 
 /// Words of paint in a look: some 20 us.

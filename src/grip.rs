@@ -32,8 +32,6 @@ const CHECKED: I8F24 = I8F24::from_bits(1 << 23);
 /// Force by which it must fall: 0.1 N, or half of it if that is less. An object that yields by 2 mm/N loses 0.2 N of
 /// 7 N and nearly all of 0.2 N. The residue of hysteresis and creep falls by a few percent in that time.
 const FALLS: Newtons = Newtons::from_bits((1 << 16) / 10);
-/// Longest release after the bus fell silent, ns.
-const LAST_RELEASE_NS: u32 = 500_000_000;
 /// Force beyond the goal and three tenths of it within which a shorted motor must be able to stop: 0.4 N.
 const STOPPED: Newtons = Newtons::from_bits((4 << 16) / 10);
 
@@ -50,8 +48,6 @@ pub struct Goal {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Grip {
     release: Option<Release>,
-    /// Time since the bus fell silent, ns. From then on the object is released, whatever the host requests.
-    silent_ns: Option<u32>,
     /// The part of the reading that is creep.
     pub creep: Creep,
 }
@@ -70,18 +66,6 @@ struct Release {
 }
 
 impl Grip {
-    /// Takes a frame of a grip whose bus is `silent`, or was. Returns true once the tip rests clear of the object, at
-    /// the latest 0.5 s after the bus fell silent.
-    pub fn ends(&mut self, silent: bool, touch: &Touch, motion: &SpeedLoop, config: &Config) -> bool {
-        if !silent && self.silent_ns.is_none() {
-            return false;
-        }
-        let ns = self.silent_ns.map_or(0, |ns| ns.saturating_add(config.timing.frame_ns));
-        self.silent_ns = Some(ns);
-        let clear = matches!(touch.stage(), Stage::None | Stage::Clear);
-        clear && motion.observer.speed.0.saturating_abs() <= config.approach.0 / 16 || ns > LAST_RELEASE_NS
-    }
-
     /// Mode as reported.
     pub fn mode(&self, touch: &Touch) -> Mode {
         match (&self.release, touch.stage()) {
@@ -102,14 +86,11 @@ impl Grip {
         config: &Config,
         limits: &mut Limits,
     ) -> Reference {
-        let asked = self.silent_ns.is_none() && goal.force > Newtons::ZERO;
-        let holds = asked && touch.stage() != Stage::Doubtful;
+        let holds = goal.force > Newtons::ZERO && touch.stage() != Stage::Doubtful;
         self.creep.observe(holds && touch.held(), contact.force, config);
         let (distance, limit, slack) = if holds {
-            if self.release.is_some() {
-                self.release = None;
-                touch.seek();
-            }
+            self.release = None;
+            touch.seek();
             self.pressing(goal, contact, touch, motion, config, limits)
         } else {
             let travel = motion.observer.travel;

@@ -32,7 +32,7 @@ use crate::pressure::{Array, Calibration};
 use crate::safety::guard::{Guard, Seen};
 use crate::safety::monitor::{self, Monitor, MonitorInputs};
 use crate::state::{Fault, Limits};
-use crate::touch::{Touch, TouchInputs};
+use crate::touch::{Stage, Touch, TouchInputs};
 use crate::units::{Duty, Newtons};
 use activity::{Activity, Halt};
 use budget::Budget;
@@ -40,6 +40,8 @@ use budget::Budget;
 /// Steps in a row without a new frame that are a fault. At the second one the newest frame is two frame times old; the
 /// board's guard trips after 1.75.
 const REPEATED_MAX: u32 = 2;
+/// Longest release after the bus fell silent, ns.
+const LAST_RELEASE_NS: u32 = 500_000_000;
 
 /// The loop's state between frames. The example at the crate's top closes a loop with it.
 ///
@@ -228,15 +230,27 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     /// itself, then stops.
     fn judge_bus(&mut self, sense: &Sense, command: &Command) -> Option<Fault> {
         let silent = command.bus_watchdog_ms != 0 && sense.bus_silent_ms >= command.bus_watchdog_ms;
-        if silent && matches!(self.activity, Activity::Press(_)) {
-            self.leave(Halt::BRAKES);
-            self.activity = Activity::Grip(Grip::default());
+        if silent {
+            self.release_for_silence();
         }
-        let ends = match &mut self.activity {
-            Activity::Grip(grip) => grip.ends(silent, &self.touch, &self.motion, &self.config),
-            _ => silent,
+        let Activity::LastRelease { ns, .. } = &mut self.activity else { return silent.then_some(Fault::BusSilent) };
+        let clear = matches!(self.touch.stage(), Stage::None | Stage::Clear);
+        let rests = self.motion.observer.speed.0.saturating_abs() <= self.config.approach.0 / 16;
+        let too_long = *ns > LAST_RELEASE_NS;
+        *ns = ns.saturating_add(self.config.timing.frame_ns);
+        (clear && rests || too_long).then_some(Fault::BusSilent)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn release_for_silence(&mut self) {
+        let grip = match self.activity {
+            Activity::Grip(grip) => grip,
+            Activity::Press(_) => Grip::default(),
+            _ => return,
         };
-        ends.then_some(Fault::BusSilent)
+        self.leave(Halt::BRAKES);
+        self.activity = Activity::LastRelease { grip, ns: 0 };
     }
 
     /// Lets the baseline learn what the array reads without a contact.
@@ -264,11 +278,12 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     ) -> Duty {
         self.status.drift = self.temperature_drift.force(command.goal, &self.config);
         let applied = i64::from(self.status.duty.0) * i64::from(sense.supply_mv);
+        let force = if matches!(self.activity, Activity::LastRelease { .. }) { Newtons::ZERO } else { command.goal };
         let Self { activity, motion, touch, config, array, status, step, .. } = self;
         let (picture, supply_mv) = (array.picture(), sense.supply_mv);
         let reference = match activity {
-            Activity::Grip(grip) => {
-                let goal = Goal { force: command.goal, drift: status.drift };
+            Activity::Grip(grip) | Activity::LastRelease { grip, .. } => {
+                let goal = Goal { force, drift: status.drift };
                 grip.reference(&goal, contact, touch, motion, config, limits)
             }
             Activity::Press(press) => {
@@ -320,9 +335,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         let Activity::Tare { halt, free } = activity else { return };
         // Not in the frame with the request, which was read with the tare before.
         if tare_goes_on && array.continue_tare() {
-            if !*free {
-                array.judge_tare(config);
-            }
+            array.judge_tare(*free, config);
             (self.tared, status.tare) = (true, Taring::Done);
             *activity = Activity::Off(*halt);
         }
@@ -339,7 +352,10 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         note(self.config.params.direction_confirmed == 0, Limits::DIRECTION);
         note(command.torque && !self.armed, Limits::TORQUE_HELD);
         self.report_activity();
-        self.status.creep = if let Activity::Grip(grip) = &self.activity { grip.creep.force() } else { Newtons::ZERO };
+        self.status.creep = match &self.activity {
+            Activity::Grip(grip) | Activity::LastRelease { grip, .. } => grip.creep.force(),
+            _ => Newtons::ZERO,
+        };
         self.status.limits = limits;
         self.status.contact = *contact;
         self.status.travel = self.motion.observer.travel;
@@ -392,6 +408,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         match self.activity {
             Activity::Tare { .. } => self.array.start_tare(),
             Activity::Off(_) => {}
+            Activity::LastRelease { .. } => self.stop(Fault::BusSilent),
             _ => {
                 self.leave(Halt::BRAKES);
                 self.status.braking = true;
@@ -400,7 +417,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         self.report_activity();
     }
 
-    /// Resets everything but the configuration and the taxels' gains: mode off, not tared, nothing measured. Requests
+    /// Resets everything but the configuration and the taxels' gains: mode off, not tared, nothing measured, torque off
+    /// until now; a tip that still moves is braked. Requests
     /// with the numbers in `taken` count as acknowledged, and `missed_frames` as missed before. The winding's
     /// temperature is restored.
     pub fn renew(&mut self, taken: AcknowledgedRequests, missed_frames: u32, winding: Winding) {
@@ -410,10 +428,10 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         self.motion = SpeedLoop { winding, ..SpeedLoop::new() };
         (self.touch, self.temperature_drift) = (Touch::default(), TemperatureDrift::default());
         (self.monitor, self.guard) = (Monitor::default(), Guard::default());
-        self.activity = Activity::Off(Halt::OPEN);
+        self.activity = Activity::Off(Halt::BRAKES);
         self.status = Status { taken, missed_frames, ..Status::default() };
         (self.tared, self.repeated, self.zeroed) = (false, None, false);
-        (self.armed, self.torque) = (false, true);
+        (self.armed, self.torque) = (false, false);
     }
 
     /// Report of the last step.

@@ -2,6 +2,7 @@
 
 use crate::common::*;
 use fingertip::capture::{Ended, Head};
+use fingertip::pipeline::Bridge;
 use fingertip::shipped::Gains;
 use replay::{Field, Frames, ReplayError, replay};
 
@@ -29,7 +30,7 @@ impl<const BYTES: usize> Recorded<BYTES> {
         while self.capture.standing().state == CaptureState::Recording {
             self.frame();
         }
-        assert_eq!(self.capture.standing().ended, Ended::Full);
+        assert_eq!(self.capture.standing().ended, Ended::Full, "{}", told(&mut self.bench));
     }
 
     /// A fresh finger that records from its tare on.
@@ -159,18 +160,18 @@ fn out_of_turn_nothing_is_kept() {
     let mut pipeline = Pipeline::new(&config);
     let mut capture = Box::new(Burst::<CODED_BYTES>::NEW);
     let (status, tare) = (Status::default(), Command { tare_request: 1, ..Command::default() });
-    assert!(!capture.is_due(&status, &tare), "nobody armed it");
+    assert!(!capture.is_due(&pipeline, &tare), "nobody armed it");
     capture.end(Ended::Asked);
     capture.record(&Frame::EMPTY, &Sense::default(), &tare, &status);
     assert_eq!((capture.standing(), capture.data()), (Default::default(), &[][..]));
     capture.arm();
     capture.arm();
     assert_eq!(capture.standing().state, CaptureState::Armed);
-    assert!(!capture.is_due(&status, &Command::default()), "nobody tares");
-    for mode in [Mode::Fault, Mode::Force, Mode::Tare] {
-        assert!(!capture.is_due(&Status { mode, ..status }, &tare), "{mode:?}");
-    }
-    assert!(capture.is_due(&status, &tare));
+    assert!(!capture.is_due(&pipeline, &Command::default()), "nobody tares");
+    let mut stopped = pipeline.clone();
+    stopped.stop(Fault::LostFrames);
+    assert!(!capture.is_due(&stopped, &tare), "a fault refuses a tare");
+    assert!(capture.is_due(&pipeline, &tare));
     // New parameters do not call it off, the host does.
     capture.end(Ended::Configured);
     assert_eq!(capture.standing().state, CaptureState::Armed);
@@ -306,12 +307,57 @@ fn what_the_finger_did_before_does_not_matter() {
     *finger.bench.command() = Command { torque: false, clear_request: 1, ..*finger.bench.command() };
     finger.bench.frames(500);
     for _ in 0..2 {
+        *finger.bench.command() = Command { torque: true, goal: newtons(0), ..*finger.bench.command() };
+        finger.frames(3_000);
+        finger.bench.command().torque = false;
+        finger.frames(300);
         finger.press();
         agrees(&finger, |_| {});
-        *finger.bench.command() = Command { torque: false, goal: newtons(0), ..*finger.bench.command() };
-        finger.frames(300);
     }
     assert_eq!(finger.capture.standing().count, 2);
+}
+
+/// The zero before remains, and the motor is shorted until the tip rests.
+#[test]
+fn a_tare_under_load_is_refused_to_a_capture_too() {
+    let mut finger = Recorded::<BYTES>::new();
+    finger.bench.tare();
+    finger.bench.command().goal = newtons(4_000);
+    finger.frames(5_000);
+    finger.bench.command().torque = false;
+    finger.frame();
+    finger.capture.arm();
+    finger.bench.command().tare_request += 1;
+    let status = finger.frame();
+    assert_eq!((status.mode, status.tare), (Mode::Off, Taring::Refused));
+    assert_eq!(finger.frame().bridge(), Bridge::Brakes);
+    assert_eq!(finger.capture.standing().state, CaptureState::Armed);
+}
+
+/// A forced tare begins one while the tip still moves: it is braked on.
+#[test]
+fn a_capture_does_not_let_a_moving_tip_go() {
+    let mut finger = Recorded::<BYTES>::new();
+    finger.bench.tare();
+    finger.bench.command().goal = newtons(4_000);
+    finger.frames(5_000);
+    finger.bench.command().torque = false;
+    finger.frame();
+    finger.capture.arm();
+    *finger.bench.command() = Command { tare_forced: true, tare_request: 9, ..*finger.bench.command() };
+    let status = finger.frame();
+    assert_eq!((finger.capture.standing().state, status.mode), (CaptureState::Recording, Mode::Tare));
+    assert_eq!(status.bridge(), Bridge::Brakes);
+}
+
+/// Torque that comes with the tare is newer than the capture's beginning.
+#[test]
+fn torque_that_comes_before_the_first_kept_step_is_taken() {
+    let mut finger = Recorded::<BYTES>::armed();
+    *finger.bench.command() = Command { torque: true, goal: newtons(800), ..*finger.bench.command() };
+    finger.frames(TARE_FRAMES + 10);
+    let status = finger.frame();
+    assert_eq!((status.mode, status.limits.has(Limits::TORQUE_HELD)), (Mode::Approach, false));
 }
 
 #[test]
@@ -320,7 +366,9 @@ fn the_motor_stays_as_warm_as_it_is() {
     finger.bench.tare();
     *finger.bench.command() = Command { torque: true, goal: newtons(6_000), ..*finger.bench.command() };
     finger.frames(5_000);
-    *finger.bench.command() = Command { torque: false, goal: newtons(0), ..*finger.bench.command() };
+    finger.bench.command().goal = newtons(0);
+    finger.frames(3_000);
+    finger.bench.command().torque = false;
     finger.frames(200);
     let before: f64 = finger.bench.status().winding.0.to_num();
     assert!(before > 88.5, "{before} C: it is warmer than after a reset");

@@ -124,7 +124,8 @@ impl<const BYTES: usize> Recorded<BYTES> {
     /// Steps a frame whose inputs to the core are changed.
     pub fn frame_with(&mut self, change: impl FnOnce(&mut Record)) -> Status {
         let Self { bench, capture } = self;
-        if capture.is_due(bench.status(), &bench.record().command) {
+        let command = bench.record().command;
+        if capture.is_due(bench.pipeline(), &command) {
             capture.begin(bench.pipeline());
         }
         let mut given = bench.record();

@@ -174,6 +174,36 @@ fn a_silent_bus() {
     assert_eq!(stopped.map(|status| status.fault), Some(Some(Fault::BusSilent)));
 }
 
+/// A host that is back within the release finds its fault: at once with torque off or a new configuration, else once the
+/// object is released.
+#[test]
+fn nothing_that_arrives_ends_a_release_for_a_silent_bus() {
+    let requests: [fn(&mut Bench); 6] = [
+        |board| board.command().torque = false,
+        |board| board.command().goal = newtons(5_000),
+        |board| board.command().tare_request += 1,
+        |board| board.command().clear_request += 1,
+        |board| board.request(Task::Press),
+        |board| {
+            let config = board.pipeline().config().clone();
+            board.pipeline().configure(&config);
+        },
+    ];
+    for (number, request) in requests.into_iter().enumerate() {
+        let mut board = holding(3_000);
+        board.command().bus_watchdog_ms = 40;
+        board.step_with(|record| record.sense.bus_silent_ms = 40);
+        board.frames(20);
+        request(&mut board);
+        let frames = (0..5_001).find(|_| board.step().mode != Mode::Release);
+        let (status, left_n) = (*board.status(), board.truth().force_n);
+        assert_eq!((status.mode, status.fault), (Mode::Fault, Some(Fault::BusSilent)), "{number}: {frames:?}");
+        let at_once = [0, 5].contains(&number);
+        assert!(if at_once { frames == Some(0) } else { left_n == 0.0 }, "{number}: {left_n} N after {frames:?}");
+        assert_ne!(status.tare, Taring::Running, "{number}");
+    }
+}
+
 #[test]
 fn a_fault_stays_until_it_is_cleared_with_torque_off() {
     let mut board = holding(1_000);

@@ -95,18 +95,6 @@ fn a_tare_that_comes_with_another_request_is_done() {
     }
 }
 
-#[test]
-fn a_tare_in_a_fault_is_refused_for_all_to_see() {
-    let mut board = faulted();
-    assert_eq!(board.step().tare, Taring::Done, "that before");
-    board.command().tare_request += 1;
-    let status = board.step();
-    assert_eq!((status.mode, status.tare), (Mode::Fault, Taring::Refused));
-    board.command().clear_request += 1;
-    let status = board.step();
-    assert_eq!((status.mode, status.tare), (Mode::Off, Taring::Refused), "it does not come back by itself");
-}
-
 /// Also in the frame of the request.
 #[test]
 fn a_fault_ends_a_tare_for_all_to_see() {
@@ -363,4 +351,45 @@ fn before_a_tare_no_contact_is_reported() {
     board.command().tare_forced = true;
     board.tare();
     assert_ne!(board.step().contact, Contact { bad_taxels: 1, ..Contact::default() });
+}
+
+/// Torque that was off in between changes nothing: the next approach does not know the surface of the one before.
+#[test]
+fn an_approach_after_a_release_forgets_the_surface() {
+    let [kept, cycled] = [false, true].map(|cycles| {
+        let mut board = ready();
+        board.hold(1_000, 0.5);
+        board.hold(0, 0.5);
+        if cycles {
+            board.command().torque = false;
+            board.frames(500);
+            board.command().torque = true;
+        }
+        board.place_object(100.0);
+        board.hold(1_000, 0.2);
+        let turned_mm = board.truth().travel_mm;
+        board.hold(0, 0.5);
+        board.truth().travel_mm - turned_mm
+    });
+    assert!(kept.abs() < 0.2 && (kept - cycled).abs() < 0.1, "{kept} mm with torque on, {cycled} mm after it was off");
+}
+
+/// The flag of a tare under a touch lasts until the next tare, also where that is not judged, since the tip was released.
+#[test]
+fn a_tare_of_a_released_tip_is_not_flagged_by_the_one_before() {
+    let flagged = |board: &mut Bench| board.step().limits.has(Limits::TARED_TOUCHING);
+    let mut board = ready();
+    board.hold(0, 0.1);
+    board.place_object(-0.3);
+    board.command().tare_forced = true;
+    board.tare();
+    assert!(flagged(&mut board), "{}", told(&mut board));
+    board.hold(1_000, 0.5);
+    board.hold(0, 0.5);
+    board.command().tare_forced = false;
+    board.tare();
+    assert!(!flagged(&mut board), "{}", told(&mut board));
+    board.hold(1_000, 0.5);
+    let status = board.step();
+    assert_eq!(status.mode, Mode::Force, "{}", told(&mut board));
 }

@@ -25,17 +25,13 @@ pub fn ask(arm: bool) {
 /// State of the capture that control knows without access to it.
 #[derive(Clone, Copy, Default)]
 pub struct Keeper {
-    standing: CaptureStatus,
+    /// Status of the capture.
+    pub standing: CaptureStatus,
     /// A motion that measures was under way in the step before.
     measures: bool,
 }
 
 impl Keeper {
-    /// Status of the capture.
-    pub fn standing(self) -> CaptureStatus {
-        self.standing
-    }
-
     /// Acknowledges the request of the host.
     pub fn take_asked(&mut self) {
         match ASKED.load(Ordering::Relaxed) {
@@ -54,12 +50,12 @@ impl Keeper {
     }
 
     /// Returns true if the next step is the first one to keep.
-    pub fn is_due(&mut self, status: &Status, command: impl FnOnce() -> Command) -> bool {
+    pub fn is_due(&mut self, pipeline: &Pipeline, command: impl FnOnce() -> Command) -> bool {
         if self.standing.state != CaptureState::Armed {
             return false;
         }
         let (mut due, command) = (false, command());
-        self.work(|capture| due = capture.is_due(status, &command));
+        self.work(|capture| due = capture.is_due(pipeline, &command));
         due
     }
 

@@ -84,8 +84,8 @@ impl ControlTask {
             discard_next: true,
             lost: false,
             report: Report::default(),
-            bus: BusClock::new(),
-            time: FrameClock::new(),
+            bus: BusClock::default(),
+            time: FrameClock::default(),
             clear_seen: 0,
             keeper: Keeper::default(),
         }
@@ -102,11 +102,12 @@ impl ControlTask {
             trace::Pin::Guard.low();
         }
         self.find_frames();
+        // Before the command that came with them.
+        self.configure();
+        self.calibrate();
         self.capture();
         self.take_frame();
         self.check_part();
-        self.configure();
-        self.calibrate();
         self.save();
     }
 
@@ -234,7 +235,7 @@ impl ControlTask {
     }
 
     fn publish(&mut self) {
-        self.report.capture = self.keeper.standing();
+        self.report.capture = self.keeper.standing;
         let (pipeline, frame, report) = (&self.parts.pipeline, &self.frame, &self.report);
         let status = pipeline.status();
         LOOP_STATE.set(LoopState { mode: status.mode, fault: status.fault, missed_frames: status.missed_frames });
@@ -252,59 +253,45 @@ impl ControlTask {
 const TICKS_PER_MS: u32 = guard::HZ / 1_000;
 
 /// The stopwatch in microseconds, beyond its wrap.
-pub struct FrameClock {
+#[derive(Default)]
+struct FrameClock {
+    /// The stopwatch at the last whole microsecond.
     last: u32,
-    part_ticks: u32,
     time_us: u32,
 }
 
 impl FrameClock {
-    /// Clock that starts at 0.
-    pub const fn new() -> Self {
-        Self { last: 0, part_ticks: 0, time_us: 0 }
-    }
-
     /// The time of an instant at most half a wrap of the stopwatch later than the last one. A frame that ended before
     /// its loss was noticed counts as from then.
-    pub fn at_us(&mut self, instant: u32) -> u32 {
+    fn at_us(&mut self, instant: u32) -> u32 {
         let passed = instant.wrapping_sub(self.last);
-        if passed.cast_signed() < 0 {
-            return self.time_us;
+        if passed.cast_signed() > 0 {
+            let us = passed / guard::TICKS_PER_US;
+            self.last = self.last.wrapping_add(us * guard::TICKS_PER_US);
+            self.time_us = self.time_us.wrapping_add(us);
         }
-        let ticks = passed + self.part_ticks;
-        self.last = instant;
-        self.part_ticks = ticks % guard::TICKS_PER_US;
-        self.time_us = self.time_us.wrapping_add(ticks / guard::TICKS_PER_US);
         self.time_us
     }
 }
 
 /// Time for which the bus has been silent, measured where a hanging link cannot stop the clock.
-pub struct BusClock {
+#[derive(Default)]
+struct BusClock {
     packets: u32,
+    /// The stopwatch at the last whole millisecond of the silence.
     last: u32,
-    part_ticks: u32,
     silent_ms: u16,
 }
 
 impl BusClock {
-    /// Heard just now.
-    pub const fn new() -> Self {
-        Self { packets: 0, last: 0, part_ticks: 0, silent_ms: 0 }
-    }
-
     /// Milliseconds since the count of packets last changed.
-    pub fn silent_ms(&mut self, packets: u32) -> u16 {
+    fn silent_ms(&mut self, packets: u32) -> u16 {
         let now = guard::now();
-        self.part_ticks += now.wrapping_sub(self.last);
-        self.last = now;
-        if packets != self.packets {
-            self.packets = packets;
-            self.part_ticks = 0;
-            self.silent_ms = 0;
+        if core::mem::replace(&mut self.packets, packets) != packets {
+            (self.last, self.silent_ms) = (now, 0);
         }
-        while self.part_ticks >= TICKS_PER_MS {
-            self.part_ticks -= TICKS_PER_MS;
+        while now.wrapping_sub(self.last) >= TICKS_PER_MS {
+            self.last = self.last.wrapping_add(TICKS_PER_MS);
             self.silent_ms = self.silent_ms.saturating_add(1);
         }
         self.silent_ms
@@ -312,7 +299,11 @@ impl BusClock {
 }
 
 impl ControlTask {
+    /// Stops the scan, with the bridge as it is. A driven motor is shorted: no frame limits its duty.
     fn rest(&mut self) {
+        if let Requested::Driven(_) = self.parts.pipeline.status().bridge() {
+            self.parts.bridge.apply(Requested::Brakes);
+        }
         self.parts.scan.stop();
         guard::rest();
     }
@@ -320,20 +311,17 @@ impl ControlTask {
     /// Begins a capture when it is due. The reset of the pipeline may take most of a frame, so the scan restarts.
     fn capture(&mut self) {
         self.keeper.take_asked();
-        if self.keeper.is_due(self.parts.pipeline.status(), || HEARD.get().command) {
-            self.parts.bridge.apply(Requested::Open);
+        if self.keeper.is_due(self.parts.pipeline, || HEARD.get().command) {
             self.rest();
             self.keeper.begin(self.parts.pipeline);
             self.restart_scan();
         }
     }
 
-    /// Makes a new configuration of new parameters. That takes longer than a frame: the bridge is off meanwhile, and
-    /// the scan restarts.
+    /// Makes a new configuration of new parameters. That takes longer than a frame, so the scan restarts.
     fn configure(&mut self) {
         let Some(params) = PARAMS.take(|params| *params) else { return };
         self.keeper.end(Ended::Configured);
-        self.parts.bridge.apply(Requested::Open);
         self.rest();
         self.parts.watchdogs.allow_long();
         if !set_config(self.parts.pipeline, &params) {
@@ -346,7 +334,6 @@ impl ControlTask {
     fn calibrate(&mut self) {
         if let Some(gains) = GAINS.take(|gains| *gains) {
             self.keeper.end(Ended::Configured);
-            self.parts.bridge.apply(Requested::Open);
             self.rest();
             self.parts.pipeline.calibrate(&Calibration::of(&gains));
             self.restart_scan();

@@ -35,7 +35,7 @@ impl LinkTask {
         let mut received = [0; 256];
         let mut reply = Reply::new();
         // Stored requests apply before the host sends any.
-        self.pass_on();
+        self.pass_on(Actions::default());
         loop {
             match self.bus.receive(&mut received).await {
                 Ok(count) => {
@@ -59,14 +59,14 @@ impl LinkTask {
             // Control, which fills the snapshot, interrupts this task: it never runs at this point.
             let Some(taken) = self.feed(bytes, reply) else { return };
             bytes = bytes.get(taken..).unwrap_or_default();
-            self.pass_on();
+            let actions = self.server.take_actions();
+            self.pass_on(actions);
             if !reply.is_empty() {
                 Timer::at(received + Duration::from_micros(self.server.reply_delay_us().into())).await;
                 if let Err(cause) = self.bus.send(reply).await {
                     warn!("bus, sending: {}", cause);
                 }
             }
-            let actions = self.server.take_actions();
             self.carry_out(actions).await;
         }
     }
@@ -84,12 +84,8 @@ impl LinkTask {
         })
     }
 
-    fn pass_on(&self) {
-        HEARD.set(Heard { command: self.server.command(), packets: self.server.good_packets() });
-    }
-
-    async fn carry_out(&mut self, actions: Actions) {
-        let baud = self.server.settings().baud();
+    /// Passes a packet on to control as a whole: what its command needs comes before it.
+    fn pass_on(&self, actions: Actions) {
         let record = &self.server.settings().record;
         if actions.configure {
             // The newest count where control has not yet taken those before.
@@ -100,6 +96,13 @@ impl LinkTask {
             GAINS.take(|_| ());
             GAINS.fill(|gains| *gains = record.gains);
         }
+        HEARD.set(Heard { command: self.server.command(), packets: self.server.good_packets() });
+    }
+
+    /// What waits until the reply is sent.
+    async fn carry_out(&mut self, actions: Actions) {
+        let baud = self.server.settings().baud();
+        let record = &self.server.settings().record;
         if actions.save {
             let saved = save(record).await;
             self.server.note_saved(saved);

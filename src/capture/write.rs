@@ -68,11 +68,13 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
         self.standing = CaptureStatus { state, count, ..CaptureStatus::default() };
     }
 
-    /// Returns true if the capture should begin: it is armed, and the next step would acknowledge a tare.
-    pub fn is_due(&self, status: &Status, command: &Command) -> bool {
+    /// Returns true if the capture should begin: it is armed, and the next step would begin a tare.
+    pub fn is_due(&self, pipeline: &Pipeline<ROWS, COLUMNS>, command: &Command) -> bool {
+        let status = pipeline.status();
         self.standing.state == CaptureState::Armed
             && status.mode == Mode::Off
             && command.tare_request != status.taken.tare
+            && pipeline.takes_tare(command.tare_forced)
     }
 
     /// Begins, and resets the pipeline; the next step is the first one kept. That takes as long as a frame. A board

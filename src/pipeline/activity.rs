@@ -11,9 +11,9 @@
 //! | request | accepted | otherwise |
 //! | --- | --- | --- |
 //! | clear | in fault, with torque off | the fault remains, or there is none |
-//! | tare | in every activity but fault, also in the frame that clears one; not while something is pressed, unless that was [forced](Command::tare_forced): the zero before remains | refused: [`Taring::Refused`] |
+//! | tare | in every activity but fault and the last release, also in the frame that clears one; not while something is pressed, unless that was [forced](Command::tare_forced): the zero before remains | refused: [`Taring::Refused`] |
 //! | torque on | in off, once the tip is slow; not before a tare, nor after one while something touched the tip, unless that was [forced](Command::tare_forced); not before the direction is confirmed, nor while it has been on since before the tare or the configuration | the finger stays off; limits 6, 10, 14 and 15 give the reason |
-//! | torque off | in every activity | |
+//! | torque off | in every activity; a last release ends with its fault | |
 //! | jog, strokes | in off, with torque off, the array tared and nothing at the tip; they wait until the tip is at rest | refused: [`Ended`] |
 //! | press | in a grip; with torque on it waits while torque is taken up or a tare is under way | refused: `NotReady` |
 //! | stop | a jog, strokes or a press under way | |
@@ -53,6 +53,13 @@ pub enum Activity {
     },
     /// Approach, hold and release.
     Grip(Grip),
+    /// Release because the bus fell silent. It ends with the fault of that, whatever arrives meanwhile.
+    LastRelease {
+        /// The grip that releases.
+        grip: Grip,
+        /// Time since the bus fell silent, ns.
+        ns: u32,
+    },
     /// A press that measures tip and array.
     Press(Press),
     /// Motions in the air that measure the drive.
@@ -67,7 +74,7 @@ impl Activity {
         match self {
             Self::Off(_) => Mode::Off,
             Self::Tare { .. } => Mode::Tare,
-            Self::Grip(grip) => grip.mode(touch),
+            Self::Grip(grip) | Self::LastRelease { grip, .. } => grip.mode(touch),
             Self::Press(_) => Mode::Press,
             Self::Strokes(_) => Mode::Strokes,
             Self::Fault(_) => Mode::Fault,
@@ -76,12 +83,12 @@ impl Activity {
 
     /// Returns true in the mode release.
     pub fn releases(&self, touch: &Touch) -> bool {
-        matches!(self, Self::Grip(grip) if grip.mode(touch) == Mode::Release)
+        matches!(self, Self::Grip(grip) | Self::LastRelease { grip, .. } if grip.mode(touch) == Mode::Release)
     }
 
     /// Returns true if the motor is driven: then guard and monitor judge the motion.
     pub fn drives(&self) -> bool {
-        matches!(self, Self::Grip(_) | Self::Press(_) | Self::Strokes(_))
+        !matches!(self, Self::Off(_) | Self::Tare { .. } | Self::Fault(_))
     }
 
     /// Returns true if the contact is fitted to the model. A press must not depend on the configured modulus.
@@ -91,7 +98,7 @@ impl Activity {
 
     /// Returns true if the baseline may follow the array's readings.
     pub fn learns(&self) -> bool {
-        matches!(self, Self::Off(_) | Self::Grip(_))
+        matches!(self, Self::Off(_) | Self::Grip(_) | Self::LastRelease { .. })
     }
 }
 
@@ -151,7 +158,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     pub(super) fn asked(&self, command: &Command) -> bool {
         let waits = match self.activity {
             Activity::Off(_) | Activity::Strokes(_) => command.torque,
-            Activity::Grip(_) => !command.torque,
+            Activity::Grip(_) | Activity::LastRelease { .. } => !command.torque,
             Activity::Press(_) => true,
             Activity::Tare { .. } | Activity::Fault(_) => false,
         };
@@ -180,8 +187,12 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         if command.tare_request != before.tare {
             self.serve_tare(command.tare_forced);
         }
-        if !command.torque && matches!(self.activity, Activity::Grip(_) | Activity::Press(_)) {
-            self.leave(Halt::BRAKES);
+        if !command.torque {
+            match self.activity {
+                Activity::Grip(_) | Activity::Press(_) => self.leave(Halt::BRAKES),
+                Activity::LastRelease { .. } => self.stop(Fault::BusSilent),
+                _ => {}
+            }
         }
         if command.torque {
             if let Activity::Strokes(run) = &mut self.activity {
@@ -199,12 +210,11 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     }
 
     fn serve_tare(&mut self, forced: bool) {
-        let pressed = self.tared && self.touch.held() && !forced;
+        if !self.takes_tare(forced) {
+            self.status.tare = Taring::Refused;
+            return;
+        }
         let halt = match self.activity {
-            ref activity if pressed || matches!(activity, Activity::Fault(_)) => {
-                self.status.tare = Taring::Refused;
-                return;
-            }
             Activity::Off(halt) | Activity::Tare { halt, .. } => halt,
             _ => Halt::BRAKES,
         };
@@ -218,6 +228,12 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         (self.touch, self.guard) = (Touch::default(), Guard::default());
         (self.tared, self.status.tare) = (false, Taring::Running);
         self.activity = Activity::Tare { halt, free };
+    }
+
+    /// Returns true if a tare that is requested now is measured.
+    pub(crate) fn takes_tare(&self, forced: bool) -> bool {
+        let pressed = self.tared && self.touch.held() && !forced;
+        !pressed && !matches!(self.activity, Activity::LastRelease { .. } | Activity::Fault(_))
     }
 
     /// Returns true if torque may be enabled: it is a new request, and the motor's direction is confirmed.
@@ -310,7 +326,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             Activity::Press(_) | Activity::Strokes(_) => self.status.measure.end(Ended::Interrupted, 0),
             Activity::Tare { .. } if self.status.tare == Taring::Running => self.status.tare = Taring::Refused,
             Activity::Fault(_) => return,
-            Activity::Off(_) | Activity::Tare { .. } | Activity::Grip(_) => {}
+            Activity::Off(_) | Activity::Tare { .. } | Activity::Grip(_) | Activity::LastRelease { .. } => {}
         }
         self.activity = Activity::Off(halt);
     }

@@ -119,9 +119,13 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         self.touched.flag
     }
 
-    /// Judges the tare that was just completed.
+    /// Judges the tare that was just completed. The residue that a `free` tip reads is no touch, and no reference.
     #[inline(never)]
-    pub fn judge_tare(&mut self, config: &Config) {
+    pub fn judge_tare(&mut self, free: bool, config: &Config) {
+        if free {
+            self.touched.flag = false;
+            return;
+        }
         let mut now: Lines<ROWS> = [None; ROWS];
         for ((now, [line, _]), bad) in now.iter_mut().zip(self.tare_lines).zip(self.picture.bad) {
             let good = (COLUMNS as u32).saturating_sub(bad.count_ones());

@@ -126,7 +126,7 @@ fn survives<const ROWS: usize, const COLUMNS: usize>() {
                     array.read(frame, &config);
                     array.continue_tare();
                 }
-                array.judge_tare(&config);
+                array.judge_tare(false, &config);
                 let picture = *array.read(&frames[0], &config);
                 fits.iter_mut().for_each(|fit| _ = fit.read(&picture, &config));
                 array.follow_drift(1 << 16);

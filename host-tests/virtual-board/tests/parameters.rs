@@ -1,9 +1,12 @@
 //! Parameters in the flash of the emulated board: sectors that take turns, and words that take as long as they may.
 
-use crate::common::{frames, on_bus, read_u8, read_u32, reboot, refused, register, running, write_u8, write_u32};
+use crate::common::{
+    frames, on_bus, read_u8, read_u32, reboot, refused, register, running, write_and_run_ms, write_param, write_u8,
+    write_u16, write_u32,
+};
 use fingertip::link::table::address;
 use fingertip::shipped::Record;
-use fingertip::state::Fault;
+use fingertip::state::{Fault, Mode};
 use fingertip::store::SLOT_BYTES;
 use rigless::soc::Width;
 use sim::encode;
@@ -77,11 +80,27 @@ fn words_and_erases(rig: &mut Rig) -> (u64, u64) {
 #[test]
 fn stored_parameters_outlive_long_times_full_sectors_and_damage() {
     let mut rig = start();
+    a_parameter_and_torque_in_one_packet_both_act(&mut rig);
     a_save_with_the_longest_times_is_no_fault_and_no_reset(&mut rig);
     assert!(!tells_of_a_record(&mut rig, 0));
     after_a_save_cut_short_the_old_values_count_and_fault_8_says_so(&mut rig);
     damaged_parameters_are_a_fault_that_the_bus_tells(&mut rig);
     nearly_full_sectors_take_turns(&mut rig);
+}
+
+/// The parameter comes first: it would stop what torque began.
+fn a_parameter_and_torque_in_one_packet_both_act(rig: &mut Rig) {
+    write_param(rig, "direction_confirmed", 1);
+    write_and_run_ms(rig, address::TARE, 1, 20);
+    let pitch = register("pitch_um");
+    for (place, led_to) in (pitch..pitch + 4).chain([address::TORQUE_ENABLE]).enumerate() {
+        write_u16(rig, address::INDIRECT_ADDRESS_1 + 2 * place as u16, led_to);
+    }
+    on_bus(rig, |bus| bus.write(1, address::INDIRECT_DATA_1, &[0xa4, 0x06, 0, 0, 1]).map(drop));
+    rig.run_ms(10).expect("it runs");
+    assert_eq!((pitch_um(rig), read_u8(rig, address::PRESENT_MODE)), (1_700, Mode::Release as u8));
+    write_u8(rig, address::TORQUE_ENABLE, 0);
+    write_param(rig, "direction_confirmed", 0);
 }
 
 fn a_save_with_the_longest_times_is_no_fault_and_no_reset(rig: &mut Rig) {

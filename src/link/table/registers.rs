@@ -58,8 +58,8 @@ control_table! {
     /// Reason of a stop of the motor, by bit: 0 supply, 3 encoder, 4
     /// bridge, 5 over-force, 6 array, 7 controller or bus. Number: fault.
     70 HARDWARE_ERROR_STATUS: U8 ReadOnly, |view, _| u32::from(hardware_error(view.status().fault));
-    /// If the bus is silent for longer, the finger releases the object (0.5 s at most, whatever arrives
-    /// then) and stops with fault 7; 0 is off. Reads -1 after a trip until 0 is written; until then goals
+    /// If the bus is silent for longer, the finger releases the object (0.5 s at most; torque off ends that
+    /// at once) and stops with fault 7, whatever arrives then; 0 is off. Reads -1 after a trip until 0 is written; until then goals
     /// are refused with a range error, as by X-series servos, and torque enable with a result error.
     98 BUS_WATCHDOG: I8 ReadWrite "ms" * 20 in 0..=127 = 0, |view, _| view.watchdog(),
         Staged::set_watchdog;

@@ -117,7 +117,7 @@ impl<E: Set> Bus<E> {
             let scanned = device.broken.as_mut().is_none_or(|broken| broken.change(frame, &mut sense, params));
             device.supply_mv = sense.supply_mv;
             let command = device.server.command();
-            if device.capture.is_due(unit.pipeline.status(), &command) {
+            if device.capture.is_due(&unit.pipeline, &command) {
                 device.capture.begin(&mut unit.pipeline);
             }
             let status = if scanned {

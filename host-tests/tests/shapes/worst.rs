@@ -22,6 +22,11 @@ fn config<const ROWS: usize, const COLUMNS: usize>(params: &Params) -> Shaped<RO
     Shaped::new(params, &CLOCKS).expect("parameters within their ranges")
 }
 
+/// Calls a check for each shape, rows x columns.
+macro_rules! shapes {
+    ($check:ident: $($rows:literal x $columns:literal),+) => { $($check::<$rows, $columns>();)+ };
+}
+
 /// Parameters at the limits that matter for the sums and the fit, with the largest sag that the shape allows.
 fn extremes<const ROWS: usize, const COLUMNS: usize>() -> Vec<Params> {
     let with = |sag: &i32| Params { row_sag_ppb_per_code: *sag, ..Params::DEFAULT };
@@ -137,14 +142,7 @@ fn survives<const ROWS: usize, const COLUMNS: usize>() {
 
 #[test]
 fn the_worst_frames_overflow_nothing() {
-    survives::<3, 3>();
-    survives::<3, 5>();
-    survives::<4, 4>();
-    survives::<8, 8>();
-    survives::<10, 10>();
-    survives::<16, 16>();
-    survives::<3, 32>();
-    survives::<16, 32>();
+    shapes!(survives: 3 x 3, 3 x 5, 4 x 4, 8 x 8, 10 x 10, 16 x 16, 3 x 32, 16 x 32);
 }
 
 /// A tare takes the same out of every taxel, also where the rows are odd.
@@ -164,13 +162,7 @@ fn tares<const ROWS: usize, const COLUMNS: usize>() {
 
 #[test]
 fn a_tare_zeroes_every_taxel() {
-    tares::<3, 3>();
-    tares::<3, 5>();
-    tares::<4, 4>();
-    tares::<9, 8>();
-    tares::<16, 16>();
-    tares::<15, 31>();
-    tares::<16, 32>();
+    shapes!(tares: 3 x 3, 3 x 5, 4 x 4, 9 x 8, 16 x 16, 15 x 31, 16 x 32);
 }
 
 /// A taxel that is dead or saturated is left out, whichever it is, and no other.
@@ -193,14 +185,7 @@ fn leaves_out<const ROWS: usize, const COLUMNS: usize>() {
 
 #[test]
 fn a_bad_taxel_is_left_out_wherever_it_is() {
-    leaves_out::<3, 3>();
-    leaves_out::<3, 5>();
-    leaves_out::<4, 4>();
-    leaves_out::<8, 8>();
-    leaves_out::<10, 10>();
-    leaves_out::<16, 16>();
-    leaves_out::<5, 31>();
-    leaves_out::<16, 32>();
+    shapes!(leaves_out: 3 x 3, 3 x 5, 4 x 4, 8 x 8, 10 x 10, 16 x 16, 5 x 31, 16 x 32);
 }
 
 #[test]
@@ -372,12 +357,5 @@ fn stays_within_along_the_rim<const ROWS: usize, const COLUMNS: usize>() {
 
 #[test]
 fn a_rows_sums_fit_along_the_rim() {
-    stays_within_along_the_rim::<3, 3>();
-    stays_within_along_the_rim::<10, 10>();
-    stays_within_along_the_rim::<3, 14>();
-    stays_within_along_the_rim::<3, 15>();
-    stays_within_along_the_rim::<3, 28>();
-    stays_within_along_the_rim::<3, 31>();
-    stays_within_along_the_rim::<3, 32>();
-    stays_within_along_the_rim::<16, 32>();
+    shapes!(stays_within_along_the_rim: 3 x 3, 10 x 10, 3 x 14, 3 x 15, 3 x 28, 3 x 31, 3 x 32, 16 x 32);
 }

@@ -37,28 +37,6 @@ fn summary(name: &str, errors: &[[f64; 2]]) -> [f64; 5] {
     summary
 }
 
-/// Bounds for tips with one press each: the median of errors below 0.1 % would be better than the noise allows.
-fn one_press(seeds: std::ops::Range<u64>) {
-    let count = (seeds.end - seeds.start) as f64;
-    let [median, worst, deviation, sigma, within] = summary("one press", &errors(seeds, 1, &plan()));
-    assert!((0.1..4.0).contains(&median) && worst < 10.0, "{median} {worst}");
-    assert!(
-        within >= 0.9 * count && sigma < 3.0 * deviation && sigma > 0.5 * deviation,
-        "{within} {sigma} {deviation}"
-    );
-}
-
-#[test]
-fn one_press_gives_the_modulus() {
-    one_press(0..10);
-}
-
-#[test]
-#[ignore = "long: cargo xtask test --long"]
-fn long_one_press_gives_the_modulus_() {
-    one_press(0..30);
-}
-
 #[test]
 fn three_presses_give_a_better_one() {
     let [median, worst, _, sigma, within] = summary("three presses", &errors(200..203, 3, &plan()));

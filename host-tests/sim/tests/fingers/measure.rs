@@ -124,7 +124,7 @@ fn presses_complete(count: usize) {
     print("presses", &made);
     let most_n = 1e-3 * f64::from(Params::DEFAULT.force_max_mn) * 1.05;
     assert!(largest(&made, |made| made.force_n) < most_n);
-    let (mut errors_percent, mut within) = (Vec::new(), 0);
+    let (mut errors_percent, mut sigmas_percent, mut within) = (Vec::new(), Vec::new(), 0);
     for (number, (finger, made)) in fingers.iter().zip(&made).enumerate() {
         assert!(made.status.state == MeasureState::Done && made.fault.is_none(), "tip {number}");
         assert!(made.rows <= ROWS_MAX as u32, "tip {number}");
@@ -134,12 +134,16 @@ fn presses_complete(count: usize) {
         let found = solve::modulus(&[press]).unwrap_or_else(|why| panic!("tip {number}: {why}"));
         let truth_kpa = drawn(finger, "modulus_kpa").expect("it is drawn");
         errors_percent.push(100.0 * (found.kpa / truth_kpa - 1.0).abs());
+        sigmas_percent.push(100.0 * found.sigma_kpa / found.kpa);
         within += usize::from((found.kpa - truth_kpa).abs() <= 2.0 * found.sigma_kpa);
     }
     errors_percent.sort_by(f64::total_cmp);
     let (median, worst) = (errors_percent[count / 2], errors_percent[count - 1]);
     println!("error of the modulus: median {median:.2} %, worst {worst:.2} %; {within} of {count} within two sigmas");
     assert!((0.1..4.0).contains(&median) && worst < 10.0 && 10 * within >= 9 * count);
+    let rms = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>().sqrt();
+    let honest = rms(&sigmas_percent) / rms(&errors_percent);
+    assert!((0.5..3.0).contains(&honest), "the uncertainty is {honest:.2} times the error");
 }
 
 /// Disturbance of a press: its name, changes of the tips, the place of the object, and the ends that are valid with it.

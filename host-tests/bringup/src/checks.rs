@@ -2,7 +2,9 @@
 
 use crate::script::Bench;
 use crate::script::{COUNTS_PER_RAD, FORCE_PER_MM2, MM_PER_RAD};
+use fingertip::control::Winding;
 use fingertip::params::Params;
+use fingertip::pipeline::AcknowledgedRequests;
 use fingertip::shipped::{Config, Pipeline};
 use serde_json::Value;
 use std::sync::OnceLock;
@@ -246,7 +248,10 @@ fn loop_bits() -> u32 {
         let config = config.expect("the defaults make a configuration: a test of the core holds that");
         let mut bench = Bench::new();
         bench.finger.make_table();
-        bench.digest(&mut Pipeline::new(&config))
+        let mut pipeline = Pipeline::new(&config);
+        // As the image does behind its other checks.
+        pipeline.renew(AcknowledgedRequests::default(), 0, Winding::new());
+        bench.digest(&mut pipeline)
     })
 }
 

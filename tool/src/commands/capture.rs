@@ -7,6 +7,7 @@ use crate::state::unix_ns;
 use crate::whole::Part;
 use crate::{Client, Error, numbers, table};
 use fingertip::capture::CaptureState;
+use fingertip::pipeline::Taring;
 use fingertip::shipped::address;
 use fingertip::state::Limits;
 use serde_json::{Value, json};
@@ -20,6 +21,8 @@ const LOOK: Duration = Duration::from_millis(5);
 const ARMED: i64 = CaptureState::Armed as i64;
 const RECORDING: i64 = CaptureState::Recording as i64;
 const DONE: i64 = CaptureState::Done as i64;
+/// `TARE_STATE`.
+const TARE_REFUSED: i64 = Taring::Refused as i64;
 /// Licence of contributed captures.
 const LICENCE: &str = "Apache-2.0 OR MIT, as the project: contributed by who captured it";
 
@@ -135,11 +138,19 @@ fn keep(args: &Args, client: &mut Client, interrupt: &Interrupt, json: bool) -> 
     }
     report("armed; taring, nothing may touch the tip", json);
     client.set(address::TARE, 1)?;
+    let until = Instant::now() + within;
+    // A tare that is refused begins no capture, and torque would press by the zero before.
+    while client.again(|client| client.number(address::CAPTURE_STATE))? == ARMED && Instant::now() < until {
+        let state = client.again(|client| client.number(address::TARE_STATE))?;
+        if state == TARE_REFUSED {
+            client.again(|client| client.set(address::CAPTURE, 0))?;
+            return Err(format!("the tare came to nothing: {}", table::meaning(address::TARE_STATE, state)).into());
+        }
+    }
     if let Some(goal_mn) = args.press {
         // During the tare, so that the approach begins right after it.
         press::begin(goal_mn, client)?;
     }
-    let until = Instant::now() + within;
     loop {
         let block = client.again(|client| client.block(address::CAPTURE_STATE, address::CAPTURE_FRAMES))?;
         let (state, frames) = (block.number(address::CAPTURE_STATE), block.number(address::CAPTURE_FRAMES));

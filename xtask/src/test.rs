@@ -29,11 +29,7 @@ pub fn run(args: &Args, choice: Choice) -> Result<()> {
     if args.long {
         return long(stages, choice);
     }
-    stages.stage("core and host tests", |console| {
-        // Tests of served fingers wait most of their time.
-        let threads = 4 * std::thread::available_parallelism().map_or(1, usize::from);
-        host::test(host::tests(&["--no-fail-fast"]).env("RUST_TEST_THREADS", threads.to_string()), console)
-    });
+    stages.stage("core and host tests", |console| host::test(&mut host::tests(&["--no-fail-fast"]), console));
     stages.stage("fit of a sensor to recordings", |console| {
         let mut command = install::script("test_fit.py", console)?;
         console.run(&mut command)

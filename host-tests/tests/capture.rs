@@ -41,6 +41,18 @@ impl<const BYTES: usize> Recorded<BYTES> {
         finger
     }
 
+    /// Armed, a frame after torque went off while the finger held 4 N.
+    fn let_go_under_load() -> Self {
+        let mut finger = Self::new();
+        finger.bench.tare();
+        finger.bench.command().goal = newtons(4_000);
+        finger.frames(5_000);
+        finger.bench.command().torque = false;
+        finger.frame();
+        finger.capture.arm();
+        finger
+    }
+
     /// A press of a fresh finger.
     fn pressed() -> Self {
         let mut finger = Self::new();
@@ -317,16 +329,10 @@ fn what_the_finger_did_before_does_not_matter() {
     assert_eq!(finger.capture.standing().count, 2);
 }
 
-/// The zero before remains, and the motor is shorted until the tip rests.
+/// The old zero remains, and the motor is shorted until the tip rests.
 #[test]
 fn a_tare_under_load_is_refused_to_a_capture_too() {
-    let mut finger = Recorded::<BYTES>::new();
-    finger.bench.tare();
-    finger.bench.command().goal = newtons(4_000);
-    finger.frames(5_000);
-    finger.bench.command().torque = false;
-    finger.frame();
-    finger.capture.arm();
+    let mut finger = Recorded::<BYTES>::let_go_under_load();
     finger.bench.command().tare_request += 1;
     let status = finger.frame();
     assert_eq!((status.mode, status.tare), (Mode::Off, Taring::Refused));
@@ -337,13 +343,7 @@ fn a_tare_under_load_is_refused_to_a_capture_too() {
 /// A forced tare begins one while the tip still moves: it is braked on.
 #[test]
 fn a_capture_does_not_let_a_moving_tip_go() {
-    let mut finger = Recorded::<BYTES>::new();
-    finger.bench.tare();
-    finger.bench.command().goal = newtons(4_000);
-    finger.frames(5_000);
-    finger.bench.command().torque = false;
-    finger.frame();
-    finger.capture.arm();
+    let mut finger = Recorded::<BYTES>::let_go_under_load();
     *finger.bench.command() = Command { tare_forced: true, tare_request: 9, ..*finger.bench.command() };
     let status = finger.frame();
     assert_eq!((finger.capture.standing().state, status.mode), (CaptureState::Recording, Mode::Tare));

@@ -102,7 +102,7 @@ impl ControlTask {
             trace::Pin::Guard.low();
         }
         self.find_frames();
-        // Before the command that came with them.
+        // New parameters and gains act before the command of the same packet.
         self.configure();
         self.calibrate();
         self.capture();
@@ -299,7 +299,7 @@ impl BusClock {
 }
 
 impl ControlTask {
-    /// Stops the scan, with the bridge as it is. A driven motor is shorted: no frame limits its duty.
+    /// Stops the scan. The bridge keeps its state, but a driven motor is braked: without frames nothing limits its duty.
     fn rest(&mut self) {
         if let Requested::Driven(_) = self.parts.pipeline.status().bridge() {
             self.parts.bridge.apply(Requested::Brakes);
@@ -318,7 +318,7 @@ impl ControlTask {
         }
     }
 
-    /// Makes a new configuration of new parameters. That takes longer than a frame, so the scan restarts.
+    /// Applies new parameters. That takes longer than a frame, so the scan restarts.
     fn configure(&mut self) {
         let Some(params) = PARAMS.take(|params| *params) else { return };
         self.keeper.end(Ended::Configured);

@@ -84,7 +84,7 @@ impl LinkTask {
         })
     }
 
-    /// Passes a packet on to control as a whole: what its command needs comes before it.
+    /// Passes a packet to control: its parameters and gains first, then its command.
     fn pass_on(&self, actions: Actions) {
         let record = &self.server.settings().record;
         if actions.configure {

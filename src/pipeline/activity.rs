@@ -13,7 +13,7 @@
 //! | clear | in fault, with torque off | the fault remains, or there is none |
 //! | tare | in every activity but fault and the last release, also in the frame that clears one; not while something is pressed, unless that was [forced](Command::tare_forced): the zero before remains | refused: [`Taring::Refused`] |
 //! | torque on | in off, once the tip is slow; not before a tare, nor after one while something touched the tip, unless that was [forced](Command::tare_forced); not before the direction is confirmed, nor while it has been on since before the tare or the configuration | the finger stays off; limits 6, 10, 14 and 15 give the reason |
-//! | torque off | in every activity; a last release ends with its fault | |
+//! | torque off | in every activity; a release for a silent bus stops with fault 7 | |
 //! | jog, strokes | in off, with torque off, the array tared and nothing at the tip; they wait until the tip is at rest | refused: [`Ended`] |
 //! | press | in a grip; with torque on it waits while torque is taken up or a tare is under way | refused: `NotReady` |
 //! | stop | a jog, strokes or a press under way | |
@@ -53,7 +53,7 @@ pub enum Activity {
     },
     /// Approach, hold and release.
     Grip(Grip),
-    /// Release because the bus fell silent. It ends with the fault of that, whatever arrives meanwhile.
+    /// Release because the bus is silent. Whatever arrives meanwhile, it ends with fault 7 (bus silent).
     LastRelease {
         /// The grip that releases.
         grip: Grip,

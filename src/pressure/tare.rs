@@ -119,7 +119,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         self.touched.flag
     }
 
-    /// Judges the tare that was just completed. The residue that a `free` tip reads is no touch, and no reference.
+    /// Judges the tare that was just completed. What a released (`free`) tip reads is residue: no touch, no reference.
     #[inline(never)]
     pub fn judge_tare(&mut self, free: bool, config: &Config) {
         if free {

@@ -1,6 +1,6 @@
 //! `fingertip capture`, and `fingertip replay` of what it wrote.
 
-use super::stop::Moving;
+use super::stop::{Moving, no_tare};
 use super::{Interrupt, TOUCHED, no_fault_nor_motion, press, report, say, say_json, stopped, wait_for};
 use crate::recordings::{self, About, ENDED, device};
 use crate::state::unix_ns;
@@ -21,7 +21,7 @@ const LOOK: Duration = Duration::from_millis(5);
 const ARMED: i64 = CaptureState::Armed as i64;
 const RECORDING: i64 = CaptureState::Recording as i64;
 const DONE: i64 = CaptureState::Done as i64;
-/// `TARE_STATE`.
+/// A value of `TARE_STATE`.
 const TARE_REFUSED: i64 = Taring::Refused as i64;
 /// Licence of contributed captures.
 const LICENCE: &str = "Apache-2.0 OR MIT, as the project: contributed by who captured it";
@@ -139,12 +139,12 @@ fn keep(args: &Args, client: &mut Client, interrupt: &Interrupt, json: bool) -> 
     report("armed; taring, nothing may touch the tip", json);
     client.set(address::TARE, 1)?;
     let until = Instant::now() + within;
-    // A tare that is refused begins no capture, and torque would press by the zero before.
+    // After a refused tare no capture begins, and a press would still use the old zero.
     while client.again(|client| client.number(address::CAPTURE_STATE))? == ARMED && Instant::now() < until {
         let state = client.again(|client| client.number(address::TARE_STATE))?;
         if state == TARE_REFUSED {
             client.again(|client| client.set(address::CAPTURE, 0))?;
-            return Err(format!("the tare came to nothing: {}", table::meaning(address::TARE_STATE, state)).into());
+            return Err(no_tare(state));
         }
     }
     if let Some(goal_mn) = args.press {

@@ -297,6 +297,11 @@ pub(super) struct Tared {
     most: i64,
 }
 
+/// Error of a tare that ended in this `TARE_STATE`.
+pub(super) fn no_tare(state: i64) -> Error {
+    format!("the tare came to nothing: {}", table::meaning(address::TARE_STATE, state)).into()
+}
+
 /// Measures the zeros, with torque off.
 pub(super) fn measure_tare(within: Duration, client: &mut Client) -> Result<Tared, Error> {
     client.set(address::TARE, 1)?;
@@ -307,7 +312,7 @@ pub(super) fn measure_tare(within: Duration, client: &mut Client) -> Result<Tare
             let within_s = within.as_secs_f64();
             return Err(format!("the tare is still running after {within_s} s: do frames come in?").into());
         }
-        _ => return Err(format!("the tare came to nothing: {}", table::meaning(address::TARE_STATE, state)).into()),
+        _ => return Err(no_tare(state)),
     }
     let touched = Limits(client.number(address::LIMITS)? as u16).has(Limits::TARED_TOUCHING);
     let codes = client.block(address::TARE_CODES, address::TARE_CODES)?.numbers(address::TARE_CODES);

@@ -13,7 +13,7 @@ mod tests;
 pub use array::{ArrayDrift, Geometry};
 pub(crate) use bounds::SPAN_PARTS;
 pub use bounds::{Bounds, Motions};
-pub use diagnostics::{ConfigError, Warning};
+pub use diagnostics::ConfigError;
 pub use lanes::Curve;
 pub(crate) use motor::ALLOWANCE_BITS;
 pub use motor::{GAIN_SETS, Gains, Heat, Lag};

@@ -37,7 +37,7 @@ fn SPI3() {
 
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
-    stack::guard_foot();
+    stack::protect();
     let boot = crash::boot();
     let clocked = clocks::start_external();
     let p = clocks::init(clocked);

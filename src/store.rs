@@ -285,13 +285,7 @@ pub fn settle<T>(
 /// Resets the parameters that the error names to their defaults, or all parameters if that changes nothing.
 #[inline(never)]
 fn give_up(params: &mut Params, error: ConfigError) {
-    let names = match error {
-        ConfigError::Param(error) => [error.name; 2],
-        ConfigError::Scan(_) => ["settle_ns", "sample_cycles"],
-        ConfigError::Order([(low, _), (high, _)]) => [low, high],
-        ConfigError::Seen { .. } => ["codes_per_kpa_milli", "contact_on_mn"],
-        ConfigError::Supply(..) => ["voltage_max_mv", "supply_min_mv"],
-    };
+    let names = error.parameters();
     let mut values = params.to_array();
     let mut changed = false;
     for (value, (name, default, ..)) in values.iter_mut().zip(&Params::RANGES) {

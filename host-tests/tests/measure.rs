@@ -311,6 +311,19 @@ fn a_motion_that_replaces_another_is_one_of_its_own() {
     assert_eq!((measure.task, measure.ended), (Task::Jog, Ended::NotReady));
 }
 
+/// A stop of a jog that waited reports that the jog never began, not the outcome before it; a stop of nothing reports nothing.
+#[test]
+fn a_stop_of_a_motion_that_waits_has_an_outcome_of_its_own() {
+    let mut finger = Made::begun(Task::Jog);
+    finger.ends();
+    finger.bench.request(Task::Stop);
+    finger.frame();
+    assert_eq!(finger.bench.status().measure, MeasureStatus::over(Task::Jog, Ended::Complete, 0));
+    finger.bench.request(Task::Jog);
+    finger.bench.request(Task::Stop);
+    assert_eq!(finger.frame().measure, MeasureStatus::over(Task::Stop, Ended::Interrupted, 0));
+}
+
 /// The host ends the record in the middle: the motion continues without a record, the next motion has one again.
 #[test]
 fn a_record_ended_by_the_host_is_whole() {

@@ -96,6 +96,10 @@ impl LinkTask {
             GAINS.take(|_| ());
             GAINS.fill(|gains| *gains = record.gains);
         }
+        // Before the reply: the state that the host reads next is that of its own request.
+        if let Some(arm) = actions.capture {
+            capture::ask(arm);
+        }
         HEARD.set(Heard { command: self.server.command(), packets: self.server.good_packets() });
     }
 
@@ -112,9 +116,6 @@ impl LinkTask {
             if let Err(cause) = self.bus.set_baud(baud) {
                 error!("bus speed: {}", cause);
             }
-        }
-        if let Some(arm) = actions.capture {
-            capture::ask(arm);
         }
         if actions.reboot {
             crash::reboot();

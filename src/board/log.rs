@@ -5,7 +5,6 @@ use embassy_stm32::gpio::Output;
 use embassy_time::Timer;
 use fingertip::config::ConfigError;
 use fingertip::params::ParamError;
-use fingertip::scan::ScanError;
 use fingertip::state::{Fault, Mode};
 use fingertip::store::Remark;
 
@@ -58,17 +57,10 @@ pub fn log_save_error(error: SaveError) {
 pub fn log_refusal(error: ConfigError) {
     match error {
         ConfigError::Param(cause) => log_parameter(cause),
-        ConfigError::Scan(ScanError::SampleCycles { cycles, .. }) => {
-            error!("no sampling time of {=u16} cycles", cycles)
+        _ => {
+            let [first, second] = error.parameters();
+            error!("{=str} and {=str} contradict each other: their defaults", first, second);
         }
-        ConfigError::Scan(ScanError::SlotTooLong { ticks }) => error!("a slot of {=u32} ticks, 65535 at most", ticks),
-        ConfigError::Scan(ScanError::FrameTooLong { ticks, .. }) => {
-            error!("a frame of {=u32} ticks is too long", ticks)
-        }
-        ConfigError::Order([(low, low_value), (high, high_value)]) => {
-            error!("{=str} of {=i32} is not below {=str} of {=i32}", low, low_value, high, high_value)
-        }
-        _ => error!("the scan cannot be timed so"),
     }
 }
 

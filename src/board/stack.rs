@@ -1,16 +1,23 @@
-//! Protection of the memory below the stack: an overflow faults wherever it lands.
+//! Protection of the memory: a store to the image, code in RAM, or an overflow of the stack is a hard fault, as no other
+//! handler is enabled.
 //!
 //! RAM begins where the stack ends. Below it lie the option bytes and addresses that the manual calls reserved; what a
-//! store there does it does not say. A region of the memory protection unit refuses it: the access is a hard fault, as
-//! no other handler is enabled.
+//! store there does it does not say. So the overflow is refused wherever it lands.
 
 use cortex_m::asm::{dsb, isb};
 use cortex_m::peripheral::MPU;
 
-/// 16 KiB up to the start of RAM. The factory's calibration words lie below them.
-const FOOT: u32 = 0x1FFF_C000;
-/// Region attributes: size as a power of two, less one; no access, not executable.
-const ATTRIBUTES: u32 = 13 << 1 | 1 | 1 << 28;
+/// Regions of the memory protection unit by base and attributes: size as a power of two, less one, access, and memory
+/// type as in the usual map. Where regions overlap, the later one counts.
+const REGIONS: [(u32, u32); 3] = [
+    // The image, 256 KiB of flash: read only. The stored parameters lie above it.
+    (0x0800_0000, 17 << 1 | 1 | 0b110 << 24 | 0b000_010 << 16),
+    // RAM, 128 KiB: not executable.
+    (0x2000_0000, 16 << 1 | 1 | 0b011 << 24 | 0b001_011 << 16 | NEVER_EXECUTED),
+    // 16 KiB up to the start of RAM: no access. The factory's calibration words lie below them.
+    (0x1FFF_C000, 13 << 1 | 1 | NEVER_EXECUTED),
+];
+const NEVER_EXECUTED: u32 = 1 << 28;
 /// On, with the usual map for all else. Off in the hard fault's handler.
 const CONTROL: u32 = 1 | 1 << 2;
 
@@ -52,14 +59,17 @@ impl Paint {
     }
 }
 
-/// Closes it.
-pub fn guard_foot() {
-    // SAFETY: nothing else uses these registers, and nothing of the image lies in the region.
+/// Turns the protection on.
+pub fn protect() {
+    // SAFETY: nothing else uses these registers. The image writes to flash above its region only, runs no code from RAM
+    // and has nothing below RAM.
     unsafe {
         let mpu = &*MPU::PTR;
-        mpu.rnr.write(0);
-        mpu.rbar.write(FOOT);
-        mpu.rasr.write(ATTRIBUTES);
+        for (number, (base, attributes)) in REGIONS.into_iter().enumerate() {
+            mpu.rnr.write(number as u32);
+            mpu.rbar.write(base);
+            mpu.rasr.write(attributes);
+        }
         mpu.ctrl.write(CONTROL);
     }
     dsb();

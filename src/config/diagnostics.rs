@@ -29,6 +29,19 @@ pub enum ConfigError {
     },
 }
 
+impl ConfigError {
+    /// Names of the parameters concerned; twice the same if there is only one.
+    pub fn parameters(&self) -> [&'static str; 2] {
+        match *self {
+            Self::Param(error) => [error.name; 2],
+            Self::Scan(_) => ["settle_ns", "sample_cycles"],
+            Self::Order([(low, _), (high, _)]) => [low, high],
+            Self::Seen { .. } => ["codes_per_kpa_milli", "contact_on_mn"],
+            Self::Supply(..) => ["voltage_max_mv", "supply_min_mv"],
+        }
+    }
+}
+
 impl core::fmt::Display for ConfigError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
@@ -63,100 +76,14 @@ const FRAME_NS: u32 = 3_333_333;
 /// Lag of the observer's disturbance, times the speed gain: 3 / 2.5, because its three poles are at 2.5 times that gain.
 /// Meanwhile the force of a contact grows with the travel, and brakes the tip.
 const CONTACT_SLOWS: f32 = 1.2;
-/// Longest [`Warning::LightDrive::settle_ms`] that is not warned of.
+/// Longest time for an error to fall to 37 % that is not warned of, ms.
 const SETTLE_MS: f32 = 500.0;
 /// Length of an encoder count above which the motions that measure the drive are refused, um.
 const COUNT_UM: i32 = 100;
 
-/// A doubtful configuration, with its numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Warning {
-    /// The taxels are too far apart for this tip.
-    CoarsePitch {
-        /// [`Params::pitch_um`].
-        pitch_um: i32,
-        /// An eighth of the largest force, mN.
-        force_mn: i32,
-        /// Radius of the contact at that force, um.
-        radius_um: i32,
-    },
-    /// The converter saturates before the largest goal is reached.
-    ForceUnseen {
-        /// [`Params::force_max_mn`].
-        force_max_mn: i32,
-        /// The largest force that the converter sees whole, mN.
-        seen_mn: i32,
-    },
-    /// The frames are slower than the loop's gains can follow.
-    SlowFrames {
-        /// Frame time, ns.
-        frame_ns: u32,
-    },
-    /// The encoder is too coarse for the motions that measure the drive.
-    CoarseEncoder {
-        /// Travel of the tip for a count, um.
-        count_um: i32,
-    },
-    /// The drive is so light beside the tip's stiffness that the last part of a force error stays for long.
-    LightDrive {
-        /// Inertia of the motor as a mass at the tip, g.
-        mass_g: i32,
-        /// An eighth of the largest force, mN.
-        force_mn: i32,
-        /// Time in which the slowest gain set reduces an error of that force to 37 %, ms.
-        settle_ms: i32,
-    },
-    /// The motor at its largest current or voltage presses less than the largest goal.
-    WeakDrive {
-        /// [`Params::force_max_mn`].
-        force_max_mn: i32,
-        /// Largest force of the motor at rest, without friction, mN.
-        stall_mn: i32,
-    },
-}
-
-impl core::fmt::Display for Warning {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::CoarsePitch { pitch_um, force_mn, radius_um } => write!(
-                f,
-                "pitch_um of {pitch_um}: a contact of {force_mn} mN has a radius of {radius_um} um, less than \
-                 {PITCHES} taxels; \
-                 its confidence is low, and one dead taxel falsifies the force"
-            ),
-            Self::ForceUnseen { force_max_mn, seen_mn } => write!(
-                f,
-                "force_max_mn of {force_max_mn}: the converter sees up to {seen_mn} mN; larger goals are held as that"
-            ),
-            Self::SlowFrames { frame_ns } => write!(
-                f,
-                "frames of {frame_ns} ns: the gains follow the frame time up to {FRAME_NS} ns; the guard and \
-                 the motions that measure are made for quicker ones"
-            ),
-            Self::CoarseEncoder { count_um } => write!(
-                f,
-                "encoder_counts_per_turn: a count is {count_um} um of travel; jog and strokes are refused above \
-                 {COUNT_UM}"
-            ),
-            Self::LightDrive { mass_g, force_mn, settle_ms } => write!(
-                f,
-                "reduction_mrad_per_mm: the motor is a mass of {mass_g} g at the tip, too light for the tip's \
-                 stiffness: the last part of an error at {force_mn} mN falls to 37 % in {settle_ms} ms; use a larger \
-                 reduction, quicker frames or a finer encoder"
-            ),
-            Self::WeakDrive { force_max_mn, stall_mn } => write!(
-                f,
-                "force_max_mn of {force_max_mn}: the motor presses {stall_mn} mN at most, by current_max_ma or \
-                 voltage_max_mv; larger goals are not reached"
-            ),
-        }
-    }
-}
-
 impl Config {
-    /// Returns the warnings about this configuration, for a host to show.
-    pub fn warnings(&self) -> impl Iterator<Item = Warning> {
+    /// Tells each reason for which the loop runs worse with this configuration than its user may expect, for a host to show.
+    pub fn warnings(&self, mut tell: impl FnMut(core::fmt::Arguments<'_>)) {
         let p = &self.params;
         let Params { pitch_um, force_max_mn, .. } = *p;
         let force_mn = force_max_mn / PART;
@@ -174,23 +101,44 @@ impl Config {
         let slope = self.gain_sets[GAIN_SETS - 1].slope_per_s.max(1) as f32;
         let speed_gain = POSITION_TO_SPEED * slope;
         let mass_g = (1e3 * mass_kg) as i32;
-        let settling_ms = 1e3 * (1.0 + CONTACT_SLOWS * stiffness / (speed_gain * speed_gain)) / slope;
+        let settle_ms = 1e3 * (1.0 + CONTACT_SLOWS * stiffness / (speed_gain * speed_gain)) / slope;
         let volts_mv = p.voltage_max_mv.min(p.supply_max_mv) as f32;
         let amperes = (p.current_max_ma as f32 * 1e-3).min(volts_mv / p.resistance_mohm.max(1) as f32);
         let stall_mn = (amperes * p.torque_constant_unm_per_a as f32 * 1e-3 * rad_per_m) as i32;
-        [
-            (radius_um < PITCHES * pitch_um).then_some(Warning::CoarsePitch { pitch_um, force_mn, radius_um }),
-            (seen_mn < force_max_mn).then_some(Warning::ForceUnseen { force_max_mn, seen_mn }),
-            (frame_ns > FRAME_NS).then_some(Warning::SlowFrames { frame_ns }),
-            (count_um >= COUNT_UM).then_some(Warning::CoarseEncoder { count_um }),
-            (settling_ms > SETTLE_MS).then_some(Warning::LightDrive {
-                mass_g,
-                force_mn,
-                settle_ms: settling_ms as i32,
-            }),
-            (stall_mn < force_max_mn).then_some(Warning::WeakDrive { force_max_mn, stall_mn }),
-        ]
-        .into_iter()
-        .flatten()
+        if radius_um < PITCHES * pitch_um {
+            tell(format_args!(
+                "pitch_um of {pitch_um}: a contact of {force_mn} mN has a radius of {radius_um} um, less than {PITCHES} \
+                 taxels; its confidence is low, and one dead taxel falsifies the force"
+            ));
+        }
+        if seen_mn < force_max_mn {
+            tell(format_args!(
+                "force_max_mn of {force_max_mn}: the converter sees up to {seen_mn} mN; larger goals are held as that"
+            ));
+        }
+        if frame_ns > FRAME_NS {
+            tell(format_args!(
+                "frames of {frame_ns} ns: the gains follow the frame time up to {FRAME_NS} ns; the guard and the motions \
+                 that measure are made for quicker ones"
+            ));
+        }
+        if count_um >= COUNT_UM {
+            tell(format_args!(
+                "encoder_counts_per_turn: a count is {count_um} um of travel; jog and strokes are refused above {COUNT_UM}"
+            ));
+        }
+        if settle_ms > SETTLE_MS {
+            tell(format_args!(
+                "reduction_mrad_per_mm: the motor is a mass of {mass_g} g at the tip, too light for the tip's stiffness: \
+                 the last part of an error at {force_mn} mN falls to 37 % in {settle_ms:.0} ms; use a larger reduction, \
+                 quicker frames or a finer encoder"
+            ));
+        }
+        if stall_mn < force_max_mn {
+            tell(format_args!(
+                "force_max_mn of {force_max_mn}: the motor presses {stall_mn} mN at most, by current_max_ma or \
+                 voltage_max_mv; larger goals are not reached"
+            ));
+        }
     }
 }

@@ -386,7 +386,12 @@ fn a_motion_is_refused_where_it_cannot_begin() {
     const STROKES: u8 = 2;
     const PRESS: u8 = 3;
     let ask = |bench: &mut Bench, task: u8| bench.write(address::MEASURE, &[task]);
-    let all = |bench: &mut Bench| [JOG, STROKES, PRESS].map(|task| ask(bench, task).is_ok());
+    let all = |bench: &mut Bench| {
+        [JOG, STROKES, PRESS].map(|task| {
+            bench.status.taken.measure = bench.server.command().measure_request;
+            ask(bench, task).is_ok()
+        })
+    };
     let mut bench = Bench::new();
     bench.status.limits.set(Limits::NOT_TARED);
     assert_eq!(all(&mut bench), [false; 3], "not tared, torque off");
@@ -409,6 +414,10 @@ fn a_motion_is_refused_where_it_cannot_begin() {
     let mut bench = Bench::new();
     bench.capture.state = CaptureState::Recording;
     assert_eq!(all(&mut bench), [true, false, false], "the capture's memory is in use");
+    // The loop has not seen the jog yet: a motion would replace it, or the stop behind it.
+    let mut waits = Bench::new();
+    let answers = [JOG, STROKES, 0, JOG, STROKES, 0].map(|task| ask(&mut waits, task).is_ok());
+    assert_eq!(answers, [true, false, true, false, false, true]);
     // Stopping is never refused.
     for bench in [&mut Bench::new(), &mut faulted(), &mut bench] {
         let before = bench.server.command().measure_request;

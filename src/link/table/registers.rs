@@ -229,7 +229,8 @@ control_table! {
     /// torque off and the tip in the air: at most 8 % of duty, 0.8 mm towards the
     /// object and back. 2 strokes of 0.7 mm to both sides, as 1 and with the direction
     /// confirmed. 3 two presses into a hard flat plate, with torque on. 0 stops.
-    /// Result error if these conditions are not met or during a capture. Reads 0.
+    /// Result error if these conditions are not met, while the request before waits, or
+    /// for a record (2, 3) during a capture. Reads 0.
     4224 MEASURE: U8 ReadWrite in 0..=3 = 0, |_, _| 0, Staged::set_measure;
     /// Last requested motion: 0 none since reset, 1 running, 2 complete, 3 ended early.
     4225 MEASURE_STATE: U8 ReadOnly in 0..=3, |view, _| view.measure_state();
@@ -242,7 +243,7 @@ control_table! {
     4227 MEASURE_ENDED: U8 ReadOnly in 0..=13, |view, _| view.status().measure.ended as u32;
     /// Number that explains measure_ended.
     4228 MEASURE_VALUE: I32 ReadOnly in -0x7FFF_FFFF..=0x7FFF_FFFF, |view, _| view.status().measure.value as u32;
-    /// Kind of the motion: 1 jog, 2 strokes, 3 press.
+    /// Kind of the motion: 0 stopped before it began, 1 jog, 2 strokes, 3 press.
     4232 MEASURE_TASK: U8 ReadOnly in 0..=3, |view, _| view.status().measure.task as u32;
     /// 1 arms a capture, which begins with the next tare and keeps every frame
     /// until its memory is full. 0 ends or cancels it. 1 gives an access error

@@ -44,14 +44,15 @@ impl<const ROWS: usize, const COLUMNS: usize> Staged<'_, ROWS, COLUMNS> {
         Ok(())
     }
 
-    /// Requests a task of a measurement.
+    /// Requests a task of a measurement. A motion is refused while the request before it waits: it would replace a stop.
     pub(super) fn set_measure(&mut self, value: i64) -> Result<(), StatusError> {
         let task = Task::of(value as u8);
+        let waits = self.settings.command.measure_request != self.snapshot.status.taken.measure;
         let command = &mut self.settings.command;
         command.measure_request = task.after(command.measure_request);
         // Its record needs the memory of a capture.
         let kept = matches!(task, Task::Strokes | Task::Press) && self.snapshot.records();
-        if kept { Err(StatusError::Result) } else { Ok(()) }
+        if task != Task::Stop && waits || kept { Err(StatusError::Result) } else { Ok(()) }
     }
 
     /// Sets the goal force: refused until a tripped watchdog is reset.

@@ -298,7 +298,7 @@ pub(super) fn set(values: &[Value], client: &mut Client) -> Result<Vec<Changed>,
     // Parameters that contradict each other are refused by the core's own check.
     let config = Config::shipped(&of_bytes(&after));
     let config = config.map_err(|why| format!("these do not go together: {why}; nothing was changed"))?;
-    config.warnings().for_each(|warning| eprintln!("warning: {warning}"));
+    config.warnings(|warning| eprintln!("warning: {warning}"));
     torque_is_off(client)?;
     for (_, id) in others.iter().filter(|(register, _)| register.address == address::ID) {
         if *id != i64::from(client.id) && client.is_taken(*id as u8)? {

@@ -46,7 +46,7 @@ const CYCLES_PER_US: u32 = 168;
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    stack::guard_foot();
+    stack::protect();
     let boot = crash::boot();
     let clocked = clocks::start_external();
     let external_hz = part::external_by_internal();

@@ -15,6 +15,10 @@ const SMALL: f64 = 0.1;
 const HUBER: f64 = 2.0;
 /// Share of the root mean square of the residuals that their scale is at least.
 const OUTLIERS: f64 = 0.4;
+/// Share of the cost below which its fall in the last half of the rounds does not count.
+const FLAT: f64 = 0.01;
+/// Share of the scale below which a change of it does not count.
+const STEADY: f64 = 0.05;
 /// Step of a parameter for its derivative.
 const NUDGE: f64 = 1e-5;
 /// Prior of the Stribeck speed: its logarithm and standard deviation.
@@ -126,10 +130,14 @@ impl Problem<'_> {
     /// The least cost near a point, by damped Gauss-Newton steps (Levenberg and Marquardt).
     fn minimum(&self, mut at: Point) -> Result<Point, NoDrive> {
         let mut damping = 1e-3;
-        let mut rounds = 0;
+        let (mut rounds, mut scale, mut halfway) = (0, 0.0, f64::MAX);
         loop {
             let residuals = residuals(self.paths, &at.p, self.law, &at.own);
-            let scale = scale(&residuals).max(self.least);
+            // Kept once it hardly changes: a cost whose scale moves with the point has no least value.
+            let now = self::scale(&residuals).max(self.least);
+            if (now - scale).abs() > STEADY * scale {
+                (scale, halfway) = (now, f64::MAX);
+            }
             let before = self.cost(&residuals, &at, scale);
             let blocks = self.blocks(&at, &residuals, scale, FITTED);
             let (matrix, gradient) = self.equations(&Normal::new(&blocks, 0.0), &at.p, 0.0);
@@ -137,10 +145,14 @@ impl Problem<'_> {
             if whole < SMALL {
                 return Ok(at);
             }
+            if rounds < ROUNDS / 2 {
+                halfway = before;
+            }
             loop {
                 rounds += 1;
                 if rounds > ROUNDS {
-                    return Err(NoDrive::Unsolved(ROUNDS));
+                    // The bottom of a flat valley: what is left to gain says nothing about the motor.
+                    return if halfway < (1.0 + FLAT) * before { Ok(at) } else { Err(NoDrive::Unsolved(ROUNDS)) };
                 }
                 let normal = Normal::new(&blocks, damping);
                 let (matrix, gradient) = self.equations(&normal, &at.p, damping);

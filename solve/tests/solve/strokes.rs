@@ -512,3 +512,12 @@ impl Rig {
         self.force_n = self.force_n.max(self.drive.force_n(self.tip_mm));
     }
 }
+
+/// Strokes on the emulated board whose fit ends in a flat valley: it went on until its rounds were over, and gave no drive.
+#[test]
+fn a_fit_with_nothing_left_to_gain_is_solved() {
+    let strokes = record::strokes(include_bytes!("flat-valley.strokes"), &Params::DEFAULT).expect("strokes");
+    let k = solve(&strokes).expect("a drive").torque_constant;
+    let off = k.value * 1e6 / f64::from(Params::DEFAULT.torque_constant_unm_per_a) - 1.0;
+    assert!(off.abs() < 0.02, "{k:?}");
+}

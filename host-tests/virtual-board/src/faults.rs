@@ -20,8 +20,6 @@ const ENABLE: u64 = 1;
 /// DMA2 stream 1's vector, and flash that no image takes.
 const HALFWAY_VECTOR: u64 = 0x0800_0000 + 4 * (16 + 57);
 const FREE_FLASH: u64 = 0x0803_f000;
-/// `movw r0, #0xfffc; movt r0, #0x1fff; str r0, [r0]; bx lr`.
-const STORE_BELOW_RAM: [u64; 6] = [0xf64f, 0x70fc, 0xf6c1, 0x70ff, 0x6000, 0x4770];
 /// Address at which no device answers.
 const NOWHERE: u64 = 0xd000_0000;
 
@@ -41,8 +39,8 @@ pub enum Fault {
     /// The external clock stops, and is not there at a start. The emulated part has no exception that nothing masks:
     /// its handler is entered as the frame guard's interrupt, which has the highest priority.
     ClockLost,
-    /// The scan's half-frame interrupt stores a word just below RAM, as a stack that runs over does.
-    StoreBelowRam,
+    /// The scan's half-frame interrupt stores a word at this address.
+    StoreAt(u32),
     /// The bus's receiving DMA stream points where nothing answers, so its next byte is a transfer error: a panic.
     BusMemoryLost,
     /// The core's next access to these addresses is a bus error: a hard fault.
@@ -63,14 +61,14 @@ impl Fault {
             Self::BridgeFault => session.board_mut().part.set_bridge_well(stop.at, !defect),
             Self::CoreHangs => host.hold(defect),
             Self::ClockLost => {}
-            Self::StoreBelowRam if defect => {
-                for (place, halfword) in STORE_BELOW_RAM.into_iter().enumerate() {
+            Self::StoreAt(address) if defect => {
+                for (place, halfword) in store_at(address.into()).into_iter().enumerate() {
                     host.program(FREE_FLASH + 2 * place as u64, Width::W16, halfword)
                         .expect("the flash can be programmed");
                 }
                 host.program(HALFWAY_VECTOR, Width::W32, FREE_FLASH | 1).expect("the flash can be programmed");
             }
-            Self::StoreBelowRam => {}
+            Self::StoreAt(_) => {}
             Self::BusMemoryLost if defect => {
                 let mut access = |kind, address, value| {
                     let access = Access::new(kind, address, Width::W32, value).at(stop.instruction_count, stop.at);
@@ -87,6 +85,15 @@ impl Fault {
             Self::BusError { .. } => {}
         }
     }
+}
+
+/// `movw r0, #low; movt r0, #high; str r0, [r0]; bx lr`.
+fn store_at(address: u64) -> [u64; 6] {
+    let moved = |opcode: u64, half: u64| {
+        [opcode | (half >> 11 & 1) << 10 | half >> 12 & 15, (half >> 8 & 7) << 12 | half & 0xff]
+    };
+    let ([low, low_rest], [high, high_rest]) = (moved(0xf240, address), moved(0xf2c0, address >> 16));
+    [low, low_rest, high, high_rest, 0x6000, 0x4770]
 }
 
 impl Rig {

@@ -92,14 +92,15 @@ struct Programs {
 }
 
 impl Programs {
-    /// Builds them with the tests of their packages, as plain `cargo test` has done: another selection of packages could
-    /// give them other features, and compile them again.
+    /// Builds them with the tests of their packages, as plain `cargo test` or `cargo xtask test` has done: another
+    /// selection of packages would give them other features, and compile them again.
     fn new() -> Self {
         let own = std::env::current_exe().expect("this program");
         let folder = own.ancestors().nth(2).expect("the profile's folder").to_owned();
         let profile = folder.file_name().expect("its name").to_string_lossy().replace("debug", "dev");
         let mut build = Command::new(env!("CARGO"));
         build.args(["test", "--no-run", "--quiet", "--profile", &profile]).current_dir(root());
+        build.args(std::env::var("FINGERTIP_TESTS").iter().flat_map(|words| words.split(' ')));
         for test in ["commands", "files", "served", "finger"] {
             build.args(["--test", test]);
         }

@@ -250,7 +250,7 @@ control_table! {
     /// with torque on, a result error while frames are being kept. Reads 0.
     4260 CAPTURE: U8 ReadWrite in 0..=1 = 0, |_, _| 0, Staged::set_capture;
     /// Capture: 0 none since reset, 1 armed, 2 keeping frames, 3 done.
-    4261 CAPTURE_STATE: U8 ReadOnly in 0..=3, |view, _| view.capture_state();
+    4261 CAPTURE_STATE: U8 ReadOnly in 0..=3, |view, _| view.snapshot.capture.standing.state as u32;
     /// Reason of the capture's end; 0 none. 1 its memory is full, 2 the host ended it, 3 new parameters or gains, 4 the
     /// firmware stopped the motor, 5 the firmware shorted the motor at a broken array.
     4262 CAPTURE_ENDED: U8 ReadOnly in 0..=5, |view, _| view.snapshot.capture.standing.ended as u32;

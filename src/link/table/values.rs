@@ -1,7 +1,6 @@
 //! Registers whose values take more than a line to read or to write.
 
 use super::{Staged, TableView};
-use crate::capture::CaptureState;
 use crate::config::newtons;
 use crate::link::checks::Hindrance;
 use crate::link::packet::StatusError;
@@ -137,12 +136,6 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> TableView<'a, ROWS, COLUMNS> {
     pub(super) fn measure_state(&self) -> u32 {
         let waits = self.settings().command.measure_request != self.status().taken.measure;
         if waits { MeasureState::Running as u32 } else { self.status().measure.state as u32 }
-    }
-
-    /// Returns the state of the capture, where a new request counts already.
-    pub(super) fn capture_state(&self) -> u32 {
-        let armed = self.state.actions.capture == Some(true);
-        if armed { CaptureState::Armed as u32 } else { self.snapshot.capture.standing.state as u32 }
     }
 
     /// Returns a byte of the capture.

@@ -34,9 +34,6 @@ pub struct Image {
 
 impl Image {
     /// Lays out the loadable segments of a linked image by their load addresses; gaps read as erased.
-    ///
-    /// # Errors
-    /// The file is missing, no image for the target, loads nothing, or names a folder of this machine.
     pub fn read(elf: &Path) -> Result<Self> {
         let data = fs::read(elf).with_context(|| format!("cannot read the image {}", host::shown(elf)))?;
         let file = ElfFile::<FileHeader32<LittleEndian>>::parse(&*data)
@@ -60,9 +57,6 @@ impl Image {
     }
 
     /// Refuses an image with a path of this machine in it: a build on another machine would give other bytes.
-    ///
-    /// # Errors
-    /// Names the path: where the sources of the core lie, or those of other crates.
     fn names_no_folder(&self) -> Result<()> {
         // With its subfolder: that of a checkout in `/src` alone is part of most paths.
         for folder in toolchain::sources().into_iter().chain([host::root().join("src")]) {
@@ -103,9 +97,6 @@ fn lay_out(segments: &[(u32, &[u8])]) -> Result<(u32, Vec<u8>)> {
 }
 
 /// Builds the flash image.
-///
-/// # Errors
-/// No compiler, or the firmware does not compile.
 pub fn firmware(choice: Choice, console: &mut Console) -> Result<Image> {
     let toolchain = toolchain::ensure(choice, console)?;
     let mut command = toolchain.cargo("build");
@@ -114,9 +105,6 @@ pub fn firmware(choice: Choice, console: &mut Console) -> Result<Image> {
 }
 
 /// Builds an image that checks a board.
-///
-/// # Errors
-/// The image does not compile or link.
 pub fn checking(toolchain: Toolchain, name: &str, console: &mut Console) -> Result<Image> {
     let mut command = toolchain.cargo("build");
     command.args(["--package", name, "--bin", name, "--no-default-features", "--features", "image"]);
@@ -131,9 +119,6 @@ fn with_bytes(command: &mut Command, toolchain: Toolchain, name: &str, console: 
 }
 
 /// Builds an image for the emulated core and returns where it lies.
-///
-/// # Errors
-/// The image does not compile or link.
 pub fn build(toolchain: Toolchain, name: &str, feature: &str, console: &mut Console) -> Result<PathBuf> {
     built(emulated(toolchain, name, feature).arg("--release"), toolchain, name, console)
 }

@@ -21,9 +21,6 @@ pub struct Args {
 }
 
 /// Runs every test at its usual size, or what that leaves out.
-///
-/// # Errors
-/// Names the stages that failed.
 pub fn run(args: &Args, choice: Choice) -> Result<()> {
     let mut stages = Stages::default();
     if args.long {

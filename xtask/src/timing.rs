@@ -65,9 +65,6 @@ impl Run {
 }
 
 /// Measures the loop's kernels or an image, or checks the model.
-///
-/// # Errors
-/// Something does not build, or the image fails or cannot be measured.
 pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     if args.check {
         return check(choice, console);
@@ -87,9 +84,6 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
 }
 
 /// Runs the tests that compare the model with published measurements.
-///
-/// # Errors
-/// Something does not build, or a test fails.
 pub fn check(choice: Choice, console: &mut Console) -> Result<()> {
     ensure(console)?;
     let plugin = plugin(console)?;
@@ -99,9 +93,6 @@ pub fn check(choice: Choice, console: &mut Console) -> Result<()> {
 }
 
 /// Measures the loop's kernels over the recorded stimulus.
-///
-/// # Errors
-/// Something does not build, or the image fails.
 pub fn kernels(choice: Choice, console: &mut Console) -> Result<Run> {
     let image = image::build(toolchain::ensure(choice, console)?, "timing", "timing", console)?;
     let recording = host::made("timing")?.join("recording.bin");
@@ -111,9 +102,6 @@ pub fn kernels(choice: Choice, console: &mut Console) -> Result<Run> {
 }
 
 /// Runs an image to its end under the plugin; `argument` is its command line.
-///
-/// # Errors
-/// QEMU or the plugin is missing, the image fails, or a region cannot be measured.
 pub fn measure(image: &Path, argument: Option<&Path>, console: &mut Console) -> Result<Run> {
     ensure(console)?;
     let plugin = plugin(console)?;
@@ -142,9 +130,6 @@ pub fn measure(image: &Path, argument: Option<&Path>, console: &mut Console) -> 
 }
 
 /// Makes sure of an emulator with the plugin interface.
-///
-/// # Errors
-/// The emulator is missing and cannot be installed.
 pub fn ensure(console: &mut Console) -> Result<()> {
     if version().is_some_and(|version| version >= VERSION_MIN) {
         return Ok(());

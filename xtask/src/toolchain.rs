@@ -99,17 +99,11 @@ pub fn sources() -> Option<PathBuf> {
 }
 
 /// Finds or installs a compiler for the firmware.
-///
-/// # Errors
-/// Neither rustup nor Debian could provide one; the text says what was tried and what to do.
 pub fn ensure(choice: Choice, console: &mut Console) -> Result<Toolchain> {
     ensure_for(choice, &[TARGET], "the firmware is compiled for it", console)
 }
 
 /// Finds or installs a compiler for some targets.
-///
-/// # Errors
-/// Like [`ensure`].
 pub fn ensure_for(choice: Choice, targets: &[&str], why: &str, console: &mut Console) -> Result<Toolchain> {
     if choice == Choice::Debian {
         return debian(console);

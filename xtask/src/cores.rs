@@ -6,7 +6,6 @@ use crate::image::{self, Image};
 use crate::toolchain::{self, Choice, TARGET};
 use crate::{docs, install};
 use anyhow::{Context, Result, ensure};
-use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
 
@@ -100,17 +99,9 @@ pub fn page(choice: Choice, console: &mut Console) -> Result<String> {
         fs::copy(toolchain.images_for(core.target, core.flags).join("cores"), &elf)
             .with_context(|| host::shown(&elf))?;
         let bytes = Image::read(&elf)?.bytes.len();
-        // A string takes every write.
-        let _ = writeln!(
-            list,
-            "{}\t{}\t{}\t{}\t{bytes}\t{}\t{}",
-            core.name,
-            core.array,
-            core.target,
-            core.flags.join(" "),
-            core.emulator(),
-            elf.display()
-        );
+        let Core { name, array, target, flags, .. } = core;
+        let (flags, emulator) = (flags.join(" "), core.emulator());
+        list += &format!("{name}\t{array}\t{target}\t{flags}\t{bytes}\t{emulator}\t{}\n", elf.display());
     }
     let file = folder.join("list.tsv");
     fs::write(&file, list).with_context(|| host::shown(&file))?;

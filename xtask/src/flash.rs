@@ -9,7 +9,6 @@ use crate::toolchain::{self, Choice, Toolchain};
 use crate::{sim, timing};
 use anyhow::{Context, Result, bail, ensure};
 use clap::ValueEnum;
-use std::fmt::Write as _;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
@@ -288,8 +287,7 @@ fn estimates(toolchain: Toolchain, console: &mut Console) -> Result<PathBuf> {
     let call = run.regions.first().map_or(0, |region| region.flash.median);
     let mut text = String::new();
     for region in &run.regions {
-        // A string takes every write.
-        let _ = writeln!(text, "{} {}", region.flash.median.saturating_sub(call), run.name(region.region));
+        text += &format!("{} {}\n", region.flash.median.saturating_sub(call), run.name(region.region));
     }
     fs::write(&file, text).with_context(|| format!("cannot write {}", host::shown(&file)))?;
     Ok(file)

@@ -10,7 +10,6 @@ use object::read::elf::{ElfFile, ProgramHeader};
 use object::{LittleEndian, Object, ObjectSection, ObjectSymbol, SectionFlags};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -24,7 +23,7 @@ const SPAN_MAX: usize = 2 << 20;
 pub struct Image {
     /// The linked image, with symbols.
     pub elf: PathBuf,
-    /// The flashable bytes, as a file beside it.
+    /// The file of the flashable bytes beside it.
     pub bin: PathBuf,
     /// The flashable bytes.
     pub bytes: Vec<u8>,
@@ -236,13 +235,13 @@ impl Sizes {
     fn table(&self) -> String {
         let mut text = format!("{:<24} {:>10} {:>8} {:>8}\n", "section", "address", "flash", "RAM");
         for (name, address, flash, ram) in &self.sections {
-            let _ = writeln!(text, "{name:<24} {address:#010x} {flash:>8} {ram:>8}");
+            text += &format!("{name:<24} {address:#010x} {flash:>8} {ram:>8}\n");
         }
         let mut crates: Vec<_> = self.crates.iter().collect();
         crates.sort_by_key(|(_, (flash, ram))| std::cmp::Reverse(flash + ram));
-        let _ = writeln!(text, "\n{:<35} {:>8} {:>8}", "crate (named symbols only)", "flash", "RAM");
+        text += &format!("\n{:<35} {:>8} {:>8}\n", "crate (named symbols only)", "flash", "RAM");
         for (name, (flash, ram)) in crates.into_iter().take(CRATES_SHOWN) {
-            let _ = writeln!(text, "{name:<35} {flash:>8} {ram:>8}");
+            text += &format!("{name:<35} {flash:>8} {ram:>8}\n");
         }
         text
     }
@@ -267,27 +266,16 @@ const UNDEFINED: &str = "fingertip_step_can_panic";
 /// Builds the proof and its two controls.
 pub fn prove_panic_free(choice: Choice, console: &mut Console) -> Result<()> {
     let toolchain = toolchain::ensure(choice, console)?;
-    let elf = link(toolchain, console)?;
+    let linked = build(toolchain, NAME, "proof", console);
+    let elf = linked
+        .with_context(|| format!("the proof does not link; if {UNDEFINED} is missing above, the step can panic"))?;
     console.print("The control step links without a panic handler: no panic is reachable.");
     let calls = float_calls(&elf)?;
     if !calls.is_empty() {
         bail!("the control step calls floating-point routines: {}", calls.join(", "));
     }
     console.print("It calls no floating-point routine.");
-    controls(toolchain, console)?;
-    console.print("The controls, a step that can panic and one that computes in f64, are caught.");
-    Ok(())
-}
-
-/// Links the proof.
-fn link(toolchain: Toolchain, console: &mut Console) -> Result<std::path::PathBuf> {
-    build(toolchain, NAME, "proof", console).map_err(|error| {
-        error.context(format!("the proof does not link; if {UNDEFINED} is missing above, the step can panic"))
-    })
-}
-
-/// Shows that the proof can fail.
-fn controls(toolchain: Toolchain, console: &mut Console) -> Result<()> {
+    // Shows that the proof can fail.
     let output = console.run_to_failure(emulated(toolchain, NAME, "proof-control-panic").arg("--release"))?;
     if !output.contains(UNDEFINED) {
         bail!("the control that panics fails for another reason:\n{output}");
@@ -296,6 +284,7 @@ fn controls(toolchain: Toolchain, console: &mut Console) -> Result<()> {
     if float_calls(&elf)?.is_empty() {
         bail!("the control that computes in f64 shows no floating-point routine in {}", host::shown(&elf));
     }
+    console.print("The controls, a step that can panic and one that computes in f64, are caught.");
     Ok(())
 }
 

@@ -35,11 +35,6 @@ pub fn packages(names: &[&str], why: &str, console: &mut Console) -> Result<()> 
         .with_context(|| format!("apt-get cannot install `{list}`, which {why} needs: is a package mirror in reach?"))
 }
 
-/// True if nothing of these packages is missing.
-pub fn all_installed(packages: &[&str]) -> bool {
-    packages.iter().all(|package| installed(package))
-}
-
 /// Installs the newest version of packages that Debian has for this release, its backports included. Backports are a
 /// source of this call alone: apt does not know of them afterwards.
 pub fn newest(packages: &[&str], why: &str, console: &mut Console) -> Result<()> {
@@ -124,7 +119,8 @@ fn is_main(release: &str, uri: &str) -> bool {
     uri.trim_end_matches('/').ends_with("/debian") && !release.contains("security")
 }
 
-fn installed(package: &str) -> bool {
+/// True if a Debian package is there.
+pub fn installed(package: &str) -> bool {
     let query = Command::new("dpkg-query").args(["-W", "-f", "${Status}", package]).output();
     query.is_ok_and(|output| output.stdout.ends_with(b" installed"))
 }

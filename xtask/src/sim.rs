@@ -73,7 +73,12 @@ pub struct DemoArgs {
 
 /// Shows the demonstration on the native core, which is built soon, then on the flash image.
 pub fn demo(args: &DemoArgs, choice: Choice, console: &mut Console) -> Result<()> {
-    native_demo(args, console)?;
+    let mut command = host::NATIVE_DEMO.build(console)?;
+    console.say("First on the native core: the same script and plant, no microcontroller in between.");
+    // As it is to be read: programs are started in the root.
+    let out = host::shown(&host::target().join("demo").join("native"));
+    console.run(command.arg("--out").arg(out).args(args.quick.then_some("--quick")))?;
+    console.say("Now on the flash image: the emulator is compiled for some minutes, the first time.");
     let image = image::firmware(choice, console)?;
     console.say(&image.summary());
     let mut command = host::BOARD.build(console)?;
@@ -85,17 +90,6 @@ pub fn demo(args: &DemoArgs, choice: Choice, console: &mut Console) -> Result<()
     }
     command.args(args.quick.then_some("--quick"));
     console.run(&mut command)
-}
-
-/// The same script on the core compiled for this machine: something to look at while the emulator compiles.
-fn native_demo(args: &DemoArgs, console: &mut Console) -> Result<()> {
-    let mut command = host::NATIVE_DEMO.build(console)?;
-    console.say("First on the native core: the same script and plant, no microcontroller in between.");
-    // As it is to be read: programs are started in the root.
-    let out = host::shown(&host::target().join("demo").join("native"));
-    console.run(command.arg("--out").arg(out).args(args.quick.then_some("--quick")))?;
-    console.say("Now on the flash image: the emulator is compiled for some minutes, the first time.");
-    Ok(())
 }
 
 /// Flags of `cargo xtask serve`.

@@ -8,7 +8,6 @@ use crate::{image, install};
 use anyhow::{Context, Result, bail};
 use m4_timing::meter::{Measured, parse};
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
-use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -57,8 +56,7 @@ impl Run {
         let mut text = String::new();
         for (line, measured) in self.json_lines.lines().zip(&self.regions) {
             let name = self.name(measured.region).replace(['"', '\\'], "'");
-            // A string takes every write.
-            let _ = writeln!(text, "{{\"name\":\"{name}\",{}", line.trim_start_matches('{'));
+            text += &format!("{{\"name\":\"{name}\",{}\n", line.trim_start_matches('{'));
         }
         text
     }
@@ -166,10 +164,8 @@ fn table(run: &Run) -> String {
     );
     for measured in &run.regions {
         let Measured { region, passes, instructions, low, estimate, high, flash } = measured;
-        // A string takes every write.
-        let _ = writeln!(
-            text,
-            "{:<34}{passes:>8}{:>8}{:>8}{:>9}{:>8}{:>8}{:>10}",
+        text += &format!(
+            "{:<34}{passes:>8}{:>8}{:>8}{:>9}{:>8}{:>8}{:>10}\n",
             run.name(*region),
             instructions.median,
             low.median,
@@ -249,10 +245,9 @@ fn measured(image: &Path, inputs: &Path, file: &Path, console: &mut Console) -> 
     let run = measure(image, Some(inputs), console)?;
     let mut text = run.output;
     for measured in &run.regions {
-        // A string takes every write.
-        let _ = write!(text, "cost {}", measured.region);
+        text += &format!("cost {}", measured.region);
         for figure in [&measured.instructions, &measured.low, &measured.estimate, &measured.high, &measured.flash] {
-            let _ = write!(text, " {} {}", figure.median, figure.max);
+            text += &format!(" {} {}", figure.median, figure.max);
         }
         text.push('\n');
     }

@@ -147,7 +147,6 @@ pub fn ensure(console: &mut Console) -> Result<()> {
 
 const M4_EMULATOR: &str = "qemu-system-arm";
 
-/// Flags of `cargo xtask qemu`.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  cargo xtask qemu\n  cargo xtask qemu --inject hang    (fails, as it must)")]
 pub struct QemuArgs {

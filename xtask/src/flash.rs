@@ -19,7 +19,6 @@ use std::{fs, iter, thread};
 /// The part on the board, in probe-rs's words.
 const CHIP: &str = "STM32F446RETx";
 
-/// Flags of `cargo xtask flash`.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  cargo xtask flash\n  cargo xtask flash --probe 0483:374b")]
 pub struct Args {
@@ -201,7 +200,6 @@ pub const BRINGUP: &str = "bringup";
 const BY_ID: &str = "/dev/serial/by-id";
 const ST_LINK: &str = "STLINK";
 
-/// Flags of `cargo xtask bringup`.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  cargo xtask bringup --json board.json\n  cargo xtask bringup --board virtual\n\n\
     docs/bringup.md goes on from there. `cargo xtask flash` puts the firmware back.")]

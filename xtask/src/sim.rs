@@ -54,7 +54,6 @@ pub fn start(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// Flags of `cargo xtask demo`.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  \
     cargo xtask demo\n  \
@@ -92,7 +91,6 @@ pub fn demo(args: &DemoArgs, choice: Choice, console: &mut Console) -> Result<()
     console.run(&mut command)
 }
 
-/// Flags of `cargo xtask serve`.
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples:\n  cargo xtask serve --pty /tmp/finger\n  cargo xtask serve raspberry --tcp 7000\n  \
@@ -158,7 +156,6 @@ pub fn serve(args: &ServeArgs, choice: Choice, console: &mut Console) -> Result<
     start(&mut command)
 }
 
-/// Flags of `cargo xtask replay`.
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples:\n  cargo xtask replay\n  cargo xtask replay my/captures\n  cargo xtask replay press.mcap"

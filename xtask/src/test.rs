@@ -8,7 +8,6 @@ use anyhow::{Context, Result, bail, ensure};
 use std::process::Command;
 use std::time::Instant;
 
-/// Flags of `cargo xtask test`.
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples:\n  cargo xtask test\n  cargo xtask test --long    (the cases that the usual size leaves out)\n  \

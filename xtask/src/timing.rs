@@ -17,7 +17,6 @@ const PROGRAM: &str = "qemu-system-arm";
 const VERSION_MIN: u32 = 9;
 const WHY: &str = "estimating cycles on an emulated Cortex-M4F";
 
-/// Flags of `cargo xtask timing`.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  cargo xtask timing\n  cargo xtask timing --json kernels.json\n  \
     cargo xtask timing --check\n  cargo xtask timing my-image.elf")]
@@ -187,7 +186,6 @@ const STUDY_PROFILE: &str = "study";
 /// Number of fingers of the whole loop.
 const FINGERS: &str = "12";
 
-/// Flags of `cargo xtask study`.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  cargo xtask study\n  cargo xtask study --check\n  \
     cargo xtask study --json study.json --out /tmp/study")]

@@ -7,7 +7,7 @@ pub use crate::setup::Setup;
 
 use crate::effects::drive::{self, Circuit, Friction};
 use crate::effects::sensor::{self, Readout, Settling};
-use crate::effects::{Parts, Set, contact};
+use crate::effects::{Parts, Set, contact, link};
 use crate::mechanics::rotor::Shaft;
 use crate::mechanics::{Bridge, Finger, decay};
 use crate::scene::Scene;
@@ -241,7 +241,8 @@ pub struct Reference;
 
 impl Reference {
     pub fn parts(setup: &Setup) -> Parts<Self> {
-        Parts::new(Sensor::new(&setup.array), Drive::new(setup))
+        let (contact, link) = (contact::Named::default(), link::Named::default());
+        Parts { sensor: Sensor::new(&setup.array), contact, drive: Drive::new(setup), link }
     }
 }
 

@@ -145,7 +145,7 @@ pub struct Tracks {
     pub control_error: Track,
     /// The control error while a force is held, `HELD_AFTER_S` after the goal changed or the touch.
     pub held_error: Track,
-    /// Tracks of [`QUANTITIES`].
+    /// Tracks of the quantities with plots of their own.
     pub quantities: [Track; QUANTITIES.len()],
     /// True force, N, and travel, mm, less those of the other board, if there is one.
     pub differences: [Track; 2],

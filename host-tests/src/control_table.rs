@@ -6,7 +6,7 @@ use fingertip::params::Params;
 use fingertip::shipped::{COLUMNS, REGISTERS, TAXELS, address};
 use output::units;
 
-pub const COMMAND: &str = "cargo xtask docs";
+const COMMAND: &str = "cargo xtask docs";
 
 pub fn markdown() -> String {
     let mut page = String::new();

@@ -10,6 +10,7 @@ use fingertip::contact::{self, CONFIDENCE_LEAST, Contact, FitLevel};
 use fingertip::shipped::{Config, Fit, TactileImage};
 use images::single::{self, Refined};
 use std::fmt::Write as _;
+use std::sync::LazyLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A contact that fewer live taxels see is not judged.
@@ -34,8 +35,8 @@ pub struct Series {
     pub reading: Reading,
 }
 
-const fn reading(dead: usize, steps: Steps, noise: Noise) -> Reading {
-    Reading { steps, noise, dead }
+const fn series(name: &'static str, scene: fn(&mut Rng) -> Scene, dead: usize, steps: Steps, noise: Noise) -> Series {
+    Series { name, scene, reading: Reading { steps, noise, dead } }
 }
 
 /// Noise of 1 % of each reading.
@@ -43,26 +44,22 @@ const NOISE: Noise = Noise::OfReading(0.01);
 
 /// Hemispheres on a plane.
 pub const GOOD: [Series; 6] = [
-    Series { name: "clean", scene: Scene::good, reading: reading(0, Steps::Sixteenths, Noise::None) },
-    Series { name: "10 dead", scene: Scene::good, reading: reading(10, Steps::Sixteenths, Noise::None) },
-    Series { name: "10 dead, floor", scene: Scene::good, reading: reading(10, Steps::Codes, Noise::None) },
-    Series { name: "noise", scene: Scene::good, reading: reading(0, Steps::Sixteenths, NOISE) },
-    Series { name: "noise, 10 dead", scene: Scene::good, reading: reading(10, Steps::Sixteenths, NOISE) },
-    Series {
-        name: "noise of the peak",
-        scene: Scene::good,
-        reading: reading(0, Steps::Sixteenths, Noise::OfPeak(0.01)),
-    },
+    series("clean", Scene::good, 0, Steps::Sixteenths, Noise::None),
+    series("10 dead", Scene::good, 10, Steps::Sixteenths, Noise::None),
+    series("10 dead, floor", Scene::good, 10, Steps::Codes, Noise::None),
+    series("noise", Scene::good, 0, Steps::Sixteenths, NOISE),
+    series("noise, 10 dead", Scene::good, 10, Steps::Sixteenths, NOISE),
+    series("noise of the peak", Scene::good, 0, Steps::Sixteenths, Noise::OfPeak(0.01)),
 ];
 
 /// Contacts other than a hemisphere on a plane, with noise.
 pub const BAD: [Series; 6] = [
-    Series { name: "edge", scene: Scene::edge, reading: reading(0, Steps::Sixteenths, NOISE) },
-    Series { name: "edge, 10 dead", scene: Scene::edge, reading: reading(10, Steps::Sixteenths, NOISE) },
-    Series { name: "two contacts", scene: Scene::two, reading: reading(0, Steps::Sixteenths, NOISE) },
-    Series { name: "two contacts, 10 dead", scene: Scene::two, reading: reading(10, Steps::Sixteenths, NOISE) },
-    Series { name: "bent", scene: Scene::bent, reading: reading(0, Steps::Sixteenths, NOISE) },
-    Series { name: "bent, 10 dead", scene: Scene::bent, reading: reading(10, Steps::Sixteenths, NOISE) },
+    series("edge", Scene::edge, 0, Steps::Sixteenths, NOISE),
+    series("edge, 10 dead", Scene::edge, 10, Steps::Sixteenths, NOISE),
+    series("two contacts", Scene::two, 0, Steps::Sixteenths, NOISE),
+    series("two contacts, 10 dead", Scene::two, 10, Steps::Sixteenths, NOISE),
+    series("bent", Scene::bent, 0, Steps::Sixteenths, NOISE),
+    series("bent, 10 dead", Scene::bent, 10, Steps::Sixteenths, NOISE),
 ];
 
 /// One tactile image with its truth.
@@ -92,27 +89,12 @@ impl Series {
     }
 }
 
-/// The core's constants for each pitch.
-#[derive(Clone, Debug)]
-pub struct Configs(Vec<(f64, Config)>);
-
-impl Default for Configs {
-    fn default() -> Self {
-        let config = |pitch_mm| {
-            let mut scene = Scene::good(&mut Rng::with_seed(0));
-            scene.pitch_mm = pitch_mm;
-            (pitch_mm, scene.config())
-        };
-        Self(PITCHES_MM.into_iter().map(config).collect())
-    }
-}
-
-impl Configs {
-    /// Configuration for a scene's array.
-    pub fn of(&self, scene: &Scene) -> &Config {
-        let found = self.0.iter().find(|(pitch_mm, _)| *pitch_mm == scene.pitch_mm);
-        &found.expect("one of the arrays' pitches").1
-    }
+/// The core's constants for the array of a case.
+fn config(scene: &Scene) -> &'static Config {
+    static CONFIGS: LazyLock<[Config; PITCHES_MM.len()]> =
+        LazyLock::new(|| PITCHES_MM.map(|pitch_mm| Scene { pitch_mm, ..Scene::good(&mut Rng::with_seed(0)) }.config()));
+    let place = PITCHES_MM.iter().position(|pitch_mm| *pitch_mm == scene.pitch_mm);
+    &CONFIGS[place.expect("one of the arrays' pitches")]
 }
 
 /// Result of one reading method on one case.
@@ -154,9 +136,9 @@ pub type Judged = Vec<Verdict>;
 
 impl Verdict {
     /// Judges the case of this number, with this fit level of [`Fit`].
-    pub fn of(series: &Series, number: usize, fit_level: FitLevel, configs: &Configs) -> Self {
+    pub fn of(series: &Series, number: usize, fit_level: FitLevel) -> Self {
         let case = series.case(number);
-        let config = configs.of(&case.scene);
+        let config = config(&case.scene);
         let noisy = series.reading.noise != Noise::None;
         let mut rng = Rng::with_seed(0xf7a3_0000_0000 + number as u64);
         let mut fit = Fit::new(fit_level);
@@ -174,10 +156,10 @@ impl Verdict {
 
 /// The tip pressed in at `um_per_frame` to the indentation of a good case, on an array without noise: the largest error
 /// of the force that [`Fit`] makes once enough taxels see the contact, in units of its bound, and that of the centre.
-pub fn pressed(number: usize, um_per_frame: f64, fit_level: FitLevel, configs: &Configs) -> Outcome {
+pub fn pressed(number: usize, um_per_frame: f64, fit_level: FitLevel) -> Outcome {
     let [clean, ..] = GOOD;
     let mut scene = clean.case(number).scene;
-    let (config, end) = (configs.of(&scene), scene.d_mm);
+    let (config, end) = (config(&scene), scene.d_mm);
     let mut rng = Rng::with_seed(number as u64);
     let mut fit = Fit::new(fit_level);
     let mut worst = Outcome { force: 0.0, centre: 0.0, flagged: false };
@@ -199,10 +181,9 @@ pub fn pressed(number: usize, um_per_frame: f64, fit_level: FitLevel, configs: &
 
 /// Judges `cases` cases of a series on all threads, with this fit level of [`Fit`]. `progress` gets the number done.
 pub fn judge(series: &Series, cases: usize, fit_level: FitLevel, progress: &(impl Fn(usize) + Sync)) -> Judged {
-    let configs = Configs::default();
     let done = AtomicUsize::new(0);
     sim::cores::map(0..cases, |number| {
-        let verdict = Verdict::of(series, number, fit_level, &configs);
+        let verdict = Verdict::of(series, number, fit_level);
         progress(done.fetch_add(1, Ordering::Relaxed) + 1);
         verdict
     })
@@ -265,13 +246,13 @@ fn flagged<'a>(judged: impl IntoIterator<Item = &'a Verdict>, way: usize) -> usi
 fn alarms(page: &mut String, bad: &[(&Series, Judged)]) {
     page.push_str("\nBad contacts that are flagged, percent:\n\n| image | Full | Fit |\n| --- | --- | --- |\n");
     for (series, judged) in bad {
-        let share = |way| percent(flagged(judged, way), judged.len());
-        let _ = writeln!(page, "| {} | {} |", series.name, row(share));
+        let [full, fit] = SHOWN.map(|(way, _)| 100.0 * flagged(judged, way) as f64 / judged.len().max(1) as f64);
+        let _ = writeln!(page, "| {} | {full:.2} | {fit:.2} |", series.name);
     }
 }
 
 fn motion(page: &mut String, cases: usize, fit_level: FitLevel, progress: &(impl Fn(&str, usize) + Sync)) {
-    let (cases, configs) = ((cases / 100).max(1), Configs::default());
+    let cases = (cases / 100).max(1);
     let _ = write!(
         page,
         "\nPressed in from 0.1 mm, `Fit` at every frame from the {FRAMES}th on with at least 12 taxels, {cases} contacts without noise:\n\n\
@@ -281,7 +262,7 @@ fn motion(page: &mut String, cases: usize, fit_level: FitLevel, progress: &(impl
         let outcomes: Vec<_> = (0..cases)
             .map(|number| {
                 progress("pressed in", number);
-                pressed(number, um_per_frame, fit_level, &configs)
+                pressed(number, um_per_frame, fit_level)
             })
             .collect();
         let values = |of: fn(&Outcome) -> f64| outcomes.iter().map(of);
@@ -297,13 +278,4 @@ fn motion(page: &mut String, cases: usize, fit_level: FitLevel, progress: &(impl
             outcomes.iter().filter(|outcome| outcome.flagged).count(),
         );
     }
-}
-
-/// Returns a cell for each method.
-fn row(cell: impl Fn(usize) -> String) -> String {
-    SHOWN.iter().map(|(way, _)| cell(*way)).collect::<Vec<_>>().join(" | ")
-}
-
-fn percent(part: usize, of: usize) -> String {
-    format!("{:.2}", 100.0 * part as f64 / of.max(1) as f64)
 }

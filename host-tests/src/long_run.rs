@@ -252,6 +252,7 @@ fn observers(scan: &str, config: &Config) -> Vec<Machine<Observer>> {
     ];
     let machine = |(input, pair): (&str, [(i32, i32); 2]), gain_set: usize| {
         let config = config.clone();
+        let travel_swing = if gain_set == 0 { TRAVEL_SWING } else { CALM_TRAVEL_SWING };
         Machine {
             name: format!("observer, {scan} scan, gain set {gain_set}, {input}"),
             start: Observer::new(),
@@ -262,11 +263,7 @@ fn observers(scan: &str, config: &Config) -> Vec<Machine<Observer>> {
                     .for_each(|(encoder, acceleration)| observer.update(*encoder, *acceleration, gains, &config));
             }),
             outputs: vec![
-                (
-                    "travel",
-                    |observer| observer.travel.to_bits().into(),
-                    if gain_set == 0 { TRAVEL_SWING } else { CALM_TRAVEL_SWING },
-                ),
+                ("travel", |observer| observer.travel.to_bits().into(), travel_swing),
                 ("speed", |observer| observer.speed.to_bits().into(), SPEED_SWING),
                 ("disturbance", |observer| observer.disturbance.to_bits().into(), DISTURBANCE_SWING),
             ],

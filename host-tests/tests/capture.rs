@@ -41,18 +41,6 @@ impl<const BYTES: usize> Recorded<BYTES> {
         finger
     }
 
-    /// Armed, a frame after torque went off while the finger held 4 N.
-    fn let_go_under_load() -> Self {
-        let mut finger = Self::new();
-        finger.bench.tare();
-        finger.bench.command().goal = newtons(4_000);
-        finger.frames(5_000);
-        finger.bench.command().torque = false;
-        finger.frame();
-        finger.capture.arm();
-        finger
-    }
-
     /// A press of a fresh finger.
     fn pressed() -> Self {
         let mut finger = Self::new();
@@ -329,25 +317,28 @@ fn what_the_finger_did_before_does_not_matter() {
     assert_eq!(finger.capture.standing().count, 2);
 }
 
-/// The old zero remains, and the motor is shorted until the tip rests.
+/// The old zero remains, and the motor is shorted until the tip rests. A forced tare begins the capture while the tip still
+/// moves: it is braked on.
 #[test]
-fn a_tare_under_load_is_refused_to_a_capture_too() {
-    let mut finger = Recorded::<BYTES>::let_go_under_load();
-    finger.bench.command().tare_request += 1;
-    let status = finger.frame();
-    assert_eq!((status.mode, status.tare), (Mode::Off, Taring::Refused));
-    assert_eq!(finger.frame().bridge(), Bridge::Brakes);
-    assert_eq!(finger.capture.standing().state, CaptureState::Armed);
-}
-
-/// A forced tare begins one while the tip still moves: it is braked on.
-#[test]
-fn a_capture_does_not_let_a_moving_tip_go() {
-    let mut finger = Recorded::<BYTES>::let_go_under_load();
-    *finger.bench.command() = Command { tare_forced: true, tare_request: 9, ..*finger.bench.command() };
-    let status = finger.frame();
-    assert_eq!((finger.capture.standing().state, status.mode), (CaptureState::Recording, Mode::Tare));
-    assert_eq!(status.bridge(), Bridge::Brakes);
+fn a_capture_does_not_let_a_moving_tip_go_and_a_tare_under_load_is_refused_to_it_too() {
+    let mut finger = Recorded::<BYTES>::new();
+    finger.bench.tare();
+    finger.bench.command().goal = newtons(4_000);
+    finger.frames(5_000);
+    finger.bench.command().torque = false;
+    finger.frame();
+    finger.capture.arm();
+    for (tare_forced, mode, tare, state) in [
+        (false, Mode::Off, Taring::Refused, CaptureState::Armed),
+        (true, Mode::Tare, Taring::Running, CaptureState::Recording),
+    ] {
+        let command = finger.bench.command();
+        command.tare_forced = tare_forced;
+        command.tare_request += 1;
+        let status = finger.frame();
+        assert_eq!((status.mode, status.tare, status.bridge()), (mode, tare, Bridge::Brakes));
+        assert_eq!(finger.capture.standing().state, state);
+    }
 }
 
 /// Torque that comes with the tare is newer than the capture's beginning.

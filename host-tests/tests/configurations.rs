@@ -3,11 +3,11 @@
 
 use crate::common::*;
 use fingertip::config::ConfigError;
-use fingertip::fixed::types::I8F24;
 use fingertip::params::ParamError;
 use fingertip::scan::{ScanError, ScanTiming};
 use paper::units::Ratio;
 use paper::{Relaxation, RelaxationError, RelaxationTerm};
+use sim::mechanics::pressures::Cell;
 
 fn warned(config: &Config) -> Vec<String> {
     let mut warned = Vec::new();
@@ -19,29 +19,24 @@ fn warned(config: &Config) -> Vec<String> {
 /// array, and with one dead taxel or none. A taxel reads the mean pressure on it.
 fn seen(params: &Params, force_mn: i32, off_mm: f64, dead: bool) -> (u8, f64) {
     let config = allowed(*params);
-    let depth = config.tip.indentation(newtons(force_mn));
-    let pitch = f64::from(params.pitch_um) * 1e-3;
+    let mut setup = Setup::default();
+    (setup.wall.centre_x_mm, setup.wall.centre_y_mm) = (off_mm, off_mm);
+    setup.array.pitch_mm = f64::from(params.pitch_um) * 1e-3;
+    setup.tip.radius_mm = f64::from(params.tip_radius_um) * 1e-3;
+    setup.tip.modulus_kpa = f64::from(params.modulus_pa) * 1e-3;
+    let tip = setup.tip.flattened(setup.tip.indentation_mm(f64::from(force_mn) * 1e-3));
     let mut finger = Pipeline::new(&config);
     let command = Command { tare_request: 1, fit_level: FitLevel::AllRows, ..Command::default() };
     let sense = Sense { supply_mv: 6_500, ..Sense::default() };
     let mut blank = Frame::EMPTY;
+    (0..COLUMNS).for_each(|column| blank.set_code(ROWS, column, 372));
+    recode(&mut blank, |_, _, _| 412);
     let mut pressed = blank;
-    for (row, column) in (0..=ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column))) {
-        blank.set_code(row, column, if row < ROWS { 412 } else { 372 });
-        const PARTS: usize = 6;
-        let mut kpa = 0.0;
-        for part in 0..PARTS * PARTS {
-            let mm = |taxel: usize, part: usize, side: usize| {
-                pitch * (taxel as f64 - 0.5 * side as f64 + (part as f64 + 0.5) / PARTS as f64) - off_mm
-            };
-            let distance = mm(row, part / PARTS, ROWS).hypot(mm(column, part % PARTS, COLUMNS));
-            let distance = Millimetres(I8F24::from_num(distance));
-            kpa += config.tip.pressure(distance, depth).0.to_num::<f64>() / (PARTS * PARTS) as f64;
-        }
+    recode(&mut pressed, |row, column, code| {
+        let kpa = Cell::of(&setup, row, column).mean_kpa(&tip);
         let dead = dead && (row, column) == ((ROWS - 1) / 2, (COLUMNS - 1) / 2);
-        let code = if dead || row == ROWS { 372.0 } else { 412.0 + kpa * f64::from(params.codes_per_kpa_milli) * 1e-3 };
-        pressed.set_code(row, column, code as u16);
-    }
+        if dead { 372 } else { code + (kpa * f64::from(params.codes_per_kpa_milli) * 1e-3) as u16 }
+    });
     for sequence in 1..=400 {
         let frame = Frame { sequence, ..if sequence < 200 { blank } else { pressed } };
         finger.step(&frame, &sense, &command);

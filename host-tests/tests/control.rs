@@ -287,9 +287,17 @@ fn a_calm_loop_ignores_an_error_within_the_slack() {
 
 // The observer against its equations in f64.
 
+/// Gains of the observer for a speed gain: its poles are 2.5 times as fast as the speed loop.
+fn observer_gains(speed_gain: f64, frame_s: f64) -> [f64; 3] {
+    let half = 0.5 * 2.5 * speed_gain * frame_s;
+    let beta = (1.0 - half) / (1.0 + half);
+    let gap = 1.0 - beta;
+    [1.0 - beta.powi(3), 1.5 * gap * gap * (1.0 + beta) / frame_s, gap.powi(3) / (frame_s * frame_s)]
+}
+
 /// Observer by the equations of its documentation.
 struct Ideal {
-    beta: f64,
+    gains: [f64; 3],
     frame_s: f64,
     travel: f64,
     speed: f64,
@@ -297,24 +305,21 @@ struct Ideal {
 }
 
 impl Ideal {
-    /// Observer for a gain set: its poles are 2.5 times as fast as the speed loop.
     fn new(gain_set: usize, config: &Config) -> Self {
         let frame_s = f64::from(config.frame_s_q37) / 2_f64.powi(37);
         let speed_gain = f64::from(config.gain_sets[gain_set].speed_q18_per_s) / 2_f64.powi(18);
-        let half = 0.5 * 2.5 * speed_gain * frame_s;
-        Self { beta: (1.0 - half) / (1.0 + half), frame_s, travel: 0.0, speed: 0.0, disturbance: 0.0 }
+        Self { gains: observer_gains(speed_gain, frame_s), frame_s, travel: 0.0, speed: 0.0, disturbance: 0.0 }
     }
 
     fn update(&mut self, measured: f64, driven: f64) {
-        let Self { beta, frame_s: t, .. } = *self;
-        let gap = 1.0 - beta;
+        let Self { gains: [l1, l2, l3], frame_s: t, .. } = *self;
         let acceleration = driven + self.disturbance;
         self.travel += self.speed * t + acceleration * t * t / 2.0;
         self.speed += acceleration * t;
         let error = measured - self.travel;
-        self.travel += (1.0 - beta.powi(3)) * error;
-        self.speed += 1.5 * gap * gap * (1.0 + beta) / t * error;
-        self.disturbance += gap.powi(3) / (t * t) * error;
+        self.travel += l1 * error;
+        self.speed += l2 * error;
+        self.disturbance += l3 * error;
     }
 }
 
@@ -477,14 +482,12 @@ fn is_made_for(speed_gain: f64, gain_set: usize, config: &Config) {
     let gains = &config.gain_sets[gain_set];
     let frame_s = f64::from(config.frame_s_q37) / 2_f64.powi(37);
     let slope = speed_gain / 3.0;
-    let half = 0.5 * 2.5 * speed_gain * frame_s;
-    let beta = (1.0 - half) / (1.0 + half);
-    let gap = 1.0 - beta;
     let [l1, l2, l3] = gains.observer.map(f64::from);
+    let exact = observer_gains(speed_gain, frame_s);
     for (name, found, expected) in [
-        ("l1", l1 / 2_f64.powi(31), 1.0 - beta.powi(3)),
-        ("l2", l2 / 65_536.0, 1.5 * gap * gap * (1.0 + beta) / frame_s),
-        ("l3", l3, gap.powi(3) / (frame_s * frame_s)),
+        ("l1", l1 / 2_f64.powi(31), exact[0]),
+        ("l2", l2 / 65_536.0, exact[1]),
+        ("l3", l3, exact[2]),
         ("k_v", f64::from(gains.speed_q18_per_s) / 262_144.0, speed_gain),
         ("1/2k", f64::from(gains.half_over_slope_q32) / 2_f64.powi(32), 0.5 / slope),
         ("1/2k^2", f64::from(gains.half_over_slope2_q40) / 2_f64.powi(40), 0.5 / (slope * slope)),

@@ -177,7 +177,6 @@ fn a_fit_is_doubted_by_what_is_hidden_and_how_unlike_it_is() {
         assert!((doubt - expected).abs() <= unsure, "{doubt}, {expected} expected: ratio {ratio}, {contact:?}");
         kinds[usize::from(expected > 0.0) + 2 * usize::from((1.0..254.0).contains(&unlike))] += 1;
     }
-    println!("{kinds:?}");
     assert!(kinds[0] > 50 && kinds[1] > 10 && kinds[3] > 10, "{kinds:?}");
 }
 

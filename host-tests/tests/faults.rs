@@ -232,8 +232,6 @@ fn missed_frames_are_counted() {
     assert!(status.limits.has(Limits::FRAME_MISSED));
 }
 
-type End = fn(&mut Bench);
-
 /// More dead taxels than allowed short a driven motor in the middle of a frame. The verdict is left to the step.
 #[test]
 fn a_part_of_a_frame_shorts_only_a_driven_motor_and_only_if_it_is_broken() {
@@ -281,7 +279,7 @@ fn each_mode_has_its_command_for_the_bridge() {
 /// However a drive ends, the motor is shorted until the tip was at rest for 20 ms. Then the bridge opens for good.
 #[test]
 fn a_motor_that_was_driven_brakes_until_the_tip_rests() {
-    let endings: [(&str, End); 4] = [
+    let endings: [(&str, fn(&mut Bench)); 4] = [
         ("torque off", |board| board.command().torque = false),
         ("tare", |board| (board.command().torque, board.command().tare_request) = (false, 77)),
         ("parameters", |board| {

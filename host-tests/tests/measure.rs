@@ -368,6 +368,28 @@ fn taring(mut finger: Made, frames: u32) -> Made {
     finger
 }
 
+fn unconfirmed() -> Made {
+    let mut finger = Made::of(&Setup::default(), &allowed(Params::DEFAULT));
+    finger.bench.tare();
+    finger.bench.command().torque = false;
+    finger
+}
+
+fn recalibrated() -> Made {
+    let mut finger = Made::tared();
+    finger.bench.pipeline().calibrate(&Calibration::NONE);
+    finger
+}
+
+fn faulted() -> Made {
+    let mut finger = with_torque(Made::tared());
+    finger.frame_with(|record| record.sense.bridge_fault = true);
+    finger.bench.command().torque = false;
+    finger.frame();
+    assert_eq!(finger.bench.status().mode, Mode::Fault);
+    finger
+}
+
 /// A state, how it is made, and how a jog, strokes and a press end in it.
 type Case = (&'static str, fn() -> Made, [Option<Ended>; 3]);
 
@@ -379,41 +401,13 @@ fn every_state_has_its_answer() {
         ("not tared", Made::untared, [NO; 3]),
         ("not tared, torque on", || with_torque(Made::untared()), [NO; 3]),
         ("tared", Made::tared, [None, None, NO]),
-        (
-            "unconfirmed",
-            || {
-                let mut finger = Made::of(&Setup::default(), &allowed(Params::DEFAULT));
-                finger.bench.tare();
-                finger.bench.command().torque = false;
-                finger
-            },
-            [None, Some(Ended::Unconfirmed), NO],
-        ),
+        ("unconfirmed", unconfirmed, [None, Some(Ended::Unconfirmed), NO]),
         ("torque on", || with_torque(Made::tared()), [NO, NO, None]),
         ("taring", || taring(Made::tared(), 1), [NO; 3]),
         ("touching", || pressed(Made::tared()), [NO; 3]),
         ("tared while touching", || taring(pressed(Made::untared()), 700), [NO; 3]),
-        (
-            "gains changed",
-            || {
-                let mut finger = Made::tared();
-                finger.bench.pipeline().calibrate(&Calibration::NONE);
-                finger
-            },
-            [NO; 3],
-        ),
-        (
-            "fault",
-            || {
-                let mut finger = with_torque(Made::tared());
-                finger.frame_with(|record| record.sense.bridge_fault = true);
-                finger.bench.command().torque = false;
-                finger.frame();
-                assert_eq!(finger.bench.status().mode, Mode::Fault);
-                finger
-            },
-            [NO; 3],
-        ),
+        ("gains changed", recalibrated, [NO; 3]),
+        ("fault", faulted, [NO; 3]),
     ];
     for (name, made, answers) in states {
         for (task, answer) in [Task::Jog, Task::Strokes, Task::Press].into_iter().zip(answers) {

@@ -120,34 +120,17 @@ proptest! {
         }
     }
 
-    /// Nothing panics, whatever goes in; in a test build overflow is a panic too.
+    /// That no input makes a function panic is tested by `same_bits::a_digest_is_that_of_its_inputs_and_sees_one_bit`.
     #[test]
-    fn every_function_takes_every_input(tip in any_tip(), x: i32, y: i32, z: i32, rings: NonZeroU16) {
-        let (d, r, theta) = (mm(x), mm(y), Radians::from_bits(z));
-        let depths = [tip.indentation(newtons(x)), tip.indentation_from_peak(Kilopascals::from_bits(x)), tip.indentation_from_radius(d)];
+    fn results_stay_in_their_domain_for_every_input(tip in any_tip(), x: i32, y: i32, z: i32) {
+        let depths = [tip.indentation(newtons(x)), tip.indentation_from_peak(Kilopascals::from_bits(x)), tip.indentation_from_radius(mm(x))];
         for depth in depths {
             prop_assert!(depth >= mm(0) && depth <= tip.depth_max());
         }
-        let _ = (tip.force(d), tip.contact_radius(d), tip.stiffness(d), paper::touching_angle_max(&tip, d), tip.mean_pressure(d));
-        let _ = (tip.pressure(r, d), tip.strain(r, d), tip.compression(r, d), paper::touching_angle(&tip, r, d), tip.peak_pressure(d));
-        let _ = (paper::distance_at(&tip, theta, d), paper::height_at(&tip, theta, d), paper::compression_at(&tip, theta, d));
-        let _ = (paper::distance_slope(&tip, theta, d), paper::area_density(&tip, theta, d), tip.stiffness_at_force(newtons(x)));
-        let _ = tip.force_by_rings(d, NonZeroU16::new(rings.get() % 64 + 1).unwrap());
-        let displacement = Displacement { normal: d, shift: r, tilt: theta };
-        let _ = (paper::load(&tip, displacement), paper::free_shift(&tip, d, theta));
+        let displacement = Displacement { normal: mm(x), shift: mm(y), tilt: Radians::from_bits(z) };
         prop_assert!(paper::energy(&tip, displacement).to_bits() >= 0);
-        let area = SquareMillimetres::from_bits(z);
-        let _ = (pressure_of(newtons(x), area), strain_of(d, r), force_on(Kilopascals::from_bits(x), area));
-        let _ = paper::particle_force(&tip, d, r, area);
-        let limit = paper::limit_surface(&tip, d, Ratio::from_bits(y));
+        let limit = paper::limit_surface(&tip, mm(x), Ratio::from_bits(y));
         prop_assert!(limit.margin(newtons(z), NewtonMillimetres::from_bits(x)).to_bits() <= 1 << 16);
-        let term = RelaxationTerm { share: Ratio::from_bits(y), time_constant_us: x.unsigned_abs() };
-        if let Ok(filter) = Relaxation::new(z.unsigned_abs(), &[term]) {
-            let mut state = RelaxationState::settled(newtons(x));
-            for elastic in [x, y, z, i32::MAX, i32::MIN, i32::MAX] {
-                let _ = filter.step(&mut state, newtons(elastic));
-            }
-        }
     }
 }
 

@@ -122,7 +122,7 @@ fn it_visits_every_mode_and_what_the_core_can_detect() {
 fn the_kept_inputs_are_fresh() {
     let kept = include_bytes!("../bringup/src/inputs.bin");
     assert!(
-        Inputs::new().few_to_bytes() == kept,
+        Inputs::default().few_to_bytes() == kept,
         "stale; renew them: cargo run --release -p host-tests --bin study -- few host-tests/bringup/src/inputs.bin target/few.bin"
     );
 }

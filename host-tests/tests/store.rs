@@ -7,7 +7,6 @@ use crate::common::*;
 use fingertip::params::ParamError;
 use fingertip::shipped::{Gains, Loaded, Record};
 use fingertip::store::{Flash as _, Journal, Remark, SLOT_BYTES, SaveError, Sector, number, settle};
-use host_tests::page::{PAGE, table};
 use sim::encode;
 
 // Bytes of a record, and bytes that are never taken for a record.
@@ -125,11 +124,6 @@ fn something_happens_before_each_word_of_a_save() {
     let mut fed = 0;
     assert_eq!(Journal::new(&nor).save(&mut nor, &record(1), || fed += 1), Ok(()));
     assert_eq!(fed, SLOT_BYTES / 4);
-}
-
-#[test]
-fn the_table_of_saves_is_fresh() {
-    PAGE.renew(&table(), true).expect("docs/firmware.md");
 }
 
 // Values that a firmware loads from another firmware's record, and remarks on the rest.

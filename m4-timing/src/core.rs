@@ -29,7 +29,7 @@
 //! `docs/timing.md` compares the sums with published measurements.
 
 use crate::instruction::{CoreSet, Instruction, Kind, PC, bit};
-use std::ops::{Add, AddAssign};
+use std::ops::Add;
 
 /// Cycles of an instruction or of many.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -55,12 +55,6 @@ impl Add for Cycles {
 
     fn add(self, other: Self) -> Self {
         Self::new(self.low + other.low, self.estimate + other.estimate, self.high + other.high)
-    }
-}
-
-impl AddAssign for Cycles {
-    fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
     }
 }
 
@@ -135,11 +129,11 @@ impl Core {
     #[inline(always)]
     pub fn retire(&mut self, executed: &Executed, next: Next) -> Cycles {
         let instruction = &executed.instruction;
-        let mut cost = if executed.skipped { Cycles::sure(1) } else { self.alone(executed, next) };
-        if !executed.skipped {
-            cost += self.float_wait(instruction);
-            cost += self.address_wait(instruction);
-        }
+        let mut cost = if executed.skipped {
+            Cycles::sure(1)
+        } else {
+            self.alone(executed, next) + self.float_wait(instruction) + self.address_wait(instruction)
+        };
         cost.high += self.fetch_wait(executed);
         self.dividing = self.dividing.saturating_sub(cost.estimate);
         self.remember(executed);
@@ -180,17 +174,16 @@ impl Core {
                 let refill = if jumps { refill(REFILL_MEMORY, next) } else { Cycles::default() };
                 Cycles::sure(words(count)) + refill
             }
-            Kind::StoreMany(count) => Cycles::sure(words(count)),
             Kind::Store => Cycles::new(1, 1, 2) + split(executed),
             Kind::StoreIndexed => Cycles::new(1, 2, 2) + split(executed),
             Kind::FloatAccumulate => Cycles::sure(3),
             // The result takes longer: see `float_wait`.
             Kind::FloatDivide => Cycles::new(1, 1, FLOAT_DIVIDE),
             Kind::FloatMove(count) => Cycles::new(count.into(), 1 + u64::from(count.min(1)), words(count)),
-            Kind::FloatLoad => Cycles::new(1, 2, 2),
-            Kind::FloatStore => Cycles::new(1, 2, 2),
-            Kind::FloatLoadMany(count) | Kind::FloatStoreMany(count) => Cycles::sure(words(count)),
-            Kind::Special => Cycles::new(1, 2, 2),
+            Kind::StoreMany(count) | Kind::FloatLoadMany(count) | Kind::FloatStoreMany(count) => {
+                Cycles::sure(words(count))
+            }
+            Kind::FloatLoad | Kind::FloatStore | Kind::Special => Cycles::new(1, 2, 2),
             Kind::Barrier => Cycles::new(1, 4, 7),
             Kind::Begin | Kind::End | Kind::Untimed => Cycles::default(),
         }
@@ -271,20 +264,11 @@ const LEAD: u64 = 2;
 /// Lines of the largest flash, 2 MiB; its aliases are the same lines.
 const FLASH_LINES: usize = 1 << 17;
 
-/// Properties of a part's flash.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Settings {
-    pub wait_states: u32,
-    /// Lines of the instruction cache.
-    pub instruction_lines: usize,
-    /// Lines of the data cache.
-    pub data_lines: usize,
-}
-
-impl Settings {
-    /// An STM32F4 at 168 MHz and 3.3 V.
-    pub const STM32F4: Self = Self { wait_states: 5, instruction_lines: 64, data_lines: 8 };
-}
+/// Wait states of an STM32F4 at 168 MHz and 3.3 V.
+const WAIT_STATES: u64 = 5;
+/// Lines of the instruction cache and of the data cache.
+const INSTRUCTION_LINES: usize = 64;
+const DATA_LINES: usize = 8;
 
 /// The STM32F4's flash with its accelerator: wait states, a cache of instruction lines with the next line fetched ahead,
 /// and a small cache of data lines.
@@ -294,7 +278,6 @@ impl Settings {
 /// is fetched if it is not cached, in straight code two cycles earlier. The caches replace the least recently used line.
 #[derive(Clone, Debug)]
 pub struct Flash {
-    wait_states: u64,
     instructions: Cache,
     data: Cache,
     /// The line that the core executes from.
@@ -306,20 +289,15 @@ pub struct Flash {
     now: u64,
 }
 
-impl Flash {
+impl Default for Flash {
     /// Cold caches.
-    pub fn new(settings: Settings) -> Self {
-        Self {
-            wait_states: settings.wait_states.into(),
-            instructions: Cache::new(settings.instruction_lines),
-            data: Cache::new(settings.data_lines),
-            current: None,
-            ahead: None,
-            free: 0,
-            now: 0,
-        }
+    fn default() -> Self {
+        let (instructions, data) = (Cache::new(INSTRUCTION_LINES), Cache::new(DATA_LINES));
+        Self { instructions, data, current: None, ahead: None, free: 0, now: 0 }
     }
+}
 
+impl Flash {
     /// Cycles since the beginning, with those that the core waited.
     pub fn now(&self) -> u64 {
         self.now
@@ -364,7 +342,7 @@ impl Flash {
         let next = line + 1;
         if !self.instructions.contains(next) && self.ahead.is_none_or(|(line, _)| line != next) {
             let asked = self.now.saturating_sub(if straight { LEAD } else { 0 });
-            let arrives = asked.max(self.free) + self.wait_states;
+            let arrives = asked.max(self.free) + WAIT_STATES;
             self.ahead = Some((next, arrives));
             self.free = arrives + 1;
         }
@@ -372,7 +350,7 @@ impl Flash {
 
     /// Waits for the flash, and for what it is asked.
     fn access(&mut self) {
-        self.now = self.now.max(self.free) + self.wait_states;
+        self.now = self.now.max(self.free) + WAIT_STATES;
         self.free = self.now + 1;
     }
 }

@@ -127,22 +127,19 @@ impl Instruction {
     }
 
     pub const fn accesses_memory(&self) -> bool {
-        use Kind::{
-            FloatLoad, FloatLoadMany, FloatStore, FloatStoreMany, Load, LoadMany, LoadPc, Store, StoreIndexed,
-            StoreMany, Table,
-        };
         matches!(
             self.kind,
-            Load | LoadPc
-                | LoadMany(_)
-                | Store
-                | StoreIndexed
-                | StoreMany(_)
-                | Table
-                | FloatLoad
-                | FloatStore
-                | FloatLoadMany(_)
-                | FloatStoreMany(_)
+            Kind::Load
+                | Kind::LoadPc
+                | Kind::LoadMany(_)
+                | Kind::Store
+                | Kind::StoreIndexed
+                | Kind::StoreMany(_)
+                | Kind::Table
+                | Kind::FloatLoad
+                | Kind::FloatStore
+                | Kind::FloatLoadMany(_)
+                | Kind::FloatStoreMany(_)
         )
     }
 
@@ -178,14 +175,9 @@ pub fn holds(condition: u8, xpsr: u32) -> bool {
 
 /// ITSTATE of the core: the condition of the next instruction in its upper half, what is left of the mask in its lower.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct IfThen(u8);
+pub struct IfThen(pub u8);
 
 impl IfThen {
-    /// State that an IT instruction sets.
-    pub const fn new(state: u8) -> Self {
-        Self(state)
-    }
-
     /// The condition of the next instruction, where it has one; moves on.
     pub fn advance(&mut self) -> Option<u8> {
         if self.0 & 15 == 0 {
@@ -219,10 +211,10 @@ mod tests {
     #[test]
     fn a_block_gives_each_instruction_its_condition() {
         // ITTEE NE: condition 1, then 1, 0, 0.
-        let mut block = IfThen::new(0x1 << 4 | 0b1001);
+        let mut block = IfThen(0x1 << 4 | 0b1001);
         let conditions: Vec<_> = std::iter::from_fn(|| block.advance()).collect();
         assert_eq!(conditions, [1, 1, 0, 0]);
-        let mut one = IfThen::new(0x08);
+        let mut one = IfThen(0x08);
         assert_eq!([one.advance(), one.advance()], [Some(0), None]);
     }
 }

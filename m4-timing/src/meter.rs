@@ -1,8 +1,7 @@
 //! The stopwatch: takes the executed instructions one after the other and measures what lies between the markers.
 
-use crate::core::{Core, Cycles, Executed, Flash, Next, Settings, Touched};
+use crate::core::{Core, Cycles, Executed, Flash, Next, Touched};
 use crate::decode::Unknown;
-
 use crate::instruction::{IfThen, Instruction, Kind, holds};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -78,19 +77,14 @@ struct Pass {
 }
 
 /// The stopwatch.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Meter {
     pass: Option<Pass>,
     flash: Flash,
-    regions: BTreeMap<u32, Region>,
+    regions: Regions,
 }
 
 impl Meter {
-    /// Meter without measurements.
-    pub fn new(settings: Settings) -> Self {
-        Self { pass: None, flash: Flash::new(settings), regions: BTreeMap::new() }
-    }
-
     /// True if a region is being measured: outside of one, only markers matter.
     pub fn running(&self) -> bool {
         self.pass.is_some()
@@ -136,7 +130,7 @@ impl Meter {
     }
 
     /// Returns the measurements.
-    pub fn finish(&self) -> Result<&BTreeMap<u32, Region>, MeterError> {
+    pub fn finish(&self) -> Result<&Regions, MeterError> {
         self.pass.as_ref().map_or(Ok(&self.regions), |pass| Err(MeterError::NotEnded(pass.number)))
     }
 
@@ -155,11 +149,10 @@ impl Meter {
     fn end(&mut self) {
         let Some(mut pass) = self.pass.take() else { return };
         let rest = pass.core.finish();
-        pass.cycles += rest;
+        pass.cycles = pass.cycles + rest;
         self.flash.pass(rest.estimate);
-        let flash = self.flash.now() - pass.flash_start;
-        let figures = Figures { instructions: pass.instructions, cycles: pass.cycles, flash };
-        self.regions.entry(pass.number).or_default().push(&figures);
+        let (Cycles { low, estimate, high }, flash) = (pass.cycles, self.flash.now() - pass.flash_start);
+        self.regions.entry(pass.number).or_default().push([pass.instructions, low, estimate, high, flash]);
     }
 }
 
@@ -172,7 +165,7 @@ impl Pass {
             return Err(MeterError::Interrupted { after: last.address, to: next.address });
         }
         let cycles = self.core.retire(last, next);
-        self.cycles += cycles;
+        self.cycles = self.cycles + cycles;
         self.instructions += 1;
         flash.pass(cycles.estimate);
         Ok(())
@@ -185,7 +178,7 @@ impl Pass {
         }
         if !executed.skipped {
             match instruction.kind {
-                Kind::IfThen { state } => self.block = IfThen::new(state),
+                Kind::IfThen { state } => self.block = IfThen(state),
                 Kind::Divide { signed, numerator, denominator } => {
                     executed.quotient_bits =
                         quotient_bits(signed, registers.core(numerator), registers.core(denominator));
@@ -208,18 +201,10 @@ fn quotient_bits(signed: bool, numerator: u32, denominator: u32) -> u32 {
 
 // Measurements: the passes of each region, and their statistics.
 
-/// The figures of one pass through a region, or of many together.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Figures {
-    /// Instructions executed, those whose condition did not hold too.
-    pub instructions: u64,
-    /// Cycles without wait states.
-    pub cycles: Cycles,
-    /// The estimate with the flash's wait states.
-    pub flash: u64,
-}
+/// Passes through each region, by its number: the figures of [`Measured`], in its order.
+pub type Regions = BTreeMap<u32, Vec<[u64; 5]>>;
 
-/// Names of the figures, in the order of [`Region::summaries`].
+/// Names of the figures.
 const NAMES: [&str; 5] = ["instructions", "low", "estimate", "high", "flash"];
 
 /// A figure over the passes of a region.
@@ -245,27 +230,6 @@ impl Summary {
     }
 }
 
-#[derive(Clone, Debug, Default)]
-pub struct Region {
-    passes: Vec<[u64; 5]>,
-}
-
-impl Region {
-    pub fn push(&mut self, pass: &Figures) {
-        let Figures { instructions, cycles: Cycles { low, estimate, high }, flash } = *pass;
-        self.passes.push([instructions, low, estimate, high, flash]);
-    }
-
-    pub fn passes(&self) -> usize {
-        self.passes.len()
-    }
-
-    /// Each figure over the passes, in the order of [`Measured`].
-    pub fn summaries(&self) -> [Summary; 5] {
-        std::array::from_fn(|figure| Summary::of(self.passes.iter().map(|pass| pass[figure]).collect()))
-    }
-}
-
 #[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 pub struct Measured {
     pub region: u32,
@@ -282,13 +246,18 @@ pub struct Measured {
     pub flash: Summary,
 }
 
+/// Each figure over the passes of a region.
+pub fn summaries(passes: &[[u64; 5]]) -> [Summary; 5] {
+    std::array::from_fn(|figure| Summary::of(passes.iter().map(|pass| pass[figure]).collect()))
+}
+
 /// An object a line: the regions in order of their numbers, then the sums over all of them.
-pub fn json_lines(regions: &BTreeMap<u32, Region>) -> String {
+pub fn json_lines(regions: &Regions) -> String {
     let (mut text, mut totals) = (String::new(), [0; 5]);
     for (region, passes) in regions {
-        let summaries = passes.summaries();
+        let summaries = summaries(passes);
         totals.iter_mut().zip(&summaries).for_each(|(total, summary)| *total += summary.total);
-        let ([instructions, low, estimate, high, flash], passes) = (summaries, passes.passes() as u64);
+        let ([instructions, low, estimate, high, flash], passes) = (summaries, passes.len() as u64);
         let measured = Measured { region: *region, passes, instructions, low, estimate, high, flash };
         text += &serde_json::to_string(&measured).unwrap_or_default();
         text += "\n";
@@ -315,20 +284,10 @@ mod tests {
         assert_eq!(of(&[]), Summary::default());
     }
 
-    use crate::core::Cycles;
-
-    fn regions() -> BTreeMap<u32, Region> {
-        let figures = |estimate| Figures { instructions: 4, cycles: Cycles::new(3, estimate, 9), flash: estimate + 1 };
-        let mut regions = BTreeMap::<u32, Region>::new();
-        for (number, estimate) in [(7, 6), (7, 5), (7, 8), (2, 5)] {
-            regions.entry(number).or_default().push(&figures(estimate));
-        }
-        regions
-    }
-
     #[test]
-    fn a_report_is_a_line_of_json_for_each_region_and_one_for_all() {
-        let text = json_lines(&regions());
+    fn a_report_is_a_line_of_json_for_each_region_and_one_for_all_and_is_read_as_written() {
+        let passes = |estimates: &[u64]| estimates.iter().map(|estimate| [4, 3, *estimate, 9, estimate + 1]).collect();
+        let text = json_lines(&BTreeMap::from([(7, passes(&[6, 5, 8])), (2, passes(&[5]))]));
         assert_eq!(
             text.lines().next(),
             Some(concat!(
@@ -340,11 +299,7 @@ mod tests {
         assert!(
             text.ends_with("{\"total\":{\"instructions\":16,\"low\":12,\"estimate\":24,\"high\":36,\"flash\":28}}\n")
         );
-    }
-
-    #[test]
-    fn a_report_is_read_as_it_was_written() {
-        let measured = parse(&json_lines(&regions())).expect("a report");
+        let measured = parse(&text).expect("a report");
         assert_eq!(
             measured.iter().map(|measured| (measured.region, measured.passes)).collect::<Vec<_>>(),
             [(2, 1), (7, 3)]

@@ -3,10 +3,9 @@
 //! The only unsafe code of the crate. QEMU runs one virtual CPU here; its callbacks come from one thread, the last one
 //! possibly from another, so all state lies behind a lock.
 
-use crate::core::{Settings, Touched};
+use crate::core::Touched;
 use crate::decode::{decode, is_wide};
 use crate::meter::{self, Meter, MeterError, Registers, Site};
-
 use std::collections::HashMap;
 use std::ffi::{CStr, c_char, c_int, c_uint, c_void};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -16,14 +15,6 @@ use std::{fs, path::PathBuf, ptr, slice};
 type Id = u64;
 type Block = c_void;
 type Insn = c_void;
-
-/// QEMU's version information; only the beginning matters.
-#[repr(C)]
-pub struct Info {
-    target_name: *const c_char,
-    version_min: c_int,
-    version_cur: c_int,
-}
 
 /// GLib's growing array of bytes.
 #[repr(C)]
@@ -163,7 +154,7 @@ impl Registers for &Handles {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn qemu_plugin_install(
     id: Id,
-    _: *const Info,
+    _: *const c_void,
     count: c_int,
     words: *const *const c_char,
 ) -> c_int {
@@ -180,7 +171,7 @@ pub unsafe extern "C" fn qemu_plugin_install(
             }
         }
     }
-    let plugin = Plugin { meter: Meter::new(Settings::STM32F4), out, sites: HashMap::new(), registers: None };
+    let plugin = Plugin { meter: Meter::default(), out, sites: HashMap::new(), registers: None };
     let _ = PLUGIN.set(Mutex::new(plugin));
     // SAFETY: QEMU called us, and these callbacks have the types that it expects.
     unsafe {

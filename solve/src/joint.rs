@@ -7,7 +7,7 @@ use crate::gains::{Condition, Gain, Gains, NoGains, Posed};
 use crate::gains::{judge, shifts};
 use crate::model::{At, Pose, Share, Square, UNKNOWNS};
 use crate::press::{Array, Press, Step, first_pose, forces};
-use crate::robust::{huber, huber_cost, median, spread};
+use crate::robust::{HUBER, huber, huber_cost, median, spread};
 use nalgebra::{DMatrix, DVector};
 
 /// Usual deviation of a gain from 1: arrays differ by 5 to 32 % (Tekscan). It only matters for taxels that hardly read.
@@ -224,7 +224,7 @@ impl<'a> Joint<'a> {
         let size = gains_at + self.now.gains.len();
         let (mut normal, mut right) = (DMatrix::zeros(size, size), DVector::zeros(size));
         for Residual { step, taxel, value, sigma, share } in residuals.iter().filter(|one| one.share.value > 0.0) {
-            let weight = huber(value / self.scale) / (self.scale * self.scale);
+            let weight = huber(value / self.scale, HUBER) / (self.scale * self.scale);
             let (gain, stiffness) = (self.now.gains[*taxel], self.now.stiffness[*step]);
             let pose_at = self.used[*step].press * UNKNOWNS;
             let mut row = [(0, 0.0); UNKNOWNS + 2];
@@ -291,7 +291,7 @@ impl<'a> Joint<'a> {
 
     /// Huber's cost of the residuals, plus the prior of gains and plate.
     fn cost(&self, residuals: &[Residual]) -> f64 {
-        let off: f64 = residuals.iter().map(|residual| huber_cost(residual.value / self.scale)).sum();
+        let off: f64 = residuals.iter().map(|residual| huber_cost(residual.value / self.scale, HUBER)).sum();
         let gains: f64 = self.now.gains.iter().map(|gain| ((gain - 1.0) / GAIN_USUAL).powi(2)).sum();
         let pose = |pose: &Pose| {
             let [x, y] = pose.tilt.map(|tilt| tilt / TILT_USUAL);

@@ -56,11 +56,6 @@ impl Value {
     pub fn relative(&self) -> f64 {
         self.sigma / self.value.abs()
     }
-
-    /// True if the number differs from 0 by more than three of its uncertainties.
-    pub fn differs(&self) -> bool {
-        self.value.abs() > 3.0 * self.sigma
-    }
 }
 
 /// The uncertainty with two digits, the value with as many decimals.

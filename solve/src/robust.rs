@@ -4,19 +4,19 @@ use nalgebra::{DMatrix, DVector};
 
 /// Threshold of Huber's weights, in standard deviations: 95 % efficient for normal errors (Huber and Ronchetti, Robust
 /// Statistics, 2009, section 4.5).
-const HUBER: f64 = 1.345;
+pub const HUBER: f64 = 1.345;
 /// Standard deviation of a normal distribution over its median absolute deviation.
 const NORMAL: f64 = 1.4826;
 
-/// Weight of a residual that is in standard deviations: 1 for small ones, falling with the inverse of large ones.
-pub fn huber(residual: f64) -> f64 {
-    HUBER / residual.abs().max(HUBER)
+/// Weight of a residual that is in standard deviations: 1 up to a threshold, falling with the inverse beyond.
+pub fn huber(residual: f64, threshold: f64) -> f64 {
+    threshold / residual.abs().max(threshold)
 }
 
-/// Cost of a residual that is in standard deviations: the square of a small one, a line for large ones.
-pub fn huber_cost(residual: f64) -> f64 {
+/// Cost of a residual that is in standard deviations: the square up to a threshold, a line beyond.
+pub fn huber_cost(residual: f64, threshold: f64) -> f64 {
     let size = residual.abs();
-    if size <= HUBER { size * size } else { HUBER * (2.0 * size - HUBER) }
+    if size <= threshold { size * size } else { threshold * (2.0 * size - threshold) }
 }
 
 /// Median; 0 of nothing.
@@ -79,7 +79,7 @@ pub fn minimise(start: &[f64], sizes: &[f64], residuals: impl Fn(&DVector<f64>) 
 }
 
 fn cost(residuals: &DVector<f64>) -> f64 {
-    residuals.iter().map(|residual| huber_cost(*residual)).sum()
+    residuals.iter().map(|residual| huber_cost(*residual, HUBER)).sum()
 }
 
 fn equations(
@@ -93,7 +93,7 @@ fn equations(
         aside[i] += size;
         (residuals(&aside) - now) / *size
     })));
-    let weights = now.map(huber);
+    let weights = now.map(|residual| huber(residual, HUBER));
     let weighted = DMatrix::from_fn(now.len(), sizes.len(), |row, column| weights[row] * slopes[(row, column)]);
     (weighted.transpose() * &slopes, weighted.transpose() * now)
 }

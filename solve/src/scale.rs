@@ -5,17 +5,16 @@
 //! scale shows the force itself:
 //!
 //! ```text
-//! F = k R + b + q R^2
+//! F = k R
 //! ```
 //!
-//! with R the array's sum. k divides `codes_per_kpa` and multiplies the modulus. b and q are zero for a sound array: where
-//! they differ from zero by three of their uncertainties they hint at a scale that was not zeroed, and at a characteristic
-//! that is no line (`curve_permille`). Least squares with Huber's weights: one number that was misread does not move k.
+//! with R the array's sum. k divides `codes_per_kpa` and multiplies the modulus. Least squares with Huber's weights: one
+//! number that was misread does not move k.
 
 use crate::Value;
 use crate::modulus::{NoModulus, modulus};
 use crate::press::Press;
-use crate::robust::{Fit, minimise};
+use crate::robust::minimise;
 use nalgebra::DVector;
 
 /// Goals before a held force, as shares of it: one above, then one below. An array with hysteresis reads less while
@@ -36,10 +35,6 @@ pub struct Held {
 pub struct Scale {
     /// Force shown over force read.
     pub factor: Value,
-    /// Force shown where the array reads none, N. None from a single force.
-    pub offset_n: Option<Value>,
-    /// Change of the factor at the largest force, as a share. None from fewer than three forces.
-    pub curve: Option<Value>,
 }
 
 /// Reason why there is no scale, with the number behind it.
@@ -64,33 +59,16 @@ pub fn scale(held: &[Held]) -> Result<Scale, NoScale> {
     if largest_n < LEAST_N || held.iter().all(|held| held.shown_n < LEAST_N) {
         return Err(NoScale::TooLittle(largest_n));
     }
-    let (factor, _) = line(held, 1, largest_n).ok_or(NoScale::TooLittle(largest_n))?;
+    let off =
+        |factor: f64, held: &Held| (factor * held.read_n - held.shown_n) / SHOWN_N.hypot(HELD_PART * held.shown_n);
+    let residuals = |x: &DVector<f64>| DVector::from_iterator(held.len(), held.iter().map(|held| off(x[0], held)));
+    let fit = minimise(&[1.0], &[1e-4], residuals).ok_or(NoScale::TooLittle(largest_n))?;
+    let scale2 = (fit.cost / held.len().saturating_sub(1).max(1) as f64).max(1.0);
+    let factor = Value { value: fit.unknowns[0], sigma: (scale2 * fit.covariance[(0, 0)]).sqrt() };
     if !(0.5..=2.0).contains(&factor.value) {
         return Err(NoScale::Range(factor.value));
     }
-    let last =
-        |terms: usize| (held.len() >= terms).then(|| line(held, terms, largest_n)).flatten().map(|(_, last)| last);
-    let share = |curve: Value| Value { value: curve.value / factor.value, sigma: curve.sigma / factor.value };
-    Ok(Scale { factor, offset_n: last(2), curve: last(3).map(share) })
-}
-
-/// Fit with the first terms of factor, offset and curve: the factor and the last term.
-fn line(held: &[Held], terms: usize, largest_n: f64) -> Option<(Value, Value)> {
-    let residuals = |x: &DVector<f64>| {
-        DVector::from_iterator(
-            held.len(),
-            held.iter().map(|Held { shown_n, read_n }| {
-                let by = [*read_n, 1.0, read_n * read_n / largest_n];
-                let model: f64 = x.iter().zip(by).map(|(x, by)| x * by).sum();
-                (model - shown_n) / SHOWN_N.hypot(HELD_PART * shown_n)
-            }),
-        )
-    };
-    let start = [1.0, 0.0, 0.0];
-    let Fit { unknowns, covariance, cost } = minimise(&start[..terms], &[1e-4; 3][..terms], residuals)?;
-    let scale2 = (cost / held.len().saturating_sub(terms).max(1) as f64).max(1.0);
-    let value = |at: usize| Value { value: unknowns[at], sigma: (scale2 * covariance[(at, at)]).sqrt() };
-    Some((value(0), value(terms - 1)))
+    Ok(Scale { factor })
 }
 
 /// Readings under a force that does not change: a weight, or a loop that holds a scale's number.

@@ -294,7 +294,8 @@ fn assignment(address: u16, value: i64) -> Result<Vec<u8>, Error> {
     Ok([&address.to_le_bytes()[..], &table::encode(register, value)].concat())
 }
 
-fn packet(id: u8, instruction: u8, params: &[u8]) -> Reply {
+/// The bytes of an instruction.
+pub fn packet(id: u8, instruction: u8, params: &[u8]) -> Reply {
     let mut packet = Reply::new();
     let mut sender = Sender::new(&mut packet, id, instruction);
     params.iter().for_each(|byte| sender.push(*byte));
@@ -393,6 +394,15 @@ impl Line {
             }
         }
         Ok(())
+    }
+}
+
+impl Drop for Line {
+    fn drop(&mut self) {
+        if let Self::Serial(port) = self {
+            // A lock lasts as long as any copy of its file: a process that another thread starts just now has one.
+            let _ = flock(port, FlockOperation::Unlock);
+        }
     }
 }
 

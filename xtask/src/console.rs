@@ -63,14 +63,10 @@ impl Console {
             return if status.success() { Ok(()) } else { bail!("{status}: {shown}") };
         };
         let _ = writeln!(text, "$ {shown}");
-        let mut child = command
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .with_context(|| missing(command))?;
-        for Line { text: line, .. } in lines(&mut child) {
-            show_line(&line);
+        let mut child = heard(command)?;
+        for (line, _) in lines(&mut child) {
+            let short: String = line.chars().filter(|letter| !letter.is_control()).take(76).collect();
+            show_short(format_args!("    {short}"));
             let _ = writeln!(text, "{line}");
         }
         let status = child.wait()?;
@@ -84,11 +80,10 @@ impl Console {
         let shown = show(command);
         command.args(["--message-format", "json-render-diagnostics"]).current_dir(host::root());
         command.env("CARGO_TERM_PROGRESS_WHEN", "always").env("CARGO_TERM_PROGRESS_WIDTH", "400");
-        let child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
-        let mut child = child.with_context(|| missing(command))?;
+        let mut child = heard(command)?;
         let mut progress = Progress::new(what, slow);
         let mut said = format!("$ {shown}\n");
-        for Line { text, error } in lines(&mut child) {
+        for (text, error) in lines(&mut child) {
             if !error {
                 progress.done(&text);
             } else if !progress.hear(&text) {
@@ -132,18 +127,17 @@ impl Console {
     }
 }
 
-/// A line of a program's.
-struct Line {
-    text: String,
-    /// True for a line of the standard error.
-    error: bool,
+/// Starts a program whose output is read.
+fn heard(command: &mut Command) -> Result<Child> {
+    let child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+    child.with_context(|| missing(command))
 }
 
-/// Reads a program's output until it closes both of its streams.
-fn lines(child: &mut Child) -> mpsc::Receiver<Line> {
+/// Reads a program's output until it closes both of its streams: lines, and whether each is of the standard error.
+fn lines(child: &mut Child) -> mpsc::Receiver<(String, bool)> {
     let (sender, lines) = mpsc::channel();
     let output = child.stdout.take().map(|stream| Box::new(stream) as Box<dyn Read + Send>);
-    let errors = child.stderr.take().map(|stream| Box::new(stream) as Box<dyn Read + Send>);
+    let errors = child.stderr.take().map(|stream| Box::new(stream) as _);
     for (stream, error) in [(output, false), (errors, true)] {
         let Some(stream) = stream else { continue };
         let sender = sender.clone();
@@ -156,7 +150,7 @@ fn lines(child: &mut Child) -> mpsc::Receiver<Line> {
                     b'\n' | b'\r' => {
                         let text = String::from_utf8_lossy(&line).into_owned();
                         line.clear();
-                        let _ = sender.send(Line { text, error });
+                        let _ = sender.send((text, error));
                     }
                     _ => line.push(byte),
                 }
@@ -206,18 +200,13 @@ fn missing(command: &Command) -> String {
     format!("cannot start {}; looked in PATH={path}", command.get_program().to_string_lossy())
 }
 
-fn show_line(line: &str) {
-    let short: String = line.chars().filter(|letter| !letter.is_control()).take(76).collect();
-    show_short(format_args!("    {short}"));
-}
-
 /// Writes a line of progress. A reader that went away does not end the command.
-pub fn say_line(line: Arguments) {
+fn say_line(line: Arguments) {
     let _ = writeln!(io::stderr(), "{line}");
 }
 
 /// Shows a line of progress that the next one replaces, in a terminal only.
-pub fn show_short(line: Arguments) {
+fn show_short(line: Arguments) {
     if io::stderr().is_terminal() {
         let _ = write!(io::stderr(), "\r\x1b[2K{line}");
     }

@@ -6,7 +6,6 @@ use crate::image::{self, Image};
 use crate::toolchain::{self, Choice, TARGET};
 use crate::{docs, install};
 use anyhow::{Context, Result, ensure};
-use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
 
@@ -77,9 +76,6 @@ impl Core {
 }
 
 /// Runs the loop on every core and writes the table.
-///
-/// # Errors
-/// Like [`page`]; also if the page cannot be written.
 pub fn run_all(choice: Choice, console: &mut Console) -> Result<()> {
     let page = page(choice, console)?;
     console.print(&table(&page));
@@ -88,9 +84,6 @@ pub fn run_all(choice: Choice, console: &mut Console) -> Result<()> {
 
 /// Builds the image for every core, runs each, and compares its digest with this machine's. Returns the text of the page
 /// with their table.
-///
-/// # Errors
-/// No compiler or emulator, an image does not build or fails, or a digest differs.
 pub fn page(choice: Choice, console: &mut Console) -> Result<String> {
     ensure(console)?;
     let targets = CORES.map(|core| core.target);
@@ -106,17 +99,9 @@ pub fn page(choice: Choice, console: &mut Console) -> Result<String> {
         fs::copy(toolchain.images_for(core.target, core.flags).join("cores"), &elf)
             .with_context(|| host::shown(&elf))?;
         let bytes = Image::read(&elf)?.bytes.len();
-        // A string takes every write.
-        let _ = writeln!(
-            list,
-            "{}\t{}\t{}\t{}\t{bytes}\t{}\t{}",
-            core.name,
-            core.array,
-            core.target,
-            core.flags.join(" "),
-            core.emulator(),
-            elf.display()
-        );
+        let Core { name, array, target, flags, .. } = core;
+        let (flags, emulator) = (flags.join(" "), core.emulator());
+        list += &format!("{name}\t{array}\t{target}\t{flags}\t{bytes}\t{emulator}\t{}\n", elf.display());
     }
     let file = folder.join("list.tsv");
     fs::write(&file, list).with_context(|| host::shown(&file))?;
@@ -124,9 +109,6 @@ pub fn page(choice: Choice, console: &mut Console) -> Result<String> {
 }
 
 /// Builds the example for another board, which links for its chip.
-///
-/// # Errors
-/// No compiler, it does not build, or its size shows that the loop is missing or the motions are not left out.
 pub fn example(choice: Choice, console: &mut Console) -> Result<()> {
     let target = TARGET_OF_EXAMPLE;
     let toolchain = toolchain::ensure_for(choice, &[target], "the example for another board is built for it", console)?;
@@ -152,9 +134,6 @@ fn table(page: &str) -> String {
 }
 
 /// Makes sure of the emulators.
-///
-/// # Errors
-/// One is missing and cannot be installed.
 pub fn ensure(console: &mut Console) -> Result<()> {
     ensure_m4(console)?;
     match host::find_program(RISCV_PROGRAM) {
@@ -168,7 +147,6 @@ pub fn ensure(console: &mut Console) -> Result<()> {
 
 const M4_EMULATOR: &str = "qemu-system-arm";
 
-/// Flags of `cargo xtask qemu`.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  cargo xtask qemu\n  cargo xtask qemu --inject hang    (fails, as it must)")]
 pub struct QemuArgs {
@@ -178,9 +156,6 @@ pub struct QemuArgs {
 }
 
 /// Runs the recorded stimulus and random inputs for every function on the emulator and on the host, and compares.
-///
-/// # Errors
-/// The image does not build, fails, hangs, or differs from the host.
 pub fn run_m4(args: &QemuArgs, choice: Choice, console: &mut Console) -> Result<()> {
     let image = prepare(choice, console)?;
     let [mut replay, mut same_bits] =
@@ -190,18 +165,12 @@ pub fn run_m4(args: &QemuArgs, choice: Choice, console: &mut Console) -> Result<
 }
 
 /// Runs the tests that need the emulator.
-///
-/// # Errors
-/// The image does not build, or a test fails.
 pub fn test_m4(choice: Choice, console: &mut Console) -> Result<()> {
     let image = prepare(choice, console)?;
     host::test(host::tests(&["--test", "qemu", "--", "--ignored"]).env("FINGERTIP_QEMU_IMAGE", image), console)
 }
 
 /// Makes sure of the emulator.
-///
-/// # Errors
-/// The emulator is missing and cannot be installed.
 pub fn ensure_m4(console: &mut Console) -> Result<()> {
     match host::find_program(M4_EMULATOR) {
         Some(_) => Ok(()),

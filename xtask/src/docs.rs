@@ -29,7 +29,6 @@ const PICTURES: &str = "docs/pictures";
 const PAPER: [&str; 3] = ["docs/pictures/figure-7.svg", "docs/pictures/figure-10.svg", "docs/pictures/figure-11.svg"];
 const README: (&str, &str) = ("README.md", "readme");
 
-/// Flags of `cargo xtask docs`.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  cargo xtask docs\n  cargo xtask docs --check")]
 pub struct Args {
@@ -97,7 +96,6 @@ pub fn renew(path: &str, text: &str, check: bool, stale: &mut Vec<String>, conso
 
 // The paper's figures.
 
-/// Flags of `cargo xtask figures`.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  cargo xtask figures\n  cargo xtask figures --out /tmp/figures")]
 pub struct FiguresArgs {

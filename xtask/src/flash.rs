@@ -9,7 +9,6 @@ use crate::toolchain::{self, Choice, Toolchain};
 use crate::{sim, timing};
 use anyhow::{Context, Result, bail, ensure};
 use clap::ValueEnum;
-use std::fmt::Write as _;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
@@ -20,7 +19,6 @@ use std::{fs, iter, thread};
 /// The part on the board, in probe-rs's words.
 const CHIP: &str = "STM32F446RETx";
 
-/// Flags of `cargo xtask flash`.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  cargo xtask flash\n  cargo xtask flash --probe 0483:374b")]
 pub struct Args {
@@ -202,7 +200,6 @@ pub const BRINGUP: &str = "bringup";
 const BY_ID: &str = "/dev/serial/by-id";
 const ST_LINK: &str = "STLINK";
 
-/// Flags of `cargo xtask bringup`.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  cargo xtask bringup --json board.json\n  cargo xtask bringup --board virtual\n\n\
     docs/bringup.md goes on from there. `cargo xtask flash` puts the firmware back.")]
@@ -288,8 +285,7 @@ fn estimates(toolchain: Toolchain, console: &mut Console) -> Result<PathBuf> {
     let call = run.regions.first().map_or(0, |region| region.flash.median);
     let mut text = String::new();
     for region in &run.regions {
-        // A string takes every write.
-        let _ = writeln!(text, "{} {}", region.flash.median.saturating_sub(call), run.name(region.region));
+        text += &format!("{} {}\n", region.flash.median.saturating_sub(call), run.name(region.region));
     }
     fs::write(&file, text).with_context(|| format!("cannot write {}", host::shown(&file)))?;
     Ok(file)

@@ -1,6 +1,6 @@
 //! This machine: its paths, and programs of the workspace that run here, built with a line of progress, then started.
 
-use crate::console::{self, Console, EMULATOR, HOST, Slow};
+use crate::console::{self, Console, EMULATOR, HOST};
 use anyhow::{Context, Result};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -59,7 +59,8 @@ impl Program {
     pub fn build(&self, console: &mut Console) -> Result<Command> {
         let mut command = cargo("build", self.package);
         command.args(["--bin", self.name]).args(self.with);
-        console.build(&mut command, self.name, slow(self.package))?;
+        let slow = if self.package == BOARD.package { EMULATOR } else { HOST };
+        console.build(&mut command, self.name, slow)?;
         Ok(Command::new(target().join(PROGRAMS).join(self.name)))
     }
 }
@@ -68,10 +69,6 @@ impl Program {
 pub fn run_tool(name: &'static str, words: &[&str], console: &mut Console) -> Result<()> {
     let mut command = Program::tool(name).build(console)?;
     console.run(command.args(words))
-}
-
-fn slow(package: &str) -> Slow {
-    if package == BOARD.package { EMULATOR } else { HOST }
 }
 
 /// `cargo <subcommand>` for a package of this machine. The emulator's crate asks for a newer compiler than it needs.

@@ -10,7 +10,6 @@ use object::read::elf::{ElfFile, ProgramHeader};
 use object::{LittleEndian, Object, ObjectSection, ObjectSymbol, SectionFlags};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -24,7 +23,7 @@ const SPAN_MAX: usize = 2 << 20;
 pub struct Image {
     /// The linked image, with symbols.
     pub elf: PathBuf,
-    /// The flashable bytes, as a file beside it.
+    /// The file of the flashable bytes beside it.
     pub bin: PathBuf,
     /// The flashable bytes.
     pub bytes: Vec<u8>,
@@ -34,9 +33,6 @@ pub struct Image {
 
 impl Image {
     /// Lays out the loadable segments of a linked image by their load addresses; gaps read as erased.
-    ///
-    /// # Errors
-    /// The file is missing, no image for the target, loads nothing, or names a folder of this machine.
     pub fn read(elf: &Path) -> Result<Self> {
         let data = fs::read(elf).with_context(|| format!("cannot read the image {}", host::shown(elf)))?;
         let file = ElfFile::<FileHeader32<LittleEndian>>::parse(&*data)
@@ -60,9 +56,6 @@ impl Image {
     }
 
     /// Refuses an image with a path of this machine in it: a build on another machine would give other bytes.
-    ///
-    /// # Errors
-    /// Names the path: where the sources of the core lie, or those of other crates.
     fn names_no_folder(&self) -> Result<()> {
         // With its subfolder: that of a checkout in `/src` alone is part of most paths.
         for folder in toolchain::sources().into_iter().chain([host::root().join("src")]) {
@@ -103,9 +96,6 @@ fn lay_out(segments: &[(u32, &[u8])]) -> Result<(u32, Vec<u8>)> {
 }
 
 /// Builds the flash image.
-///
-/// # Errors
-/// No compiler, or the firmware does not compile.
 pub fn firmware(choice: Choice, console: &mut Console) -> Result<Image> {
     let toolchain = toolchain::ensure(choice, console)?;
     let mut command = toolchain.cargo("build");
@@ -114,9 +104,6 @@ pub fn firmware(choice: Choice, console: &mut Console) -> Result<Image> {
 }
 
 /// Builds an image that checks a board.
-///
-/// # Errors
-/// The image does not compile or link.
 pub fn checking(toolchain: Toolchain, name: &str, console: &mut Console) -> Result<Image> {
     let mut command = toolchain.cargo("build");
     command.args(["--package", name, "--bin", name, "--no-default-features", "--features", "image"]);
@@ -131,9 +118,6 @@ fn with_bytes(command: &mut Command, toolchain: Toolchain, name: &str, console: 
 }
 
 /// Builds an image for the emulated core and returns where it lies.
-///
-/// # Errors
-/// The image does not compile or link.
 pub fn build(toolchain: Toolchain, name: &str, feature: &str, console: &mut Console) -> Result<PathBuf> {
     built(emulated(toolchain, name, feature).arg("--release"), toolchain, name, console)
 }
@@ -251,13 +235,13 @@ impl Sizes {
     fn table(&self) -> String {
         let mut text = format!("{:<24} {:>10} {:>8} {:>8}\n", "section", "address", "flash", "RAM");
         for (name, address, flash, ram) in &self.sections {
-            let _ = writeln!(text, "{name:<24} {address:#010x} {flash:>8} {ram:>8}");
+            text += &format!("{name:<24} {address:#010x} {flash:>8} {ram:>8}\n");
         }
         let mut crates: Vec<_> = self.crates.iter().collect();
         crates.sort_by_key(|(_, (flash, ram))| std::cmp::Reverse(flash + ram));
-        let _ = writeln!(text, "\n{:<35} {:>8} {:>8}", "crate (named symbols only)", "flash", "RAM");
+        text += &format!("\n{:<35} {:>8} {:>8}\n", "crate (named symbols only)", "flash", "RAM");
         for (name, (flash, ram)) in crates.into_iter().take(CRATES_SHOWN) {
-            let _ = writeln!(text, "{name:<35} {flash:>8} {ram:>8}");
+            text += &format!("{name:<35} {flash:>8} {ram:>8}\n");
         }
         text
     }
@@ -282,27 +266,16 @@ const UNDEFINED: &str = "fingertip_step_can_panic";
 /// Builds the proof and its two controls.
 pub fn prove_panic_free(choice: Choice, console: &mut Console) -> Result<()> {
     let toolchain = toolchain::ensure(choice, console)?;
-    let elf = link(toolchain, console)?;
+    let linked = build(toolchain, NAME, "proof", console);
+    let elf = linked
+        .with_context(|| format!("the proof does not link; if {UNDEFINED} is missing above, the step can panic"))?;
     console.print("The control step links without a panic handler: no panic is reachable.");
     let calls = float_calls(&elf)?;
     if !calls.is_empty() {
         bail!("the control step calls floating-point routines: {}", calls.join(", "));
     }
     console.print("It calls no floating-point routine.");
-    controls(toolchain, console)?;
-    console.print("The controls, a step that can panic and one that computes in f64, are caught.");
-    Ok(())
-}
-
-/// Links the proof.
-fn link(toolchain: Toolchain, console: &mut Console) -> Result<std::path::PathBuf> {
-    build(toolchain, NAME, "proof", console).map_err(|error| {
-        error.context(format!("the proof does not link; if {UNDEFINED} is missing above, the step can panic"))
-    })
-}
-
-/// Shows that the proof can fail.
-fn controls(toolchain: Toolchain, console: &mut Console) -> Result<()> {
+    // Shows that the proof can fail.
     let output = console.run_to_failure(emulated(toolchain, NAME, "proof-control-panic").arg("--release"))?;
     if !output.contains(UNDEFINED) {
         bail!("the control that panics fails for another reason:\n{output}");
@@ -311,6 +284,7 @@ fn controls(toolchain: Toolchain, console: &mut Console) -> Result<()> {
     if float_calls(&elf)?.is_empty() {
         bail!("the control that computes in f64 shows no floating-point routine in {}", host::shown(&elf));
     }
+    console.print("The controls, a step that can panic and one that computes in f64, are caught.");
     Ok(())
 }
 

@@ -15,9 +15,6 @@ const MIRROR: &str = "http://deb.debian.org/debian/";
 const KEYRING: &str = "/usr/share/keyrings/debian-archive-keyring.gpg";
 
 /// Makes sure of Debian packages.
-///
-/// # Errors
-/// No Debian, no root, or apt-get cannot get them; the text says what to install by hand.
 pub fn packages(names: &[&str], why: &str, console: &mut Console) -> Result<()> {
     let missing: Vec<&str> = names.iter().copied().filter(|name| !installed(name)).collect();
     if missing.is_empty() {
@@ -38,16 +35,8 @@ pub fn packages(names: &[&str], why: &str, console: &mut Console) -> Result<()> 
         .with_context(|| format!("apt-get cannot install `{list}`, which {why} needs: is a package mirror in reach?"))
 }
 
-/// True if nothing of these packages is missing.
-pub fn all_installed(packages: &[&str]) -> bool {
-    packages.iter().all(|package| installed(package))
-}
-
 /// Installs the newest version of packages that Debian has for this release, its backports included. Backports are a
 /// source of this call alone: apt does not know of them afterwards.
-///
-/// # Errors
-/// No Debian, no root, or apt-get cannot get them; the text says what to install by hand.
 pub fn newest(packages: &[&str], why: &str, console: &mut Console) -> Result<()> {
     let list = packages.join(" ");
     let release = fs::read_to_string("/etc/os-release").unwrap_or_default();
@@ -130,7 +119,8 @@ fn is_main(release: &str, uri: &str) -> bool {
     uri.trim_end_matches('/').ends_with("/debian") && !release.contains("security")
 }
 
-fn installed(package: &str) -> bool {
+/// True if a Debian package is there.
+pub fn installed(package: &str) -> bool {
     let query = Command::new("dpkg-query").args(["-W", "-f", "${Status}", package]).output();
     query.is_ok_and(|output| output.stdout.ends_with(b" installed"))
 }
@@ -145,9 +135,6 @@ fn is_root() -> bool {
 const BROWSERS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
 
 /// Finds a Chromium, or installs Debian's; with fonts, without which a page has no letters.
-///
-/// # Errors
-/// The browser is missing and cannot be installed; the text says what to install by hand.
 pub fn browser(console: &mut Console) -> Result<PathBuf> {
     let find = || BROWSERS.into_iter().find_map(host::find_program);
     if let Some(program) = find() {
@@ -182,9 +169,6 @@ pub fn bus_python(console: &mut Console) -> Result<PathBuf> {
 }
 
 /// Finds or makes a virtual environment, and returns its interpreter.
-///
-/// # Errors
-/// No Python, no `venv`, or no package; the text says what to install.
 pub fn environment(environment: &Environment, console: &mut Console) -> Result<PathBuf> {
     let Environment { folder, packages, imports, does } = environment;
     let folder = host::target().join(folder);

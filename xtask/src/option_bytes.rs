@@ -123,9 +123,6 @@ fn confirm(wanted: u32) -> [Step; 4] {
 const UNCHANGED: &str = "No option byte was changed. Check cable, probe and supply, reset the board, and try again.";
 
 /// The option bytes, where [`program`] has to change them. Refuses another device, and leaves the core halted.
-///
-/// # Errors
-/// A step fails; the message names it and the next action.
 pub fn check(probe: &mut impl Probe) -> Result<Option<u32>> {
     run(probe, &PREPARE, UNCHANGED)?;
     let options = probe.read(OPTCR).map_err(|error| anyhow!("option bytes: {error:#}\n{UNCHANGED}"))?;

@@ -54,7 +54,6 @@ pub fn start(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// Flags of `cargo xtask demo`.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  \
     cargo xtask demo\n  \
@@ -73,7 +72,12 @@ pub struct DemoArgs {
 
 /// Shows the demonstration on the native core, which is built soon, then on the flash image.
 pub fn demo(args: &DemoArgs, choice: Choice, console: &mut Console) -> Result<()> {
-    native_demo(args, console)?;
+    let mut command = host::NATIVE_DEMO.build(console)?;
+    console.say("First on the native core: the same script and plant, no microcontroller in between.");
+    // As it is to be read: programs are started in the root.
+    let out = host::shown(&host::target().join("demo").join("native"));
+    console.run(command.arg("--out").arg(out).args(args.quick.then_some("--quick")))?;
+    console.say("Now on the flash image: the emulator is compiled for some minutes, the first time.");
     let image = image::firmware(choice, console)?;
     console.say(&image.summary());
     let mut command = host::BOARD.build(console)?;
@@ -87,18 +91,6 @@ pub fn demo(args: &DemoArgs, choice: Choice, console: &mut Console) -> Result<()
     console.run(&mut command)
 }
 
-/// The same script on the core compiled for this machine: something to look at while the emulator compiles.
-fn native_demo(args: &DemoArgs, console: &mut Console) -> Result<()> {
-    let mut command = host::NATIVE_DEMO.build(console)?;
-    console.say("First on the native core: the same script and plant, no microcontroller in between.");
-    // As it is to be read: programs are started in the root.
-    let out = host::shown(&host::target().join("demo").join("native"));
-    console.run(command.arg("--out").arg(out).args(args.quick.then_some("--quick")))?;
-    console.say("Now on the flash image: the emulator is compiled for some minutes, the first time.");
-    Ok(())
-}
-
-/// Flags of `cargo xtask serve`.
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples:\n  cargo xtask serve --pty /tmp/finger\n  cargo xtask serve raspberry --tcp 7000\n  \
@@ -164,7 +156,6 @@ pub fn serve(args: &ServeArgs, choice: Choice, console: &mut Console) -> Result<
     start(&mut command)
 }
 
-/// Flags of `cargo xtask replay`.
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples:\n  cargo xtask replay\n  cargo xtask replay my/captures\n  cargo xtask replay press.mcap"

@@ -8,7 +8,6 @@ use anyhow::{Context, Result, bail, ensure};
 use std::process::Command;
 use std::time::Instant;
 
-/// Flags of `cargo xtask test`.
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples:\n  cargo xtask test\n  cargo xtask test --long    (the cases that the usual size leaves out)\n  \
@@ -21,9 +20,6 @@ pub struct Args {
 }
 
 /// Runs every test at its usual size, or what that leaves out.
-///
-/// # Errors
-/// Names the stages that failed.
 pub fn run(args: &Args, choice: Choice) -> Result<()> {
     let mut stages = Stages::default();
     if args.long {
@@ -196,18 +192,18 @@ impl Stages {
         clear_line();
         match result {
             Ok(value) => {
-                for line in closing_lines(console.text()) {
-                    println!("    {line}");
-                }
+                // Cargo's closing line of each test binary that ran a test.
+                let idle = " 0 passed; 0 failed; 0 ignored";
+                let lines = console.text().lines().filter(|line| line.starts_with("test result:"));
+                lines.filter(|line| !line.contains(idle)).for_each(|line| println!("    {line}"));
                 println!("ok     {clock_s:7.1} s  {name}");
                 Some(value)
             }
             Err(error) => {
                 println!("{}", console.text());
-                // Again at the end, where one looks first.
-                for line in console.text().lines().filter(|line| is_failed_test(line)) {
-                    println!("    {line}");
-                }
+                // The tests that failed again at the end, where one looks first.
+                let lines = console.text().lines().filter(|line| line.starts_with("test "));
+                lines.filter(|line| line.ends_with(" ... FAILED")).for_each(|line| println!("    {line}"));
                 println!("{error:#}");
                 println!("FAILED {clock_s:7.1} s  {name}");
                 self.failed.push(name.into());
@@ -233,14 +229,4 @@ impl Stages {
         println!("{what}: all passed");
         Ok(())
     }
-}
-
-/// Cargo's line of a test that failed.
-fn is_failed_test(line: &str) -> bool {
-    line.starts_with("test ") && line.ends_with(" ... FAILED")
-}
-
-/// Cargo's closing line of each test binary that ran a test.
-fn closing_lines(text: &str) -> impl Iterator<Item = &str> {
-    text.lines().filter(|line| line.starts_with("test result:") && !line.contains(" 0 passed; 0 failed; 0 ignored"))
 }

@@ -8,7 +8,6 @@ use crate::{image, install};
 use anyhow::{Context, Result, bail};
 use m4_timing::meter::{Measured, parse};
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
-use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -18,7 +17,6 @@ const PROGRAM: &str = "qemu-system-arm";
 const VERSION_MIN: u32 = 9;
 const WHY: &str = "estimating cycles on an emulated Cortex-M4F";
 
-/// Flags of `cargo xtask timing`.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  cargo xtask timing\n  cargo xtask timing --json kernels.json\n  \
     cargo xtask timing --check\n  cargo xtask timing my-image.elf")]
@@ -57,17 +55,13 @@ impl Run {
         let mut text = String::new();
         for (line, measured) in self.json_lines.lines().zip(&self.regions) {
             let name = self.name(measured.region).replace(['"', '\\'], "'");
-            // A string takes every write.
-            let _ = writeln!(text, "{{\"name\":\"{name}\",{}", line.trim_start_matches('{'));
+            text += &format!("{{\"name\":\"{name}\",{}\n", line.trim_start_matches('{'));
         }
         text
     }
 }
 
 /// Measures the loop's kernels or an image, or checks the model.
-///
-/// # Errors
-/// Something does not build, or the image fails or cannot be measured.
 pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     if args.check {
         return check(choice, console);
@@ -87,9 +81,6 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
 }
 
 /// Runs the tests that compare the model with published measurements.
-///
-/// # Errors
-/// Something does not build, or a test fails.
 pub fn check(choice: Choice, console: &mut Console) -> Result<()> {
     ensure(console)?;
     let plugin = plugin(console)?;
@@ -99,9 +90,6 @@ pub fn check(choice: Choice, console: &mut Console) -> Result<()> {
 }
 
 /// Measures the loop's kernels over the recorded stimulus.
-///
-/// # Errors
-/// Something does not build, or the image fails.
 pub fn kernels(choice: Choice, console: &mut Console) -> Result<Run> {
     let image = image::build(toolchain::ensure(choice, console)?, "timing", "timing", console)?;
     let recording = host::made("timing")?.join("recording.bin");
@@ -111,9 +99,6 @@ pub fn kernels(choice: Choice, console: &mut Console) -> Result<Run> {
 }
 
 /// Runs an image to its end under the plugin; `argument` is its command line.
-///
-/// # Errors
-/// QEMU or the plugin is missing, the image fails, or a region cannot be measured.
 pub fn measure(image: &Path, argument: Option<&Path>, console: &mut Console) -> Result<Run> {
     ensure(console)?;
     let plugin = plugin(console)?;
@@ -142,9 +127,6 @@ pub fn measure(image: &Path, argument: Option<&Path>, console: &mut Console) -> 
 }
 
 /// Makes sure of an emulator with the plugin interface.
-///
-/// # Errors
-/// The emulator is missing and cannot be installed.
 pub fn ensure(console: &mut Console) -> Result<()> {
     if version().is_some_and(|version| version >= VERSION_MIN) {
         return Ok(());
@@ -181,10 +163,8 @@ fn table(run: &Run) -> String {
     );
     for measured in &run.regions {
         let Measured { region, passes, instructions, low, estimate, high, flash } = measured;
-        // A string takes every write.
-        let _ = writeln!(
-            text,
-            "{:<34}{passes:>8}{:>8}{:>8}{:>9}{:>8}{:>8}{:>10}",
+        text += &format!(
+            "{:<34}{passes:>8}{:>8}{:>8}{:>9}{:>8}{:>8}{:>10}\n",
             run.name(*region),
             instructions.median,
             low.median,
@@ -206,7 +186,6 @@ const STUDY_PROFILE: &str = "study";
 /// Number of fingers of the whole loop.
 const FINGERS: &str = "12";
 
-/// Flags of `cargo xtask study`.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  cargo xtask study\n  cargo xtask study --check\n  \
     cargo xtask study --json study.json --out /tmp/study")]
@@ -264,10 +243,9 @@ fn measured(image: &Path, inputs: &Path, file: &Path, console: &mut Console) -> 
     let run = measure(image, Some(inputs), console)?;
     let mut text = run.output;
     for measured in &run.regions {
-        // A string takes every write.
-        let _ = write!(text, "cost {}", measured.region);
+        text += &format!("cost {}", measured.region);
         for figure in [&measured.instructions, &measured.low, &measured.estimate, &measured.high, &measured.flash] {
-            let _ = write!(text, " {} {}", figure.median, figure.max);
+            text += &format!(" {} {}", figure.median, figure.max);
         }
         text.push('\n');
     }

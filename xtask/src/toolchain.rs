@@ -53,7 +53,7 @@ impl Toolchain {
                 command
             }
         };
-        command.args(["--target", target]).arg("--target-dir").arg(self.flagged_dir(flags));
+        command.args(["--target", target]).arg("--target-dir").arg(self.target_dir(flags));
         let flags: Vec<_> = short_paths().chain(flags.iter().map(|flag| (*flag).into())).collect();
         // Added to the flags of `.cargo/config.toml`. Cargo does not find a target by a name with a dot here.
         let key = if target.contains('.') { "'cfg(target_os = \"none\")'" } else { target };
@@ -68,20 +68,15 @@ impl Toolchain {
 
     /// Folder of its release images for a target, built with these flags.
     pub fn images_for(self, target: &str, flags: &[&str]) -> PathBuf {
-        self.flagged_dir(flags).join(target).join("release")
+        self.target_dir(flags).join(target).join("release")
     }
 
-    /// Builds with other flags in one folder would rebuild each other's work, too.
-    fn flagged_dir(self, flags: &[&str]) -> PathBuf {
-        if flags.is_empty() { self.target_dir() } else { self.target_dir().join("flagged") }
-    }
-
-    /// Two compilers in one folder would rebuild each other's work.
-    fn target_dir(self) -> PathBuf {
-        match self {
-            Self::Native => host::target(),
-            Self::Debian => host::target().join("debian"),
-        }
+    /// Build folder: two compilers, or builds with other flags, would rebuild each other's work in one.
+    fn target_dir(self, flags: &[&str]) -> PathBuf {
+        let mut folder = host::target();
+        folder.extend((self == Self::Debian).then_some("debian"));
+        folder.extend((!flags.is_empty()).then_some("flagged"));
+        folder
     }
 }
 
@@ -99,17 +94,11 @@ pub fn sources() -> Option<PathBuf> {
 }
 
 /// Finds or installs a compiler for the firmware.
-///
-/// # Errors
-/// Neither rustup nor Debian could provide one; the text says what was tried and what to do.
 pub fn ensure(choice: Choice, console: &mut Console) -> Result<Toolchain> {
     ensure_for(choice, &[TARGET], "the firmware is compiled for it", console)
 }
 
 /// Finds or installs a compiler for some targets.
-///
-/// # Errors
-/// Like [`ensure`].
 pub fn ensure_for(choice: Choice, targets: &[&str], why: &str, console: &mut Console) -> Result<Toolchain> {
     if choice == Choice::Debian {
         return debian(console);
@@ -119,7 +108,10 @@ pub fn ensure_for(choice: Choice, targets: &[&str], why: &str, console: &mut Con
         return Ok(Toolchain::Native);
     }
     // Debian's compiler once taken is taken again: asking an unreachable server each time would cost minutes.
-    if choice == Choice::Auto && Toolchain::Debian.target_dir().is_dir() && install::all_installed(&DEBIAN_PACKAGES) {
+    if choice == Choice::Auto
+        && Toolchain::Debian.target_dir(&[]).is_dir()
+        && DEBIAN_PACKAGES.iter().all(|name| install::installed(name))
+    {
         return debian(console);
     }
     let Err(rustup) = add_targets(&missing, why, console) else { return Ok(Toolchain::Native) };

@@ -4,7 +4,6 @@ use crate::checks::{self, Check, FLAT};
 use crate::listen::Report;
 use serde::Serialize;
 use std::collections::HashMap;
-use std::fmt::Write as _;
 use std::fs;
 use std::io::Error;
 use std::path::Path;
@@ -159,33 +158,29 @@ impl Judgement {
                 None => format!("{} or more", number(check.at_least)),
             };
             let Judged { what, unit, source, .. } = check;
-            // A string takes every write.
-            let _ = writeln!(text, "{} {figure:>10} {unit:<7}{expected:>18}  {what}", word(check.verdict));
+            text += &format!("{} {figure:>10} {unit:<7}{expected:>18}  {what}\n", word(check.verdict));
             match (check.verdict, check.advice) {
                 (Verdict::Fail, Some(advice)) => {
-                    let _ = writeln!(text, "{:13}expected by {source}\n{:13}to do: {advice}", "", "");
+                    text += &format!("{:13}expected by {source}\n{:13}to do: {advice}\n", "", "");
                 }
                 (Verdict::NotShown, Some(why)) => {
-                    let _ = writeln!(text, "{:13}not shown by the emulator: {why}", "");
+                    text += &format!("{:13}not shown by the emulator: {why}\n", "");
                 }
                 _ => {}
             }
         }
-        let _ = writeln!(
-            text,
-            "\n{:<13}{:>10}{:>10}{:>10}  kernel: cycles, the call taken off",
-            "", "median", "most", "estimate"
-        );
+        let [none, median, most, estimate] = ["", "median", "most", "estimate"];
+        text += &format!("\n{none:<13}{median:>10}{most:>10}{estimate:>10}  kernel: cycles, the call taken off\n");
         for Kernel { name, median_cycles, most_cycles, estimated_cycles, verdict } in &self.kernels {
             let estimate = estimated_cycles.map_or("-".into(), number);
-            let _ = writeln!(text, "{} {median_cycles:>10}{most_cycles:>10}{estimate:>10}  {name}", word(*verdict));
+            text += &format!("{} {median_cycles:>10}{most_cycles:>10}{estimate:>10}  {name}\n", word(*verdict));
         }
         if self.board == Board::Emulated {
-            let _ = writeln!(text, "{:13}no kernel is shown by the emulator: {FLAT}", "");
+            text += &format!("{:13}no kernel is shown by the emulator: {FLAT}\n", "");
         }
         let Self { image_sha256, board_uid, passed, failed, not_shown, .. } = self;
-        let _ = writeln!(text, "\nsha-256  {image_sha256}\nboard    {board_uid}");
-        let _ = writeln!(text, "{passed} passed, {failed} failed, {not_shown} not shown by the emulator");
+        text += &format!("\nsha-256  {image_sha256}\nboard    {board_uid}\n");
+        text += &format!("{passed} passed, {failed} failed, {not_shown} not shown by the emulator\n");
         text
     }
 }

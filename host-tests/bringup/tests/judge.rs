@@ -11,7 +11,6 @@ use fingertip::units::CoreCycles;
 use serde_json::Value;
 use serial2::SerialPort;
 use std::collections::HashMap;
-use std::fmt::Write as _;
 use std::io::{Cursor, Read, Result, Write};
 use std::os::fd::AsRawFd as _;
 use std::path::{Path, PathBuf};
@@ -138,22 +137,16 @@ fn its_steps_are_within_a_tenth_of_the_demonstrations() {
     }
 }
 
-/// The report of a sound board, but for one figure.
-fn report(spoilt: Option<&str>) -> String {
-    let mut text = String::from("bringup 1 0123ABCD\n");
-    for check in checks() {
-        let [least, most] = check.within;
-        let middle = if most.is_finite() { 0.5 * (least + most) } else { least };
-        let figure = if spoilt == Some(check.name.as_str()) { least - 1.0 } else { middle };
-        writeln!(text, "figure {} {figure}", check.name).expect("a string takes it");
-    }
-    text.push_str("cycles 20 21 nothing: an empty call\ncycles 120 150 root: a way\n");
-    let check = text.bytes().fold(CHECK, checked);
-    text + &format!("end {check:08x}\n")
-}
-
 /// Runs the program at a port at which a board reports so.
-fn judged_by_program(report: String, json: &Path) -> Output {
+fn judged_by_program(report: &Report, json: &Path) -> Output {
+    let mut text = format!("bringup 1 {}\n", report.uid);
+    for (name, figure) in &report.figures {
+        text += &format!("figure {name} {figure}\n");
+    }
+    for (kernel, median, most) in &report.cycles {
+        text += &format!("cycles {median} {most} {kernel}\n");
+    }
+    let check = text.bytes().fold(CHECK, checked);
     let (board, host) = SerialPort::pair().expect("a pair of pseudo-terminals");
     let port = fs::read_link(format!("/proc/self/fd/{}", host.as_raw_fd())).expect("it has a name");
     let folder = json.parent().expect("it lies in a folder");
@@ -169,7 +162,7 @@ fn judged_by_program(report: String, json: &Path) -> Output {
                 heard.push_str(&String::from_utf8_lossy(&bytes[..count]));
             }
         }
-        board.write_all(format!("# far\n{report}").as_bytes()).expect("it takes it");
+        board.write_all(format!("# far\n{text}end {check:08x}\n").as_bytes()).expect("it takes it");
         board
     });
     let mut command = Command::new(env!("CARGO_BIN_EXE_bringup-host"));
@@ -189,17 +182,19 @@ fn scratch(name: &str) -> PathBuf {
 #[test]
 fn a_sound_board_ends_well_and_another_does_not() {
     let json = scratch("sound");
-    let output = judged_by_program(report(None), &json);
+    let output = judged_by_program(&sound(), &json);
     let text = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success(), "{text}{}", String::from_utf8_lossy(&output.stderr));
     assert!(text.contains("far\n") && text.contains("0 failed"), "{text}");
     let file: Value = serde_json::from_slice(&fs::read(&json).expect("it was written")).expect("it is JSON");
     let plain = ["schema_version", "image_sha256", "board_uid", "board", "failed"].map(|key| file[key].to_string());
-    assert_eq!(plain, ["1", "\"ab\"", "\"0123ABCD\"", "\"silicon\"", "0"]);
+    assert_eq!(plain, ["1", "\"ab\"", "\"0123\"", "\"silicon\"", "0"]);
     assert_eq!(file["kernels"][0]["estimated_cycles"], 98.0);
 
     let json = scratch("spoilt");
-    let output = judged_by_program(report(Some("rows_wrong")), &json);
+    let mut report = sound();
+    report.figures.iter_mut().filter(|(name, _)| name == "rows_wrong").for_each(|(_, figure)| *figure -= 1.0);
+    let output = judged_by_program(&report, &json);
     let text = String::from_utf8_lossy(&output.stdout);
     assert_eq!(output.status.code(), Some(1), "{text}");
     assert!(text.contains("FAIL") && text.contains("to do: ") && text.contains("1 failed"), "{text}");

@@ -4,9 +4,9 @@
 mod charts;
 
 use crate::heatmap::Pressures;
-use charts::Frame;
 pub use charts::{Panel, Sample, overview, steps};
 use core::f64::consts::TAU;
+use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
@@ -51,7 +51,7 @@ const DARK: [(&str, &str); 7] = [
 ];
 
 /// A picture that follows the light or dark scheme of the page it is shown on.
-pub fn with_dark_scheme(svg: &str) -> String {
+fn with_dark_scheme(svg: &str) -> String {
     let drawn = svg.split(['"', '\'']).filter(|part| part.len() == 7 && part.starts_with('#'));
     for colour in drawn {
         assert!(DARK.iter().any(|(light, _)| *light == colour), "dark pages have no colour for {colour}");
@@ -110,6 +110,8 @@ pub enum Curve {
     Second(Vec<(f64, f64)>),
     /// A dashed line through points.
     Dashed(Vec<(f64, f64)>),
+    /// A thin dotted line through points.
+    Dotted(Vec<(f64, f64)>),
     /// A circle at each point.
     Circles(Vec<(f64, f64)>),
 }
@@ -120,9 +122,40 @@ impl Curve {
         | Self::Pale(points)
         | Self::Second(points)
         | Self::Dashed(points)
+        | Self::Dotted(points)
         | Self::Circles(points)) = self;
         points
     }
+
+    fn draw(&self, chart: &mut Chart<'_, '_>) -> Result<(), PlotError> {
+        match self {
+            Self::Solid(points) => line(chart, points, INK.stroke_width(2 * FINE)),
+            Self::Pale(points) => line(chart, points, PALE_INK.stroke_width(FINE)),
+            Self::Second(points) => line(chart, points, SECOND_INK.stroke_width(FINE)),
+            Self::Dashed(points) => dashes(chart, points, [7, 4], GOAL_INK.stroke_width(2 * FINE)),
+            Self::Dotted(points) => dashes(chart, points, [2, 3], BLACK.stroke_width(FINE)),
+            Self::Circles(points) => {
+                let circles = points.iter().map(|point| Circle::new(*point, 4 * FINE, BLACK.stroke_width(FINE)));
+                chart.draw_series(circles).map(drop).map_err(failed)
+            }
+        }
+    }
+}
+
+type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+
+fn line(chart: &mut Chart<'_, '_>, points: &[(f64, f64)], style: ShapeStyle) -> Result<(), PlotError> {
+    chart.draw_series(LineSeries::new(points.iter().copied(), style)).map(drop).map_err(failed)
+}
+
+fn dashes(
+    chart: &mut Chart<'_, '_>,
+    points: &[(f64, f64)],
+    [dash, gap]: [u32; 2],
+    style: ShapeStyle,
+) -> Result<(), PlotError> {
+    let line = DashedLineSeries::new(points.iter().copied(), dash * FINE, gap * FINE, style);
+    chart.draw_series(line).map(drop).map_err(failed)
 }
 
 #[derive(Clone, Debug)]
@@ -140,26 +173,45 @@ pub struct Curves<'a> {
     pub curves: Vec<Curve>,
 }
 
+impl Curves<'_> {
+    fn draw(&self, area: &Area<'_>) -> Result<(), PlotError> {
+        let ([left, right], [low, high]) = (self.x_range, self.y_range);
+        // The margin below the title keeps it off the numbers of the axis.
+        let area = area.margin(6 * FINE, 0, 0, 0).titled(&self.title, (FONT, TITLE_PX * FINE)).map_err(failed)?;
+        let mut chart = ChartBuilder::on(&area)
+            .margin(8 * FINE)
+            .margin_right(18 * FINE)
+            .x_label_area_size(36 * FINE)
+            .y_label_area_size(52 * FINE)
+            .build_cartesian_2d(left..right, low..high)
+            .map_err(failed)?;
+        chart
+            .configure_mesh()
+            .light_line_style(TRANSPARENT)
+            .bold_line_style(FAINT.stroke_width(FINE))
+            .axis_style(BLACK.stroke_width(FINE))
+            .set_all_tick_mark_size(5 * FINE)
+            .label_style((FONT, LABEL_PX * FINE))
+            .x_desc(self.x)
+            .y_desc(self.y)
+            .x_label_formatter(&number)
+            .y_label_formatter(&number)
+            .y_labels(6)
+            .x_labels(10)
+            .draw()
+            .map_err(failed)?;
+        self.curves.iter().try_for_each(|curve| curve.draw(&mut chart))
+    }
+}
+
 /// Panels side by side, each of a size.
 pub fn curves(panels: &[Curves<'_>], panel_px: (u32, u32)) -> Result<String, PlotError> {
     if panels.is_empty() {
         return Err(PlotError("there is no panel".into()));
     }
     fine_picture((panel_px.0 * panels.len() as u32, panel_px.1), |area| {
-        for (panel, area) in panels.iter().zip(area.split_evenly((1, panels.len()))) {
-            let Curves { title, x, y, x_range, y_range, curves } = panel;
-            let frame = Frame { title, x, unit: y, x_range: *x_range, range: *y_range };
-            frame.draw(&area, |chart| {
-                curves.iter().try_for_each(|curve| match curve {
-                    Curve::Solid(points) => chart.solid(points),
-                    Curve::Pale(points) => chart.pale(points),
-                    Curve::Second(points) => chart.second(points),
-                    Curve::Dashed(points) => chart.dashed(points),
-                    Curve::Circles(points) => chart.circles(points),
-                })
-            })?;
-        }
-        Ok(())
+        let areas = area.split_evenly((1, panels.len()));
+        panels.iter().zip(areas).try_for_each(|(panel, area)| panel.draw(&area))
     })
 }
 

@@ -3,47 +3,33 @@
 //! A name ends with its unit word by word, `per` standing for what it is divided by. So a unit that is made of others
 //! needs no entry.
 
-/// Words that a unit is made of, and how they are shown.
-const WORDS: [(&str, &str); 41] = [
+/// Words that a unit is made of and that are shown as they are, and others with how they are shown.
+const PLAIN: [&str; 18] = [
+    "code", "codes", "counts", "cycles", "g", "mm", "mrad", "ms", "ns", "permille", "ppb", "ppm", "rad", "s", "turn",
+    "ug", "um", "us",
+];
+const WORDS: [(&str, &str); 23] = [
     ("a", "A"),
     ("c", "degrees Celsius"),
     ("cm2", "cm^2"),
-    ("code", "code"),
-    ("codes", "codes"),
-    ("counts", "counts"),
-    ("cycles", "cycles"),
     ("decade", "decade of time"),
     ("deg", "degrees"),
-    ("g", "g"),
     ("hz", "Hz"),
     ("j", "J"),
     ("k", "K"),
     ("kpa", "kPa"),
     ("m2", "m^2"),
     ("ma", "mA"),
-    ("mm", "mm"),
     ("mn", "mN"),
     ("mnm", "mN m"),
     ("mohm", "mOhm"),
-    ("mrad", "mrad"),
-    ("ms", "ms"),
     ("mv", "mV"),
     ("n", "N"),
-    ("ns", "ns"),
     ("ohm", "Ohm"),
     ("pa", "Pa"),
     ("percent", "%"),
-    ("permille", "permille"),
-    ("ppb", "ppb"),
-    ("ppm", "ppm"),
-    ("rad", "rad"),
-    ("s", "s"),
-    ("turn", "turn"),
-    ("ug", "ug"),
     ("uh", "uH"),
-    ("um", "um"),
     ("unm", "uN m"),
-    ("us", "us"),
     ("v", "V"),
     ("w", "W"),
 ];
@@ -91,7 +77,8 @@ pub fn label(name: &str) -> String {
 }
 
 fn shown(word: &str) -> Option<&'static str> {
-    WORDS.iter().find(|(known, _)| *known == word).map(|(_, shown)| *shown)
+    let plain = PLAIN.into_iter().find(|known| *known == word);
+    plain.or_else(|| WORDS.iter().find(|(known, _)| *known == word).map(|(_, shown)| *shown))
 }
 
 /// One step of a whole number in a unit: `1 code` where the unit is codes.

@@ -14,7 +14,6 @@ pub use port::{Place, Port, Stop};
 
 use output::say;
 use port::Event;
-use std::fmt::Write as _;
 use std::time::{Duration, Instant};
 
 /// Interval at which an idle finger is advanced: the time that it must catch up at most when a request arrives.
@@ -217,8 +216,7 @@ impl Pace {
         let mut text = format!("pace     {ratio:.2} of real time");
         if look.late > 0 {
             let (late, allowed_ms, longest_ms) = (look.late, self.late.as_secs_f64() * 1e3, look.longest_s * 1e3);
-            // Writing to a string does not fail.
-            let _ = write!(text, "; {late} answers later than {allowed_ms:.1} ms, the longest took {longest_ms:.1} ms");
+            text += &format!("; {late} answers later than {allowed_ms:.1} ms, the longest took {longest_ms:.1} ms");
         }
         Some(text)
     }

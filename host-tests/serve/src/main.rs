@@ -77,7 +77,7 @@ fn run(args: &Args) -> Result<(), String> {
         scene.name, scene.about
     ));
     io::stdout().flush().map_err(|why| format!("cannot say where it serves: {why}"))?;
-    let served = serve::serve(&mut Native(bus), &mut port, LATE + DELAY, false).unwrap_or_else(|never| match never {});
+    let Ok(served) = serve::serve(&mut Native(bus), &mut port, LATE + DELAY, false);
     say::line(served.text());
     Ok(())
 }

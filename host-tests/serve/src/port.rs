@@ -59,6 +59,7 @@ impl Stop {
 /// The place where clients come in; gone, with its link, when dropped.
 #[derive(Debug)]
 pub struct Port {
+    name: String,
     place: Opened,
     stopped: PipeReader,
     stop: Stop,
@@ -83,12 +84,12 @@ struct Side {
 impl Port {
     /// Opens it.
     pub fn open(place: &Place) -> io::Result<Self> {
-        let place = match place {
-            Place::Pty(link) => Opened::Pty(Pty::open(link.as_deref())?),
-            Place::Tcp(port) => Opened::Tcp(Tcp::open(*port)?),
+        let (name, place) = match place {
+            Place::Pty(link) => Pty::open(link.as_deref()).map(|(name, pty)| (name, Opened::Pty(pty)))?,
+            Place::Tcp(port) => Tcp::open(*port).map(|(name, tcp)| (name, Opened::Tcp(tcp)))?,
         };
         let (stopped, stop) = io::pipe()?;
-        Ok(Self { place, stopped, stop: Stop(Arc::new(stop)), side: None })
+        Ok(Self { name, place, stopped, stop: Stop(Arc::new(stop)), side: None })
     }
 
     /// Takes commands too, a line each on the standard input.
@@ -99,10 +100,7 @@ impl Port {
 
     /// Name that a client opens: a path, or address and port.
     pub fn name(&self) -> &str {
-        match &self.place {
-            Opened::Pty(pty) => &pty.name,
-            Opened::Tcp(tcp) => &tcp.name,
-        }
+        &self.name
     }
 
     /// Something that stops whoever serves this port.
@@ -118,10 +116,12 @@ impl Port {
         let input = io::stdin();
         let mut watched = vec![PollFd::new(&self.stopped, PollFlags::IN)];
         match &self.place {
-            Opened::Pty(pty) => watched.push(PollFd::new(pty.near(), PollFlags::IN)),
+            Opened::Pty(pty) => watched.push(PollFd::new(&pty.near, PollFlags::IN)),
             Opened::Tcp(tcp) => watched.extend(tcp.watched().map(|fd| PollFd::from_borrowed_fd(fd, PollFlags::IN))),
         }
-        let side = self.side.as_ref().is_some_and(|side| !side.ended) && in_front(&input);
+        // The system stops a background process that reads its terminal.
+        let in_front = || tcgetpgrp(&input).is_ok_and(|group| group == getpgrp()) || !input.is_terminal();
+        let side = self.side.as_ref().is_some_and(|side| !side.ended) && in_front();
         if side {
             watched.push(PollFd::from_borrowed_fd(input.as_fd(), PollFlags::IN));
         }
@@ -138,8 +138,8 @@ impl Port {
         if stopped {
             return Event::Stop;
         }
-        if side {
-            self.read_side();
+        if side && let Some(side) = &mut self.side {
+            side.read();
         }
         let bytes = match &mut self.place {
             Opened::Pty(pty) if first => pty.read(baud),
@@ -156,21 +156,19 @@ impl Port {
             Opened::Tcp(tcp) => tcp.write(bytes),
         }
     }
-
-    fn read_side(&mut self) {
-        let mut buffer = [0; BUFFER];
-        let count = rustix::io::read(io::stdin(), &mut buffer).unwrap_or(0);
-        let Some(side) = &mut self.side else { return };
-        buffer[..count].iter().for_each(|byte| side.take(*byte));
-        if count == 0 {
-            // The last line may lack its end.
-            side.take(b'\n');
-            side.ended = true;
-        }
-    }
 }
 
 impl Side {
+    fn read(&mut self) {
+        let bytes = read(io::stdin()).unwrap_or_default();
+        bytes.iter().for_each(|byte| self.take(*byte));
+        if bytes.is_empty() {
+            // The last line may lack its end.
+            self.take(b'\n');
+            self.ended = true;
+        }
+    }
+
     fn take(&mut self, byte: u8) {
         if byte != b'\n' {
             // What is too long is kept as far as it takes to tell.
@@ -188,12 +186,7 @@ impl Side {
     }
 }
 
-/// True if this process may read the terminal: the system stops a background process that reads.
-fn in_front(input: impl AsFd) -> bool {
-    tcgetpgrp(input).is_ok_and(|group| group == getpgrp()) || !io::stdin().is_terminal()
-}
-
-/// Sources that have input.
+/// Reads from a source that has input.
 fn read(from: impl AsFd) -> io::Result<Vec<u8>> {
     let mut buffer = [0; BUFFER];
     let count = rustix::io::read(from, &mut buffer)?;
@@ -204,7 +197,6 @@ fn read(from: impl AsFd) -> io::Result<Vec<u8>> {
 
 #[derive(Debug)]
 struct Pty {
-    pub name: String,
     /// The finger's end, and the client's end held open so that clients may come and go.
     near: SerialPort,
     far: SerialPort,
@@ -222,21 +214,18 @@ struct Link {
 }
 
 impl Pty {
-    pub fn open(link: Option<&Path>) -> io::Result<Self> {
+    /// Opens one; it and its name.
+    fn open(link: Option<&Path>) -> io::Result<(String, Self)> {
         let (near, far) = SerialPort::pair()?;
         let device = rustix::pty::ptsname(&near, Vec::new())?;
         let device = PathBuf::from(OsStr::from_bytes(device.as_bytes()));
         fcntl_setfl(&near, fcntl_getfl(&near)? | OFlags::NONBLOCK)?;
         let name = link.unwrap_or(&device).display().to_string();
         let link = link.map(|link| Link::make(link, device)).transpose()?;
-        Ok(Self { name, near, far, _link: link, unheard: None })
+        Ok((name, Self { near, far, _link: link, unheard: None }))
     }
 
-    pub fn near(&self) -> &SerialPort {
-        &self.near
-    }
-
-    pub fn read(&mut self, baud: Option<u32>) -> Vec<u8> {
+    fn read(&mut self, baud: Option<u32>) -> Vec<u8> {
         let bytes = read(&self.near).unwrap_or_default();
         let (Some(baud), Some(set)) = (baud, self.baud()) else { return bytes };
         if set == baud {
@@ -249,7 +238,7 @@ impl Pty {
         Vec::new()
     }
 
-    pub fn write(&mut self, bytes: &[u8]) {
+    fn write(&mut self, bytes: &[u8]) {
         // Without a reader it is lost.
         let _ = rustix::io::write(&self.near, bytes);
     }
@@ -299,7 +288,6 @@ fn cannot_make(path: &Path, why: &io::Error) -> io::Error {
 
 #[derive(Debug)]
 struct Tcp {
-    pub name: String,
     listener: TcpListener,
     client: Option<(TcpStream, SocketAddr)>,
     /// Client that was refused last; kept open until the next one.
@@ -310,21 +298,22 @@ struct Tcp {
 const LAST_READS: usize = 64;
 
 impl Tcp {
-    pub fn open(port: u16) -> io::Result<Self> {
+    /// Opens one; it and its name.
+    fn open(port: u16) -> io::Result<(String, Self)> {
         let listener = TcpListener::bind(("127.0.0.1", port))
             .map_err(|why| io::Error::new(why.kind(), format!("cannot open TCP port {port}: {why}")))?;
         listener.set_nonblocking(true)?;
         let name = listener.local_addr()?.to_string();
-        Ok(Self { name, listener, client: None, refused: None })
+        Ok((name, Self { listener, client: None, refused: None }))
     }
 
     /// The listener, and the client where there is one.
-    pub fn watched(&self) -> impl Iterator<Item = BorrowedFd<'_>> {
+    fn watched(&self) -> impl Iterator<Item = BorrowedFd<'_>> {
         [self.listener.as_fd()].into_iter().chain(self.client.iter().map(|(client, _)| client.as_fd()))
     }
 
     /// Accepts a new client, and reads bytes of the present one.
-    pub fn read(&mut self, new: bool, bytes: bool) -> Vec<u8> {
+    fn read(&mut self, new: bool, bytes: bool) -> Vec<u8> {
         let mut heard = if bytes { self.hear() } else { Vec::new() };
         if new && let Ok((client, from)) = self.listener.accept() {
             // The present client may have closed the connection after its last bytes.
@@ -375,7 +364,7 @@ impl Tcp {
         }
     }
 
-    pub fn write(&mut self, bytes: &[u8]) {
+    fn write(&mut self, bytes: &[u8]) {
         if let Some((client, _)) = &mut self.client {
             // Without a reader it is lost; a client that left is noticed at the next read.
             let _ = client.write(bytes);

@@ -236,9 +236,6 @@ fn behind_a_terminal_it_serves_on_while_somebody_types() {
     }
 }
 
-/// As patient as it takes on the slowest machine.
-const PATIENCE_MS: &str = "600000";
-
 /// Runs a program under the longest bus watchdog: a busy machine stops programs for longer than the 0.5 s of the examples.
 const RUN: &str = "import runpy, sys
 from fingertip import Bus
@@ -251,7 +248,7 @@ runpy.run_path(sys.argv[0], run_name='__main__')";
 fn example(served: &Served, name: &str, arguments: &[&str]) -> String {
     let example = Path::new(env!("FINGERTIP_ROOT")).join("python/examples").join(name);
     let mut command = python();
-    command.args(["-c", RUN]).arg(example).args(["--port", &served.name, "--timeout-ms", PATIENCE_MS]);
+    command.args(["-c", RUN]).arg(example).args(["--port", &served.name, "--timeout-ms", "600000"]);
     said(command.args(arguments))
 }
 

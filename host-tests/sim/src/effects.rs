@@ -12,27 +12,16 @@ use std::time::{Duration, Instant};
 
 /// Named effects of a family: a list for each stage.
 macro_rules! named {
-    ($($part:ident($list:ident: $effect:ty),)*) => {
+    ($($list:ident: $effect:ty,)*) => {
         /// Named effects of the family.
         #[derive(Default)]
         pub struct Named {
-            any: bool,
-            $($list: Vec<Metered<$effect>>),*
+            $(pub(crate) $list: Vec<Metered<$effect>>),*
         }
 
         impl Named {
-            /// Appends an effect to the list of its stage. Returns a part of another family.
-            pub fn take(&mut self, name: &'static str, part: Part) -> Option<Part> {
-                match part {
-                    $(Part::$part(part) => self.$list.push(Metered::new(name, part)),)*
-                    other => return Some(other),
-                }
-                self.any = true;
-                None
-            }
-
             pub fn any(&self) -> bool {
-                self.any
+                $(!self.$list.is_empty())||*
             }
 
             /// Cost of each effect so far.
@@ -52,14 +41,15 @@ pub mod sensor;
 #[derive(Clone, Debug)]
 pub struct Build<'a> {
     pub values: &'a Values,
+    name: &'static str,
     seed: u64,
     drawn: Cell<bool>,
 }
 
 impl<'a> Build<'a> {
     /// Input with a seed of the scene, the name of the effect and the finger.
-    pub fn new(values: &'a Values, seed: u64) -> Self {
-        Self { values, seed, drawn: Cell::new(false) }
+    fn new(name: &'static str, values: &'a Values, seed: u64) -> Self {
+        Self { values, name, seed, drawn: Cell::new(false) }
     }
 
     pub fn rng(&self) -> Rng {
@@ -70,41 +60,18 @@ impl<'a> Build<'a> {
     pub fn number(&self, name: &str) -> f64 {
         self.values.number(name)
     }
-}
 
-/// Built effect, by the stage at which it acts.
-#[expect(missing_docs, reason = "each variant holds the type of its name")]
-pub enum Part {
-    Pressure(Box<dyn sensor::Pressure>),
-    Conductance(Box<sensor::Conductance>),
-    Network(Box<sensor::Network>),
-    Volts(Box<sensor::Volts>),
-    Codes(Box<sensor::Codes>),
-    Shape(Box<contact::Surface>),
-    Memory(Box<contact::Relaxation>),
-    /// Compliance of the object behind its surface, mm/N.
-    Series(Box<f64>),
-    Strength(Box<contact::BreakableObject>),
-    /// Friction along the surface.
-    Tangent(Box<contact::Grip>),
-    /// Mass of an object that can move, kg.
-    Body(Box<f64>),
-    Inertia(Box<drive::Inertia>),
-    Electric(Box<dyn drive::Electric>),
-    Resist(Box<drive::Resist>),
-    Potential(Box<drive::Cogging>),
-    Play(Box<drive::Play>),
-    Encoder(Box<drive::Encoder>),
-    /// Duration of a second of the controller in the world, s.
-    Clock(Box<f64>),
-    Packets(Box<link::Packets>),
+    /// Returns a part of the effect, to be appended to the list of its stage.
+    pub(crate) fn part<T: ?Sized>(&self, part: Box<T>) -> Metered<T> {
+        Metered { name: self.name, calls: 0, timed_calls: 0, timed: Duration::ZERO, repeated: 0, part }
+    }
 }
 
 /// True if an effect draws random numbers.
 pub fn draws(effect: &Description) -> bool {
     let values = Values::defaults(effect.keys);
-    let build = Build::new(&values, 0);
-    (effect.build)(&build);
+    let build = Build::new(effect.name, &values, 0);
+    (effect.build)(&build, &mut Parts::default());
     build.drawn.get()
 }
 
@@ -135,10 +102,6 @@ pub(crate) struct Metered<T: ?Sized> {
 }
 
 impl<T: ?Sized> Metered<T> {
-    pub fn new(name: &'static str, part: Box<T>) -> Self {
-        Self { name, calls: 0, timed_calls: 0, timed: Duration::ZERO, repeated: 0, part }
-    }
-
     pub fn call<R>(&mut self, f: impl FnOnce(&mut T) -> R) -> R {
         self.calls += 1;
         if self.calls % TIMED != 1 {
@@ -228,13 +191,7 @@ pub struct Parts<E: Set + ?Sized> {
     pub link: link::Named,
 }
 
-impl<E: Set> Parts<E> {
-    pub fn new(sensor: E::Sensor, drive: E::Drive) -> Self {
-        Self { sensor, contact: contact::Named::default(), drive, link: link::Named::default() }
-    }
-}
-
-/// Set of effects: [`Named`], or `()`, which has none compiled in.
+/// Set of effects: [`Named`], or those of the plant.
 pub trait Set {
     type Sensor: sensor::Stages;
     type Drive: drive::Stages;
@@ -252,32 +209,25 @@ pub trait Set {
     }
 }
 
-impl Set for () {
-    type Sensor = ();
-    type Drive = ();
-
-    fn of(_scene: &Scene, _finger: usize) -> Parts<Self> {
-        Parts::new((), ())
-    }
-
-    fn repeats(_scene: &Scene) -> bool {
-        true
-    }
-}
-
 /// Effects that the scene names.
 pub struct Named;
+
+impl Default for Parts<Named> {
+    fn default() -> Self {
+        let (sensor, contact) = (sensor::Named::default(), contact::Named::default());
+        Self { sensor, contact, drive: drive::Named::default(), link: link::Named::default() }
+    }
+}
 
 impl Set for Named {
     type Sensor = sensor::Named;
     type Drive = drive::Named;
 
     fn of(scene: &Scene, finger: usize) -> Parts<Self> {
-        let mut parts = Parts::<Self>::new(sensor::Named::default(), drive::Named::default());
-        for (name, part) in build(&scene.effects, scene.seed, finger) {
-            let rest = parts.sensor.take(name, part).and_then(|part| parts.contact.take(name, part));
-            let rest = rest.and_then(|part| parts.drive.take(name, part)).and_then(|part| parts.link.take(name, part));
-            assert!(rest.is_none(), "{name} acts at no stage");
+        let mut parts = Parts::default();
+        for NamedEffect { effect, values } in &scene.effects {
+            let build = Build::new(effect.name, values, stream(scene.seed, effect.name, finger));
+            (effect.build)(&build, &mut parts);
         }
         parts
     }
@@ -306,7 +256,8 @@ pub struct Description {
     pub keys: &'static [Key],
     /// Values of keys at which the effect changes nothing. Other keys may have any value.
     pub zero: &'static [(&'static str, f64)],
-    pub build: fn(&Build) -> Part,
+    /// Appends the effect to the list of its stage.
+    pub build: fn(&Build, &mut Parts<Named>),
 }
 
 /// A family of effects, by the place at which they act.
@@ -348,13 +299,6 @@ pub fn all() -> impl Iterator<Item = &'static Description> {
 pub fn family_of(effect: &Description) -> &'static str {
     let family = FAMILIES.iter().find(|family| family.effects.iter().any(|known| known.name == effect.name));
     family.map_or("", |family| family.name)
-}
-
-/// Builds the effects of a scene for a finger, each with its name.
-pub fn build(named: &[NamedEffect], seed: u64, finger: usize) -> impl Iterator<Item = (&'static str, Part)> {
-    named.iter().map(move |NamedEffect { effect, values }| {
-        (effect.name, (effect.build)(&Build::new(values, stream(seed, effect.name, finger))))
-    })
 }
 
 #[cfg(test)]

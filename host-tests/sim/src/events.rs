@@ -145,6 +145,11 @@ impl Event {
         (self.at_s..self.until_s).contains(&time_s)
     }
 
+    /// True if the event draws random numbers.
+    pub fn is_random(&self) -> bool {
+        self.what == What::Array(Defect::Random) && self.until_s > self.at_s
+    }
+
     pub fn moves_object(&self) -> bool {
         matches!(self.what, What::Move { .. } | What::Oscillate { .. } | What::Removed)
     }

@@ -71,13 +71,10 @@ fn keys_of(text: &mut String, title: &str, about: &str, keys: &[Key]) {
     text.push('\n');
 }
 
-/// Command that generates the page.
-pub const COMMAND: &str = "cargo xtask docs";
-
 /// Returns the reference page, `docs/scenes.md`.
 pub fn page() -> String {
     let mut page = format!(
-        "# Scenes\n\nGenerated from `host-tests/sim/src` by `{COMMAND}`: do not edit.\n\n{}\n",
+        "# Scenes\n\nGenerated from `host-tests/sim/src` by `cargo xtask docs`: do not edit.\n\n{}\n",
         include_str!("explain/scenes.md").trim().replace("{wall}", include_str!("../scenes/wall.toml"))
     );
     library_of(&mut page);

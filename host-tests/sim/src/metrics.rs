@@ -24,6 +24,8 @@ pub struct Metric {
     /// Name, with its unit last.
     pub name: &'static str,
     pub about: &'static str,
+    /// Title of its group in a report, one of [`GROUPS`].
+    pub group: &'static str,
     /// Value that counts if a scene has several fingers.
     pub of_several: Worst,
     /// Value for a finger; none if the run has none.
@@ -136,6 +138,12 @@ impl Measured {
         let of = |name: &str| self.0.iter().find(|(known, _)| known == name).map(|(_, value)| *value);
         of(name).or_else(|| of(name.strip_prefix("finger0.")?)).flatten()
     }
+
+    /// Returns all results for scripts, `null` for a missing one.
+    #[cfg(feature = "files")]
+    pub fn json(&self) -> serde_json::Map<String, serde_json::Value> {
+        self.0.iter().map(|(name, value)| (name.clone(), (*value).into())).collect()
+    }
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -174,11 +182,12 @@ pub fn shown(value: Option<f64>) -> String {
 
 const fn metric(
     name: &'static str,
+    group: &'static str,
     of_several: Worst,
     about: &'static str,
     value: fn(&Finger) -> Option<f64>,
 ) -> Metric {
-    Metric { name, about, of_several, value }
+    Metric { name, about, group, of_several, value }
 }
 
 /// Share of the time in which a limit held the controller back, percent.
@@ -195,58 +204,67 @@ fn largest(values: &[AtGoal]) -> Option<f64> {
     values.iter().map(|at| at.value).reduce(f64::max)
 }
 
+const FORCE: &str = "Force";
+const MOTION: &str = "Motion and touch";
+const FAULTS: &str = "Faults and limits";
+const SENSING: &str = "Sensing";
+const OBJECT: &str = "Slip and object";
+const MOTOR: &str = "Motor and energy";
+/// Groups of metrics, in the order of a report.
+pub const GROUPS: [&str; 6] = [FORCE, MOTION, FAULTS, SENSING, OBJECT, MOTOR];
+
 /// Every metric, in the order of the output.
 #[rustfmt::skip]
 pub const METRICS: &[Metric] = &[
-    metric("peak_force_n", Largest, "largest true normal force", |f| Some(f.peak_n)),
-    metric("overshoot_percent", Largest, "largest true force beyond the goal, as a share of the goal or of the step to it, whichever is smaller", |f| f.worst(|r| Some(r.beyond_n / r.unit_n())).map(|share| 100.0 * share)),
-    metric("rise_ms", Largest, "time from 10 % to 90 % of the step; none if a goal is not reached", |f| f.worst(Response::rise_s).map(|s| 1e3 * s)),
-    metric("settling_ms", Largest, "time from the goal's change or the touch until the true force stays within 2 % of the goal or of the step, whichever is smaller; none if a goal never settles", |f| f.worst(Response::settled_s).map(|s| 1e3 * s)),
-    metric("steady_error_max_mn", Largest, "largest error of the true force from 100 ms after the goal's change or the touch", |f| f.steady_error_n().map(|[n, _]| 1e3 * n)),
-    metric("steady_error_rms_mn", Largest, "root mean square of that error", |f| f.steady_error_n().map(|[_, n]| 1e3 * n)),
-    metric("touch_ms", Largest, "time of the first contact", |f| f.touch_s.map(|s| 1e3 * s)),
-    metric("approach_mm_per_s", Largest, "mean speed in the last 10 ms before the first contact", |f| f.approach_mm_per_s),
-    metric("travel_max_mm", Largest, "largest travel of the tip", |f| Some(f.travel_max_mm)),
-    metric("travel_min_mm", Least, "least travel of the tip; negative behind its start", |f| Some(f.conduct.travel_min_mm)),
-    metric("indentation_max_mm", Largest, "largest indentation of the tip", |f| Some(f.indentation_max_mm)),
-    metric("faults_count", Sum, "faults that stopped the motor, except during a defect and for a second after it", |f| Some(f64::from(f.faults))),
-    metric("fault_number", FirstFault, "number of the first fault; 0 if none", |f| Some(f.first_fault.map_or(0.0, |(fault, _)| f64::from(fault as u8)))),
-    metric("fault_ms", FirstFault, "time of the first fault", |f| f.first_fault.map(|(_, s)| 1e3 * s)),
-    metric("limit_voltage_percent", Largest, "share of the time at the limit of voltage or supply", |f| limited(f, Limits::VOLTAGE)),
-    metric("limit_current_percent", Largest, "share of the time at the current limit", |f| limited(f, Limits::CURRENT)),
-    metric("limit_speed_percent", Largest, "share of the time at the speed limit", |f| limited(f, Limits::SPEED)),
-    metric("limit_goal_percent", Largest, "share of the time in which the goal was changed to the largest or the least force", |f| limited(f, Limits::GOAL)),
-    metric("limit_travel_percent", Largest, "share of the time at an end of the travel", |f| limited(f, Limits::TRAVEL)),
-    metric("limit_taxels_percent", Largest, "share of the time with taxels left out", |f| limited(f, Limits::TAXELS)),
-    metric("limit_slew_percent", Largest, "share of the time at the slew limit", |f| limited(f, Limits::SLEW)),
-    metric("missed_frames_count", Sum, "frames that the controller missed", |f| Some(f64::from(f.missed))),
-    metric("duty_rms_percent", Largest, "root mean square of the duty", |f| f.duty.rms().map(|share| 100.0 * share)),
-    metric("force_error_max_mn", Largest, "largest error of the measured force", |f| Some(1e3 * f.force_error_n.max)),
-    metric("force_error_rms_mn", Largest, "root mean square of that error over the whole run", |f| f.force_error_n.rms().map(|n| 1e3 * n)),
-    metric("centre_error_max_mm", Largest, "largest error of the measured centre, above 0.1 N", |f| f.centre_error_mm),
-    metric("confidence_min_percent", Least, "least confidence from 100 ms after the goal's change or the touch", |f| f.confidence_min.map(|c| f64::from(c) / 2.55)),
-    metric("slip_mm", Largest, "distance that the contact slipped", |f| Some(f.slip_mm)),
-    metric("slips_count", Sum, "slips of more than 1 um; a slip is over when the contact has stuck for 10 ms", |f| Some(f64::from(f.slips.count))),
-    metric("slips_unnoticed_count", Sum, "slips that were over before the goal rose", |f| Some(f64::from(f.slips.unnoticed()))),
-    metric("slip_noticed_ms", Largest, "longest time from the onset of a slip to a higher goal", |f| f.slips.noticed_after_s.map(|s| 1e3 * s)),
-    metric("object_lift_mm", Least, "height of the object at the end above its start", |f| Some(f.object_lift_mm)),
-    metric("object_fall_mm", Largest, "largest fall of the object below its highest place before", |f| Some(f.object_fall_mm)),
-    metric("object_dropped", Largest, "1 if the object fell more than 5 mm", |f| Some(f64::from(f.object_fall_mm > DROPPED_MM))),
-    metric("object_broken", Largest, "1 if the object broke", |f| Some(f64::from(f.broken))),
-    metric("energy_j", Sum, "energy that the bridge took from the supply, less the energy that it returned", |f| Some(f.energy_j)),
-    metric("current_rms_a", Largest, "root mean square of the winding's current", |f| f.current_a.rms()),
-    metric("current_max_a", Largest, "largest current in the winding", |f| Some(f.current_a.max)),
-    metric("winding_max_c", Largest, "highest temperature of the winding", |f| f.winding_max_c),
-    metric("runaway_mm", Largest, "largest distance of the tip beyond the end of the travel, or behind the first touch less the largest indentation and the clearance (before a touch: behind the start less the clearance)", |f| Some(f.conduct.runaway_mm)),
-    metric("air_speed_percent", Largest, "largest speed in the air, as a share of the approach speed, from 20 ms after a contact ended", |f| Some(100.0 * f.conduct.air_share())),
-    metric("over_force_mn", Largest, "largest true force beyond the goal. A reduced goal counts for 200 ms more, and during a fault or torque off. A push of the object on a finger without torque does not count", |f| largest(&f.conduct.over_force_mn).or(Some(0.0))),
-    metric("over_force_defective_mn", Largest, "the same during a defect and for a second after it, which `over_force_mn` leaves out", |f| largest(&f.conduct.over_force_defective_mn).or(Some(0.0))),
-    metric("stop_force_mn", Largest, "largest true force from 0.5 s after a stop (goal 0 or torque off) until the stop ends, a fault occurs, or the object comes nearer or is put back; with torque off, less the force that dry friction and gear hold", |f| Some(1e3 * f.conduct.stop_force_n)),
-    metric("rest_travel_um", Largest, "range of the travel at the end of a goal of 0", |f| f.conduct.ended().rest_mm.map(|mm| 1e3 * mm).or(unjudged(f))),
-    metric("rest_duty_percent", Largest, "deviation of the duty at the end of any goal, also 0", |f| f.conduct.ended().duty.map(|share| 100.0 * share).or(unjudged(f))),
-    metric("hold_swing_mn", Largest, "range of the true force at the end of a goal", |f| largest(&f.conduct.ended().swings_mn()).or(unjudged(f))),
-    metric("hold_error_mn", Largest, "error of the mean true force at the end of a goal, without goals that a fault ended", |f| largest(&f.conduct.ended().errors_mn()).or(f.first_fault.map(|_| 0.0)).or(unjudged(f))),
-    metric("touches_missed_count", Sum, "goals without a fault at whose end nothing was touched", |f| Some(f.conduct.ended().missed() as f64)),
+    metric("peak_force_n", FORCE, Largest, "largest true normal force", |f| Some(f.peak_n)),
+    metric("overshoot_percent", FORCE, Largest, "largest true force beyond the goal, as a share of the goal or of the step to it, whichever is smaller", |f| f.worst(|r| Some(r.beyond_n / r.unit_n())).map(|share| 100.0 * share)),
+    metric("rise_ms", FORCE, Largest, "time from 10 % to 90 % of the step; none if a goal is not reached", |f| f.worst(Response::rise_s).map(|s| 1e3 * s)),
+    metric("settling_ms", FORCE, Largest, "time from the goal's change or the touch until the true force stays within 2 % of the goal or of the step, whichever is smaller; none if a goal never settles", |f| f.worst(Response::settled_s).map(|s| 1e3 * s)),
+    metric("steady_error_max_mn", FORCE, Largest, "largest error of the true force from 100 ms after the goal's change or the touch", |f| f.steady_error_n().map(|[n, _]| 1e3 * n)),
+    metric("steady_error_rms_mn", FORCE, Largest, "root mean square of that error", |f| f.steady_error_n().map(|[_, n]| 1e3 * n)),
+    metric("touch_ms", MOTION, Largest, "time of the first contact", |f| f.touch_s.map(|s| 1e3 * s)),
+    metric("approach_mm_per_s", MOTION, Largest, "mean speed in the last 10 ms before the first contact", |f| f.approach_mm_per_s),
+    metric("travel_max_mm", MOTION, Largest, "largest travel of the tip", |f| Some(f.travel_max_mm)),
+    metric("travel_min_mm", MOTION, Least, "least travel of the tip; negative behind its start", |f| Some(f.conduct.travel_min_mm)),
+    metric("indentation_max_mm", MOTION, Largest, "largest indentation of the tip", |f| Some(f.indentation_max_mm)),
+    metric("faults_count", FAULTS, Sum, "faults that stopped the motor, except during a defect and for a second after it", |f| Some(f64::from(f.faults))),
+    metric("fault_number", FAULTS, FirstFault, "number of the first fault; 0 if none", |f| Some(f.first_fault.map_or(0.0, |(fault, _)| f64::from(fault as u8)))),
+    metric("fault_ms", FAULTS, FirstFault, "time of the first fault", |f| f.first_fault.map(|(_, s)| 1e3 * s)),
+    metric("limit_voltage_percent", FAULTS, Largest, "share of the time at the limit of voltage or supply", |f| limited(f, Limits::VOLTAGE)),
+    metric("limit_current_percent", FAULTS, Largest, "share of the time at the current limit", |f| limited(f, Limits::CURRENT)),
+    metric("limit_speed_percent", FAULTS, Largest, "share of the time at the speed limit", |f| limited(f, Limits::SPEED)),
+    metric("limit_goal_percent", FAULTS, Largest, "share of the time in which the goal was changed to the largest or the least force", |f| limited(f, Limits::GOAL)),
+    metric("limit_travel_percent", FAULTS, Largest, "share of the time at an end of the travel", |f| limited(f, Limits::TRAVEL)),
+    metric("limit_taxels_percent", FAULTS, Largest, "share of the time with taxels left out", |f| limited(f, Limits::TAXELS)),
+    metric("limit_slew_percent", FAULTS, Largest, "share of the time at the slew limit", |f| limited(f, Limits::SLEW)),
+    metric("missed_frames_count", FAULTS, Sum, "frames that the controller missed", |f| Some(f64::from(f.missed))),
+    metric("duty_rms_percent", MOTOR, Largest, "root mean square of the duty", |f| f.duty.rms().map(|share| 100.0 * share)),
+    metric("force_error_max_mn", SENSING, Largest, "largest error of the measured force", |f| Some(1e3 * f.force_error_n.max)),
+    metric("force_error_rms_mn", SENSING, Largest, "root mean square of that error over the whole run", |f| f.force_error_n.rms().map(|n| 1e3 * n)),
+    metric("centre_error_max_mm", SENSING, Largest, "largest error of the measured centre, above 0.1 N", |f| f.centre_error_mm),
+    metric("confidence_min_percent", SENSING, Least, "least confidence from 100 ms after the goal's change or the touch", |f| f.confidence_min.map(|c| f64::from(c) / 2.55)),
+    metric("slip_mm", OBJECT, Largest, "distance that the contact slipped", |f| Some(f.slip_mm)),
+    metric("slips_count", OBJECT, Sum, "slips of more than 1 um; a slip is over when the contact has stuck for 10 ms", |f| Some(f64::from(f.slips.count))),
+    metric("slips_unnoticed_count", OBJECT, Sum, "slips that were over before the goal rose", |f| Some(f64::from(f.slips.unnoticed()))),
+    metric("slip_noticed_ms", OBJECT, Largest, "longest time from the onset of a slip to a higher goal", |f| f.slips.noticed_after_s.map(|s| 1e3 * s)),
+    metric("object_lift_mm", OBJECT, Least, "height of the object at the end above its start", |f| Some(f.object_lift_mm)),
+    metric("object_fall_mm", OBJECT, Largest, "largest fall of the object below its highest place before", |f| Some(f.object_fall_mm)),
+    metric("object_dropped", OBJECT, Largest, "1 if the object fell more than 5 mm", |f| Some(f64::from(f.object_fall_mm > DROPPED_MM))),
+    metric("object_broken", OBJECT, Largest, "1 if the object broke", |f| Some(f64::from(f.broken))),
+    metric("energy_j", MOTOR, Sum, "energy that the bridge took from the supply, less the energy that it returned", |f| Some(f.energy_j)),
+    metric("current_rms_a", MOTOR, Largest, "root mean square of the winding's current", |f| f.current_a.rms()),
+    metric("current_max_a", MOTOR, Largest, "largest current in the winding", |f| Some(f.current_a.max)),
+    metric("winding_max_c", MOTOR, Largest, "highest temperature of the winding", |f| f.winding_max_c),
+    metric("runaway_mm", MOTION, Largest, "largest distance of the tip beyond the end of the travel, or behind the first touch less the largest indentation and the clearance (before a touch: behind the start less the clearance)", |f| Some(f.conduct.runaway_mm)),
+    metric("air_speed_percent", MOTION, Largest, "largest speed in the air, as a share of the approach speed, from 20 ms after a contact ended", |f| Some(100.0 * f.conduct.air_share())),
+    metric("over_force_mn", FORCE, Largest, "largest true force beyond the goal. A reduced goal counts for 200 ms more, and during a fault or torque off. A push of the object on a finger without torque does not count", |f| largest(&f.conduct.over_force_mn).or(Some(0.0))),
+    metric("over_force_defective_mn", FORCE, Largest, "the same during a defect and for a second after it, which `over_force_mn` leaves out", |f| largest(&f.conduct.over_force_defective_mn).or(Some(0.0))),
+    metric("stop_force_mn", FORCE, Largest, "largest true force from 0.5 s after a stop (goal 0 or torque off) until the stop ends, a fault occurs, or the object comes nearer or is put back; with torque off, less the force that dry friction and gear hold", |f| Some(1e3 * f.conduct.stop_force_n)),
+    metric("rest_travel_um", MOTION, Largest, "range of the travel at the end of a goal of 0", |f| f.conduct.ended().rest_mm.map(|mm| 1e3 * mm).or(unjudged(f))),
+    metric("rest_duty_percent", MOTOR, Largest, "deviation of the duty at the end of any goal, also 0", |f| f.conduct.ended().duty.map(|share| 100.0 * share).or(unjudged(f))),
+    metric("hold_swing_mn", FORCE, Largest, "range of the true force at the end of a goal", |f| largest(&f.conduct.ended().swings_mn()).or(unjudged(f))),
+    metric("hold_error_mn", FORCE, Largest, "error of the mean true force at the end of a goal, without goals that a fault ended", |f| largest(&f.conduct.ended().errors_mn()).or(f.first_fault.map(|_| 0.0)).or(unjudged(f))),
+    metric("touches_missed_count", MOTION, Sum, "goals without a fault at whose end nothing was touched", |f| Some(f.conduct.ended().missed() as f64)),
 ];
 
 /// Name of a metric that has a value for each goal, and these values.

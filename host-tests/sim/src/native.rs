@@ -46,12 +46,7 @@ pub fn board(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, RunError> 
 
 /// Runs a scene with the effects that it names.
 pub fn simulate(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, SimError> {
-    simulate_with::<Named>(scene, watch)
-}
-
-/// Runs a scene with a set of effects: `()` has none compiled in, whatever the scene names.
-pub fn simulate_with<E: Set>(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, SimError> {
-    simulate_from::<E>(scene, Begun::default(), watch)
+    simulate_from(scene, Begun::default(), watch)
 }
 
 /// Runs a scene as [`simulate`], with gains of the taxels of the first finger, Q14.
@@ -76,9 +71,9 @@ pub struct Begun {
 }
 
 /// Runs a scene from another time on.
-pub fn simulate_from<E: Set>(scene: &Scene, begun: Begun, watch: &mut dyn Watch) -> Result<Summary, SimError> {
+pub fn simulate_from(scene: &Scene, begun: Begun, watch: &mut dyn Watch) -> Result<Summary, SimError> {
     let started = Instant::now();
-    Board::<E>::new(scene, begun)?.whole(scene, started, watch)
+    Board::<Named>::new(scene, begun)?.whole(scene, started, watch)
 }
 
 /// Controller of a finger, and everything between it and the world.

@@ -7,7 +7,7 @@ pub use crate::setup::Setup;
 
 use crate::effects::drive::{self, Circuit, Friction};
 use crate::effects::sensor::{self, Readout, Settling};
-use crate::effects::{Parts, Set, contact};
+use crate::effects::{Parts, Set, contact, link};
 use crate::mechanics::rotor::Shaft;
 use crate::mechanics::{Bridge, Finger, decay};
 use crate::scene::Scene;
@@ -113,22 +113,6 @@ impl Plant {
         self.world.row_kpa(0, f64::INFINITY, row)[column]
     }
 
-    /// Voltages of all columns at a time after the driven rows changed from `previous`, where they had settled.
-    pub fn settling_volts(
-        &mut self,
-        driven: &[bool; ROWS],
-        since_edge_s: f64,
-        previous: &[bool; ROWS],
-    ) -> [f64; COLUMNS] {
-        let left = decay(since_edge_s / self.setup().array.settle_tau_s);
-        let end = self.settled_volts(driven);
-        if left == 0.0 || driven == previous {
-            return end;
-        }
-        let start = self.settled_volts(previous);
-        core::array::from_fn(|column| end[column] + left * (start[column] - end[column]))
-    }
-
     /// Settled voltages of all columns while these rows are driven.
     pub fn settled_volts(&mut self, driven: &[bool; ROWS]) -> [f64; COLUMNS] {
         let (array, faults) = (self.setup().array, self.faults.array);
@@ -157,8 +141,9 @@ impl Plant {
     /// Codes of a slot, sampled [`crate::setup::Array::sample_after_s`] after its edge.
     pub fn slot_codes(&mut self, slot: usize) -> [u16; COLUMNS] {
         let array = self.setup().array;
-        let previous = driven_in((slot + SLOTS - 1) % SLOTS);
-        self.settling_volts(&driven_in(slot), array.sample_after_s, &previous).map(|volts| array.code(volts))
+        let [before, end] = [(slot + SLOTS - 1) % SLOTS, slot].map(|slot| self.settled_volts(&driven_in(slot)));
+        let left = decay(array.sample_after_s / array.settle_tau_s);
+        core::array::from_fn(|column| array.code(end[column] + left * (before[column] - end[column])))
     }
 }
 
@@ -241,7 +226,8 @@ pub struct Reference;
 
 impl Reference {
     pub fn parts(setup: &Setup) -> Parts<Self> {
-        Parts::new(Sensor::new(&setup.array), Drive::new(setup))
+        let (contact, link) = (contact::Named::default(), link::Named::default());
+        Parts { sensor: Sensor::new(&setup.array), contact, drive: Drive::new(setup), link }
     }
 }
 

@@ -125,19 +125,16 @@ impl Population {
             for event in 0..count {
                 let name = |key: &str| format!("events.{event}.{key}");
                 let kind = one(&name("kind"), &events.kind);
-                let draws = events.keys.iter().filter(|(of, _)| Drawn::Word((*of).into()) == kind);
-                let at_s = one(&name("at_s"), &events.at_s);
-                let mut event =
-                    format!("\n[[event]]\nkind = {}\nat_s = {}\n", written(&kind, false), written(&at_s, false));
-                drawn.push((name("kind"), kind.clone()));
-                drawn.push((name("at_s"), at_s.clone()));
-                for (_, place) in draws {
+                let at_s = one(&name("at_s"), &events.at_s).number().unwrap_or_default();
+                let own = events.keys.iter().filter(|(of, _)| Drawn::Word((*of).into()) == kind);
+                let mut event = String::from("\n[[event]]\n");
+                for place in [&events.kind, &events.at_s].into_iter().chain(own.map(|(_, place)| place)) {
                     let key = place.key.rsplit('.').next().unwrap_or_default();
                     let value = one(&name(key), place);
                     event += &format!("{key} = {}\n", written(&value, place.whole));
                     drawn.push((name(key), value));
                 }
-                all.push((at_s.number().unwrap_or_default(), event));
+                all.push((at_s, event));
             }
             all.sort_by(|(a_s, _), (b_s, _)| a_s.total_cmp(b_s));
             text.extend(all.into_iter().map(|(_, event)| event));
@@ -175,13 +172,13 @@ fn go_on(
     let done: BTreeSet<usize> = fingers.iter().map(|ran| ran.finger).collect();
     let numbers: Vec<usize> = numbers.filter(|number| !done.contains(&(number + 1))).collect();
     let progress = progress(numbers.len() + done.len(), "fingers")?.with_position(done.len() as u64);
-    let work = |number: &usize| {
+    let work = |number: usize| {
         let told = |error: RunError| format!("{}: finger {} of seed {seed}: {error}", population.file, number + 1);
-        let finger = population.finger(seed, *number).map_err(|errors| told(errors.into()))?;
+        let finger = population.finger(seed, number).map_err(|errors| told(errors.into()))?;
         let outcome = run(&finger.scene, board, &mut []).map_err(told)?;
-        Ok(Ran::new(*number, &finger, &outcome))
+        Ok::<_, RunError>(Ran::new(number, &finger, &outcome))
     };
-    cores::each(&numbers, work, |_, ran| {
+    cores::each(numbers, work, |ran| {
         progress.inc(1);
         keep(&ran)?;
         fingers.push(ran);
@@ -315,11 +312,8 @@ fn population(args: &Args, board: Run) -> Result<bool, RunError> {
     let started = Instant::now();
     let population = load(args.population.as_deref().unwrap_or_default())?;
     let shard = args.shard.unwrap_or(Shard::WHOLE);
-    let board_name = match args.board {
-        Board::Native => "native",
-        Board::Calibrated => "calibrated",
-        Board::Virtual => "virtual",
-    };
+    let board_name = args.board.to_possible_value().expect("no board is hidden");
+    let board_name = board_name.get_name();
     let all = args.fingers as usize;
     let numbers = (0..all).filter(|number| shard.has(*number));
     // For a regular file the progress is kept in a file next to it. Terminals and pipes get everything at the end.

@@ -6,13 +6,13 @@ mod trace;
 pub use crate::report::plots::around;
 pub use crate::report::trace::{Instant, Kept, Trace, Track, Tracks};
 
-use crate::metrics::{METRICS, Metric, Verdict, shown};
+use crate::metrics::{GROUPS, METRICS, Metric, Verdict, shown};
 use crate::report::plots::{Line, Plot, Style};
 use crate::run::{Outcome, RunError, Without, asked, difference, differences, ledger_rows};
 use crate::scene::Scene;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use output::plot::PlotError;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
 
@@ -285,45 +285,24 @@ fn ablation(report: &Report) -> Markup {
     }
 }
 
-/// Title of a group, and the first letters of the names of its metrics.
-const GROUPS: [(&str, &[&str]); 6] = [
-    ("Force", &["peak_force", "overshoot", "rise", "settling", "steady_error", "over_force", "stop_force", "hold_"]),
-    ("Motion and touch", &["touch", "approach", "travel", "indentation", "runaway", "air_speed", "rest_travel"]),
-    ("Faults and limits", &["fault", "limit_", "missed_frames"]),
-    ("Sensing", &["force_error", "centre_error", "confidence"]),
-    ("Slip and object", &["slip", "object_"]),
-    ("Motor and energy", &["duty", "rest_duty", "energy", "current", "winding"]),
-];
-const REST: &str = "More";
-
 struct Group {
-    pub title: &'static str,
-    pub metrics: Vec<&'static Metric>,
-    pub broken: usize,
+    title: &'static str,
+    metrics: Vec<&'static Metric>,
+    broken: usize,
 }
 
 /// Returns all metrics. Groups with a broken bound are first.
-fn groups(verdicts: &[Verdict]) -> Vec<Group> {
-    let titles = GROUPS.iter().map(|(title, _)| *title).chain([REST]);
+fn groups(verdicts: &[Verdict]) -> [Group; GROUPS.len()] {
+    // A verdict may name the metric of one finger.
+    let is_of = |verdict: &Verdict, metric: &Metric| verdict.bound.metric.rsplit('.').next() == Some(metric.name);
     let group = |title| {
-        let metrics: Vec<&Metric> = METRICS.iter().filter(|metric| title_of(metric.name) == title).collect();
-        let of_it = |verdict: &&Verdict| title_of(short(&verdict.bound.metric)) == title;
-        let broken = verdicts.iter().filter(of_it).filter(|verdict| !verdict.held).count();
-        Group { title, metrics, broken }
+        let metrics: Vec<&Metric> = METRICS.iter().filter(|metric| metric.group == title).collect();
+        let is_broken = |verdict: &&Verdict| !verdict.held && metrics.iter().any(|metric| is_of(verdict, metric));
+        Group { title, broken: verdicts.iter().filter(is_broken).count(), metrics }
     };
-    let mut groups: Vec<Group> = titles.map(group).filter(|group| !group.metrics.is_empty()).collect();
+    let mut groups = GROUPS.map(group);
     groups.sort_by_key(|group| group.broken == 0);
     groups
-}
-
-fn title_of(metric: &str) -> &'static str {
-    let of = |(_, begins): &&(&str, &[&str])| begins.iter().any(|begin| metric.starts_with(begin));
-    GROUPS.iter().find(of).map_or(REST, |(title, _)| title)
-}
-
-/// Name of a metric without its finger.
-fn short(metric: &str) -> &str {
-    metric.split_once('.').map_or(metric, |(_, name)| name)
 }
 
 /// Version of the format of the data. Another version is refused.
@@ -333,15 +312,13 @@ pub const BEGIN: &str = "<script type=\"application/json\" id=\"run\">";
 const END: &str = "</script>";
 
 pub fn data(report: &Report) -> Value {
-    let metrics: Map<String, Value> =
-        report.outcome.measured.0.iter().map(|(name, value)| (name.clone(), json!(value))).collect();
     json!({
         "format": FORMAT,
         "scene": report.scene.name,
         "seed": report.scene.seed,
         "board": report.board,
         "digest": report.outcome.summary.digest,
-        "metrics": metrics,
+        "metrics": report.outcome.measured.json(),
         "fingers": report.trace.fingers.iter().map(finger_data).collect::<Vec<_>>(),
     })
 }

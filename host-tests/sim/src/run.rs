@@ -1,10 +1,12 @@
 //! Run of a scene with its watchers, its results, and the cost and benefit of each effect.
 
 use crate::metrics::{Hold, Measured, Meter, Verdict, shown};
+#[cfg(feature = "files")]
+use crate::population::report::Promise;
 use crate::scene::Scene;
 use crate::watch::{Controller, Cost, Step, Summary, Watch};
 #[cfg(feature = "files")]
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use std::error::Error;
 use std::fmt::Write as _;
 
@@ -39,18 +41,8 @@ impl Outcome {
     /// Returns the result for scripts. The keys are stable; `null` is a missing value, or a side without a bound.
     #[cfg(feature = "files")]
     pub fn json(&self, scene: &Scene, board: &str, ablated: &[Without]) -> Value {
-        let values = |measured: &Measured| -> Map<String, Value> {
-            measured.0.iter().map(|(name, value)| (name.clone(), json!(value))).collect()
-        };
         let ablated =
-            ablated.iter().map(|without| json!({ "effect": without.effect, "metrics": values(&without.measured) }));
-
-        let bound = |verdict: &Verdict| {
-            let bound = &verdict.bound;
-            json!({
-                "metric": bound.metric, "min": bound.min, "max": verdict.max, "value": verdict.value, "held": verdict.held,
-            })
-        };
+            ablated.iter().map(|without| json!({ "effect": without.effect, "metrics": without.measured.json() }));
         json!({
             "scene": scene.name,
             "about": scene.about,
@@ -62,8 +54,8 @@ impl Outcome {
             "wall_s": self.summary.wall_s,
             "digest": self.summary.digest,
             "passed": self.passed(),
-            "metrics": values(&self.measured),
-            "bounds": self.verdicts.iter().map(bound).collect::<Vec<_>>(),
+            "metrics": self.measured.json(),
+            "bounds": self.verdicts.iter().map(Promise::of).collect::<Vec<_>>(),
             "ledger": ledger_json(&self.summary),
             "without": ablated.collect::<Vec<_>>(),
         })

@@ -54,8 +54,7 @@ impl Scene {
         setup.wall.distance_mm = object.number("distance_mm");
         setup.wall.centre_x_mm = object.number("centre_x_mm");
         setup.wall.centre_y_mm = object.number("centre_y_mm");
-        let siemens_per_code =
-            setup.array.reference_v / (setup.array.feedback_ohm * setup.array.drive_v * Array::CODES);
+        let siemens_per_code = setup.array.siemens_per_code();
         setup.array.pitch_mm = array.number("pitch_mm");
         setup.array.preload_siemens = array.number("preload_codes") * siemens_per_code;
         setup.array.siemens_per_kpa = array.number("gain_codes_per_kpa") * siemens_per_code;
@@ -82,10 +81,7 @@ impl Scene {
             let named = self.effects.iter().find(|named| named.effect.name == name);
             named.map_or(0.0, |named| named.values.number(key))
         };
-        let siemens_per_code = {
-            let array = Array::default();
-            array.reference_v / (array.feedback_ohm * array.drive_v * Array::CODES)
-        };
+        let siemens_per_code = Array::default().siemens_per_code();
         let known = Params {
             tip_radius_um: whole(tip.number("radius_mm") * 1e3),
             modulus_pa: whole(tip.number("modulus_kpa") * 1e3),

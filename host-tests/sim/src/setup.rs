@@ -87,6 +87,11 @@ impl Array {
         2.0 * line / (1.0 + (1.0 + 4.0 * self.growth * line / range).sqrt())
     }
 
+    /// Conductance of a code.
+    pub fn siemens_per_code(&self) -> f64 {
+        self.reference_v / (self.feedback_ohm * self.drive_v * Self::CODES)
+    }
+
     /// Returns the code of a voltage, rounded down, as a successive-approximation converter does.
     pub fn code(&self, volts: f64) -> u16 {
         (volts / self.reference_v * Self::CODES).floor().clamp(0.0, Self::CODES - 1.0) as u16

@@ -9,6 +9,7 @@ mod summary;
 pub use summary::Table;
 
 use crate::effects::{self, NamedEffect, draws};
+use crate::events::Event;
 use crate::metrics::METRICS;
 use crate::part::{self, cannot_write, make_folder};
 use crate::run::{Run, RunError, run};
@@ -53,7 +54,7 @@ pub fn sweep(plan: &Plan, board: Run) -> Result<(Table, PathBuf), RunError> {
     if seeds > 1 && !points.iter().any(|(_, scene)| is_random(scene)) {
         let drawing: Vec<&str> = effects::all().filter(|effect| draws(effect)).map(|effect| effect.name).collect();
         return Err(format!(
-            "nothing in {} is random: all {seeds} seeds would give the same run. Leave --seeds out, or name an effect that draws: {}",
+            "nothing in {} is random: all {seeds} seeds would give the same run. Leave --seeds out, name the event `interference`, or an effect that draws: {}",
             first.name,
             drawing.join(", ")
         )
@@ -62,21 +63,22 @@ pub fn sweep(plan: &Plan, board: Run) -> Result<(Table, PathBuf), RunError> {
     let head = head(plan, first, all);
     let out = plan.out.clone().unwrap_or_else(|| Path::new(FOLDER).join(&head.id));
     let mut rows = Rows::open(plan, &out, head)?;
-    say::aside(match rows.count() {
+    say::aside(match rows.rows.len() {
         0 => format!("the runs go to {}", out.display()),
         count => format!("goes on in {}, where {count} runs are done", out.display()),
     });
-    let tasks: Vec<usize> = (0..all).filter(|run| plan.shard.has(*run) && !rows.has(run + 1)).collect();
-    let progress = progress(tasks.len() + rows.count(), "runs")?.with_position(rows.count() as u64);
-    let work = |run: &usize| {
+    let tasks: Vec<usize> =
+        (0..all).filter(|run| plan.shard.has(*run) && !rows.rows.contains_key(&(run + 1))).collect();
+    let progress = progress(tasks.len() + rows.rows.len(), "runs")?.with_position(rows.rows.len() as u64);
+    let work = |run: usize| {
         let (values, scene) = &points[run / seeds];
-        row(run + 1, values, Scene { seed: scene.seed + (run % seeds) as u64, ..scene.clone() }, board)
+        let scene = Scene { seed: scene.seed + (run % seeds) as u64, ..scene.clone() };
+        Ok((run + 1, row(run + 1, values, scene, board)?))
     };
-    let done = |run: &usize, row| {
+    cores::each(tasks, work, |(number, row)| {
         progress.inc(1);
-        rows.add(run + 1, row)
-    };
-    cores::each(&tasks, work, done)?;
+        rows.add(number, row)
+    })?;
     progress.finish_and_clear();
     Ok((rows.finish(plan, &out)?, out))
 }
@@ -129,7 +131,7 @@ const VALUES: usize = 5;
 /// Most values: more are probably a typing error.
 const MOST_VALUES: usize = 100_000;
 
-impl std::str::FromStr for Vary {
+impl FromStr for Vary {
     type Err = String;
 
     /// Parses `table.key=lo..hi` or `table.key=lo..hi:n`. Between whole ends the values are whole if possible.
@@ -163,11 +165,12 @@ impl std::str::FromStr for Vary {
 
 /// True if another seed may give another run.
 fn is_random(scene: &Scene) -> bool {
-    scene.effects.iter().any(|NamedEffect { effect, values }| {
+    let effect_draws = |NamedEffect { effect, values }: &NamedEffect| {
         let idle = |keys: &[(&str, f64)]| keys.iter().all(|(key, zero)| values.number(key) == *zero);
         let zero = if effect.name == "tangential" { &[("spread_percent", 0.0)] } else { effect.zero };
         draws(effect) && (zero.is_empty() || !idle(zero))
-    })
+    };
+    scene.effects.iter().any(effect_draws) || scene.events.iter().any(Event::is_random)
 }
 
 /// Columns before the varied keys.
@@ -181,10 +184,10 @@ pub(super) const DIGEST: &str = "digest";
 pub(super) const EXPECT: &str = "expect ";
 
 /// Columns, and the values at the beginning and the end of every row.
-pub(super) struct Head {
+struct Head {
     columns: Vec<String>,
     /// Digest of the sweep, and the name of its folder without another one.
-    pub id: String,
+    id: String,
     runs: usize,
     expected: Vec<String>,
 }
@@ -202,15 +205,16 @@ fn head(plan: &Plan, scene: &Scene, runs: usize) -> Head {
 }
 
 /// Rows so far, also on disk, so that a sweep that is stopped can continue.
-pub(super) struct Rows {
+struct Rows {
     head: Head,
+    /// Rows by the number of their run, from 1.
     rows: BTreeMap<usize, Vec<String>>,
     part: part::Part,
 }
 
 impl Rows {
     /// Resumes from the rows of an earlier try of the same sweep.
-    pub fn open(plan: &Plan, out: &Path, head: Head) -> Result<Self, RunError> {
+    fn open(plan: &Plan, out: &Path, head: Head) -> Result<Self, RunError> {
         let file = out.join(runs_name(plan));
         let name = format!("the sweep {} of {} runs", head.id, head.runs);
         refuse_others(&file, &head.id)?;
@@ -229,16 +233,7 @@ impl Rows {
         Ok(Self { rows, part, head })
     }
 
-    /// True if a run is done. Numbers count from 1.
-    pub fn has(&self, number: usize) -> bool {
-        self.rows.contains_key(&number)
-    }
-
-    pub fn count(&self) -> usize {
-        self.rows.len()
-    }
-
-    pub fn add(&mut self, number: usize, values: Vec<String>) -> Result<(), RunError> {
+    fn add(&mut self, number: usize, values: Vec<String>) -> Result<(), RunError> {
         let Head { id, runs, expected, .. } = &self.head;
         let first = [id.clone(), number.to_string(), runs.to_string()];
         let row: Vec<String> = first.into_iter().chain(values).chain(expected.iter().cloned()).collect();
@@ -249,7 +244,7 @@ impl Rows {
     }
 
     /// Writes the files and then removes the rows so far.
-    pub fn finish(self, plan: &Plan, out: &Path) -> Result<Table, RunError> {
+    fn finish(self, plan: &Plan, out: &Path) -> Result<Table, RunError> {
         let table = Table { head: self.head.columns, rows: self.rows.into_values().collect() };
         self.part.write(table.csv()?)?;
         if plan.shard.is_whole() {
@@ -428,6 +423,23 @@ fn words(row: &csv::StringRecord) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn noise_and_interference_are_random() {
+        let interference = |for_s| format!("[[event]]\nat_s = 0.1\nkind = \"interference\"\nfor_s = {for_s}\n");
+        let silence = "[[event]]\nat_s = 0.1\nkind = \"host_silent\"\nfor_s = 0.2\n".to_owned();
+        let noise = |rms_codes| format!("[effects.noise]\nrms_codes = {rms_codes}\n");
+        for (table, random) in [
+            (interference("0.2"), true),
+            (interference("0"), false),
+            (silence, false),
+            (noise("1.5"), true),
+            (noise("0"), false),
+        ] {
+            let text = format!("about = \"a test\"\nduration_s = 1.0\n{table}");
+            assert_eq!(is_random(&crate::scene::read("test.toml", &text, &[]).unwrap()), random, "{table}");
+        }
+    }
 
     #[test]
     fn ranges_are_read() {

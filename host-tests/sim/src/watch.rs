@@ -1,5 +1,6 @@
 //! Values that a run shows to its watchers, one control step at a time; and the watcher that compares two boards.
 
+use crate::events::Event;
 use crate::scene::Scene;
 use fingertip::command::Command;
 use fingertip::frame::Sense;
@@ -201,7 +202,8 @@ pub struct Agreement {
 impl Agreement {
     /// Creates the watcher from the path of the first board.
     pub fn new(scene: &Scene, first: Path) -> Self {
-        let noisy = scene.effects.iter().any(|named| NOISE.contains(&named.effect.name));
+        let noise = scene.effects.iter().any(|named| NOISE.contains(&named.effect.name));
+        let noisy = noise || scene.events.iter().any(Event::is_random);
         Self { first, noisy, steps: 0, difference: [(0.0, 0.0); 2], beyond: [(0.0, 0.0); 2] }
     }
 

@@ -30,29 +30,30 @@ struct Args {
 fn main() -> ExitCode {
     let Args { quick, write, check } = Args::parse();
     let share = if quick { 1_000 } else { 1 };
-    let mut report = Report { started: Instant::now(), inputs: 0, broken: 0, sections: Vec::new() };
+    let started = Instant::now();
     let tip = reference_tip();
     let reach = |bits: i32| bits as u64 / share + 1;
 
-    report.section("Every input of the reference tip, a = 10 mm and Y = 250 kPa, judged by integers", |progress| {
-        let mut all = exact::depths(&tip, 1..reach(tip.depth_max().to_bits()), progress).to_vec();
-        all.extend(exact::forces(&tip, 0..reach(tip.force_max().to_bits()), progress));
-        all.extend(exact::radii(&tip, 0..reach(tip.contact_radius(tip.depth_max()).to_bits()), progress));
-        all.extend(exact::peaks(&tip, 0..reach(tip.peak_pressure(tip.depth_max()).to_bits()), progress));
-        all
-    });
-    report.section("A grid of the reference tip, pressures by integers", |progress| {
+    let inputs =
+        judged("Every input of the reference tip, a = 10 mm and Y = 250 kPa, judged by integers", |progress| {
+            let mut all = exact::depths(&tip, 1..reach(tip.depth_max().to_bits()), progress).to_vec();
+            all.extend(exact::forces(&tip, 0..reach(tip.force_max().to_bits()), progress));
+            all.extend(exact::radii(&tip, 0..reach(tip.contact_radius(tip.depth_max()).to_bits()), progress));
+            all.extend(exact::peaks(&tip, 0..reach(tip.peak_pressure(tip.depth_max()).to_bits()), progress));
+            all
+        });
+    let grid = judged("A grid of the reference tip, pressures by integers", |progress| {
         let mut all = exact::pressures(&tip, 4_000 / share, 2_500, progress).to_vec();
         all.extend(random::touching_angles(&tip, 1_000_000 / share, progress));
         all
     });
-    report.section("Boundaries and random points of the whole domain, also by integers", |progress| {
+    let points = judged("Boundaries and random points of the whole domain, also by integers", |progress| {
         let mut all = random::boundaries(progress);
         let points = random::points(0..10_000_000 / share, progress);
         all.iter_mut().zip(&points).for_each(|(all, points)| all.merge(points));
         all.to_vec()
     });
-    report.section("The rest of the model at random points", |progress| {
+    let rest = judged("The rest of the model at random points", |progress| {
         let points = 0..200_000 / share;
         let mut all = reference::geometry(points.clone(), progress).to_vec();
         all.extend(reference::tilt(points.clone(), progress));
@@ -65,53 +66,30 @@ fn main() -> ExitCode {
         let reference::LongRun { steps, low, high } = reference::long_run(&pattern, paper::PERIODS_MAX / share as u32);
         println!("  {name}: repeats itself from step {steps} on, between {low} and {high} N");
     }
-    match reference::check() {
-        Ok(tallies) => {
-            report.judged("The points of `host-tests/oracle/park2003.csv`", |_| tallies.to_vec());
-        }
+    let sections = [inputs, grid, points, rest];
+    let (oracle, unread) = match reference::check() {
+        Ok(tallies) => (judged("The points of `host-tests/oracle/park2003.csv`", |_| tallies.to_vec()).1, 0),
         Err(error) => {
             eprintln!("{}: {error}", reference::path().display());
-            report.broken += 1;
+            (Vec::new(), 1)
         }
+    };
+    let all = || sections.iter().flat_map(|(_, tallies)| tallies).chain(&oracle);
+    let judged: u64 = all().map(|tally| tally.inputs).sum();
+    let broken = all().filter(|tally| !tally.holds()).count() + unread;
+    println!("{judged} results judged in {} s; {broken} bounds broken", started.elapsed().as_secs());
+    if broken > 0 {
+        return ExitCode::FAILURE;
     }
-    report.end((write || check).then_some(check))
+    ended(if write || check { tally::PAGE.renew(&tally::markdown(&sections), check) } else { Ok(()) })
 }
 
-struct Report {
-    started: Instant,
-    inputs: u64,
-    broken: u64,
-    sections: Vec<(String, Vec<Tally>)>,
-}
-
-impl Report {
-    /// Judges functions for the tables of `docs/model.md`.
-    fn section(&mut self, title: &str, judge: impl FnOnce(exact::Progress<'_>) -> Vec<Tally>) {
-        let tallies = self.judged(title, judge);
-        self.sections.push((title.to_owned(), tallies));
-    }
-
-    /// Judges functions and prints how they did.
-    fn judged(&mut self, title: &str, judge: impl FnOnce(exact::Progress<'_>) -> Vec<Tally>) -> Vec<Tally> {
-        println!("{title}");
-        let progress = Progress::begin();
-        let tallies = judge(&|done, of| progress.show(format_args!("  {done} of {of}   ")));
-        progress.end("\r");
-        for tally in &tallies {
-            println!("  {tally}");
-            self.inputs += tally.inputs;
-            self.broken += u64::from(!tally.holds());
-        }
-        tallies
-    }
-
-    /// Ends the program; writes or checks the tables of `docs/model.md` if wanted.
-    fn end(&self, check: Option<bool>) -> ExitCode {
-        let seconds = self.started.elapsed().as_secs();
-        println!("{} results judged in {seconds} s; {} bounds broken", self.inputs, self.broken);
-        if self.broken > 0 {
-            return ExitCode::FAILURE;
-        }
-        ended(check.map_or(Ok(()), |check| tally::PAGE.renew(&tally::markdown(&self.sections), check)))
-    }
+/// Judges functions and prints how they did; the section's title and its tallies.
+fn judged(title: &str, judge: impl FnOnce(exact::Progress<'_>) -> Vec<Tally>) -> (String, Vec<Tally>) {
+    println!("{title}");
+    let progress = Progress::begin();
+    let tallies = judge(&|done, of| progress.show(format_args!("  {done} of {of}   ")));
+    progress.end("\r");
+    tallies.iter().for_each(|tally| println!("  {tally}"));
+    (title.to_owned(), tallies)
 }

@@ -39,9 +39,9 @@ enum Command {
 
 fn main() -> ExitCode {
     ended(match Command::parse() {
-        Command::Inputs { file } => write(&file, &Inputs::new().to_bytes()),
+        Command::Inputs { file } => write(&file, &Inputs::default().to_bytes()),
         Command::Few { kept, full } => {
-            let inputs = Inputs::new();
+            let inputs = Inputs::default();
             write(&kept, &inputs.few_to_bytes()).and_then(|()| write(&full, &inputs.few_with_records()))
         }
         Command::Report { shipped, quick, whole, check, json, out } => {
@@ -60,7 +60,7 @@ fn write(file: &Path, bytes: &[u8]) -> Result<(), String> {
 
 fn report(runs: [&Path; 2], whole: &Path, check: bool, json: Option<&Path>, out: Option<&Path>) -> Result<(), String> {
     let [shipped, quick] = runs.map(|file| output::parse(&read(file)?));
-    let (runs, inputs) = (output::merged(shipped?, quick?)?, Inputs::new());
+    let (runs, inputs) = (output::merged(shipped?, quick?)?, Inputs::default());
     let studied: Result<Vec<Studied>, String> =
         KERNELS.iter().map(|kernel| Ok((kernel, kernels::points(kernel, &runs, &inputs)?))).collect();
     let studied = studied?;

@@ -124,9 +124,9 @@ impl Frames {
     }
 }
 
-impl Inputs {
+impl Default for Inputs {
     /// The same at every call.
-    pub fn new() -> Self {
+    fn default() -> Self {
         let mut rng = Rng::with_seed(SEED);
         Self {
             root: spread(&mut rng, 512, 656, i32::MAX),
@@ -143,7 +143,9 @@ impl Inputs {
             records: stimulus::records(),
         }
     }
+}
 
+impl Inputs {
     /// As the image reads them.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
@@ -157,16 +159,11 @@ impl Inputs {
         bytes.extend(self.records.iter().flat_map(Record::to_bytes));
         bytes
     }
-}
 
-/// Inputs of each section that a board's image keeps: every n-th of the numbers, frames and contacts, and a number of
-/// pictures of a contact.
-const FEW: [usize; 4] = [32, 16, 16, 12];
-
-impl Inputs {
     /// Inputs that the image of `cargo xtask bringup` keeps: a few of all but the records, which it makes itself.
     pub fn few_to_bytes(&self) -> Vec<u8> {
-        let [number, frame, contact, pictures] = FEW;
+        // Every n-th of the numbers, frames and contacts, and so many pictures of a contact.
+        let [number, frame, contact, pictures] = [32, 16, 16, 12];
         let few = |pairs: &[Pair], each| pairs_to_bytes(&pairs.iter().copied().step_by(each).collect::<Vec<_>>());
         let mut bytes = Vec::new();
         for section in [&self.root, &self.force, &self.indentation, &self.pressure] {
@@ -192,12 +189,6 @@ impl Inputs {
         bytes.extend(RECORDS.to_le_bytes());
         (0..RECORDS).for_each(|_| bytes.extend(bench.record(&mut pipeline).to_bytes()));
         bytes
-    }
-}
-
-impl Default for Inputs {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

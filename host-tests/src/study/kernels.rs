@@ -34,14 +34,10 @@ impl Kernel {
 /// Method by which a kernel's errors are found.
 #[derive(Clone, Copy)]
 pub enum Measure {
-    /// One number from one or two.
-    Scalar {
-        section: fn(&Inputs) -> &[Pair],
-        /// The exact result.
-        exact: fn(&Reference, &Pair) -> Real,
-        /// True if the error counts as a share of the result.
-        relative: bool,
-    },
+    /// One number from one or two, by the inputs and the exact result.
+    Absolute(Section, Exact),
+    /// The same, where the error counts as a share of the result.
+    Relative(Section, Exact),
     /// Sum and moments of a frame.
     Frames,
     /// A contact from pictures.
@@ -55,6 +51,9 @@ pub enum Measure {
     Cost,
 }
 
+type Section = fn(&Inputs) -> &[Pair];
+type Exact = fn(&Reference, &Pair) -> Real;
+
 pub const KERNELS: &[Kernel] = &[
     Kernel {
         name: "root",
@@ -62,11 +61,7 @@ pub const KERNELS: &[Kernel] = &[
         text: "sqrt(x) for 512 numbers from 0.01 to 32767, equally many in each octave.",
         error: "relative error",
         other: None,
-        measure: Measure::Scalar {
-            section: |inputs| &inputs.root,
-            exact: |_, [x, _]| input(*x).sqrt(),
-            relative: true,
-        },
+        measure: Measure::Relative(|inputs| &inputs.root, |_, [x, _]| input(*x).sqrt()),
         why: "it has 32 exact bits of the root of 64, so an indentation of 8 mm is exact to 2^-24 mm, which single precision is not. Its \
             error here is that of a Q48 root cut to Q24.",
     },
@@ -76,11 +71,7 @@ pub const KERNELS: &[Kernel] = &[
         text: "F = pi Y d^2 for 512 indentations from 0.01 to 9.5 mm, a = 10 mm, Y = 250 kPa.",
         error: "force error, N",
         other: None,
-        measure: Measure::Scalar {
-            section: |inputs| &inputs.force,
-            exact: |reference, [d, _]| reference.force(&input(*d)),
-            relative: false,
-        },
+        measure: Measure::Absolute(|inputs| &inputs.force, |reference, [d, _]| reference.force(&input(*d))),
         why: "it has no floating-point numbers, and is proven to be correctly rounded for every radius from 4 to 16 mm and \
             every modulus from 20 to 2000 kPa. The cheaper integers serve only the range of this table.",
     },
@@ -90,11 +81,10 @@ pub const KERNELS: &[Kernel] = &[
         text: "d = sqrt(F / (pi Y)) for 512 forces from 1 mN to 70 N.",
         error: "indentation error, mm",
         other: None,
-        measure: Measure::Scalar {
-            section: |inputs| &inputs.indentation,
-            exact: |reference, [force, _]| reference.indentation(&input(*force)),
-            relative: false,
-        },
+        measure: Measure::Absolute(
+            |inputs| &inputs.indentation,
+            |reference, [force, _]| reference.indentation(&input(*force)),
+        ),
         why: "",
     },
     Kernel {
@@ -104,11 +94,10 @@ pub const KERNELS: &[Kernel] = &[
             *Textbook*: Y (L - (a - d)) / L. *No cancellation*: Y (r_c^2 - r^2) / (L (L + a - d)). No frame computes `Tip::pressure`.",
         error: "pressure error, kPa",
         other: None,
-        measure: Measure::Scalar {
-            section: |inputs| &inputs.pressure,
-            exact: |reference, [r, d]| reference.pressure(&input(*r), &input(*d)),
-            relative: false,
-        },
+        measure: Measure::Absolute(
+            |inputs| &inputs.pressure,
+            |reference, [r, d]| reference.pressure(&input(*r), &input(*d)),
+        ),
         why: "The loop itself takes no pressure by radius: the fit has its own arithmetic. The model's function is there for hosts \
             and tests, is correctly rounded everywhere and holds no floating-point number.",
     },
@@ -119,11 +108,7 @@ pub const KERNELS: &[Kernel] = &[
             0.5 to 5 mm. The closed form is apart from the front. `fixed` is I16F16, *Tip* is `force_by_rings`.",
         error: "relative error of the force",
         other: None,
-        measure: Measure::Scalar {
-            section: |inputs| &inputs.rings,
-            exact: |reference, [d, _]| reference.force(&input(*d)),
-            relative: true,
-        },
+        measure: Measure::Relative(|inputs| &inputs.rings, |reference, [d, _]| reference.force(&input(*d))),
         why: "",
     },
     Kernel {
@@ -216,31 +201,24 @@ pub fn points(kernel: &Kernel, runs: &[Ran], inputs: &Inputs) -> Result<Vec<Poin
 }
 
 fn point(kernel: &Kernel, ran: &Ran, inputs: &Inputs) -> Result<Point, String> {
-    let ([error_max, error_rms], other) = match kernel.measure {
-        Measure::Scalar { section, exact, relative } => {
-            (scalar(ran, section(inputs), exact, relative).ok_or_else(|| incomplete(ran))?, None)
-        }
-        Measure::Fit { noisy } => {
-            let [force, centre] = fit(ran, &inputs.fits[usize::from(noisy)]).ok_or_else(|| incomplete(ran))?;
-            (force, Some(centre))
-        }
-        Measure::Control => (control(ran, &inputs.control).ok_or_else(|| incomplete(ran))?, None),
+    let one = |errors: Option<[f64; 2]>| errors.map(|errors| (errors, None));
+    let two = |errors: Option<[[f64; 2]; 2]>| errors.map(|[force, centre]| (force, Some(centre)));
+    let errors = match kernel.measure {
+        Measure::Absolute(section, exact) => one(scalar(ran, section(inputs), exact, false)),
+        Measure::Relative(section, exact) => one(scalar(ran, section(inputs), exact, true)),
+        Measure::Fit { noisy } => two(fit(ran, &inputs.fits[usize::from(noisy)])),
+        Measure::Control => one(control(ran, &inputs.control)),
         // Nothing to compare with: neither on a front nor beaten.
-        Measure::Cost => ([f64::NAN; 2], None),
-        Measure::Frames => {
-            let [force, centre] = scan::errors(&ran.returned, &inputs.frames).ok_or_else(|| incomplete(ran))?;
-            (force, Some(centre))
-        }
+        Measure::Cost => one(Some([f64::NAN; 2])),
+        Measure::Frames => two(scan::errors(&ran.returned, &inputs.frames)),
     };
+    let ([error_max, error_rms], other) =
+        errors.ok_or_else(|| format!("{}: {} was not run on all inputs", ran.kernel, ran.name))?;
     let Ran { name, firmware, cost, .. } = ran.clone();
     Ok(Point { name, firmware, cost, error_max, error_rms, other })
 }
 
-fn incomplete(ran: &Ran) -> String {
-    format!("{}: {} was not run on all inputs", ran.kernel, ran.name)
-}
-
-fn scalar(ran: &Ran, inputs: &[Pair], exact: fn(&Reference, &Pair) -> Real, relative: bool) -> Option<[f64; 2]> {
+fn scalar(ran: &Ran, inputs: &[Pair], exact: Exact, relative: bool) -> Option<[f64; 2]> {
     let reference = Reference::new(&tip());
     let mut errors = Errors::default();
     if ran.returned.len() != inputs.len() {

@@ -60,26 +60,11 @@ impl Cost {
     /// Heads of the columns of [`Self::cells`].
     pub const HEADS: &str = "instructions | max | cycles: low | estimate | high | max | with flash | max";
 
-    /// Reads the figures as the image's run has them, two for each.
-    fn read(figures: &[i64]) -> Option<Self> {
-        let mut pairs = figures.chunks_exact(2).map(|pair| Passes { median: pair[0], max: pair[1] });
-        let mut next = || pairs.next();
-        Some(Self { instructions: next()?, low: next()?, estimate: next()?, high: next()?, flash: next()? })
-    }
-
-    /// Without what an empty call takes.
-    fn net(self, empty: &Self) -> Self {
-        let less = |figure: Passes, empty: Passes| Passes {
-            median: figure.median - empty.median,
-            max: figure.max - empty.median,
-        };
-        Self {
-            instructions: less(self.instructions, empty.instructions),
-            low: less(self.low, empty.low),
-            estimate: less(self.estimate, empty.estimate),
-            high: less(self.high, empty.high),
-            flash: less(self.flash, empty.flash),
-        }
+    /// Cost by the figures of the image's run, a median and a largest of each, less the medians of an empty call.
+    fn new(figures: &[i64; 10], empty: &[i64; 10]) -> Self {
+        let passes = |at: usize| Passes { median: figures[at] - empty[at], max: figures[at + 1] - empty[at] };
+        let [instructions, low, estimate, high, flash] = [0, 2, 4, 6, 8].map(passes);
+        Self { instructions, low, estimate, high, flash }
     }
 
     pub fn cells(&self) -> String {
@@ -121,10 +106,9 @@ pub fn parse(text: &str) -> Result<Vec<Ran>, String> {
             }
             "cost" => {
                 let numbers: Result<Vec<i64>, _> = rest.split(' ').map(str::parse).collect();
-                let numbers = numbers.map_err(|_| failed())?;
-                let [region, figures @ ..] = &numbers[..] else { return Err(failed()) };
-                let cost = Cost::read(figures).ok_or_else(failed)?;
-                costs.insert(u32::try_from(*region).map_err(|_| failed())?, cost);
+                let numbers = <[i64; 11]>::try_from(numbers.map_err(|_| failed())?);
+                let [region, figures @ ..] = numbers.map_err(|_| failed())?;
+                costs.insert(u32::try_from(region).map_err(|_| failed())?, figures);
             }
             _ => {
                 let ran = current.and_then(|region| runs.get_mut(&region)).ok_or_else(failed)?;
@@ -134,8 +118,8 @@ pub fn parse(text: &str) -> Result<Vec<Ran>, String> {
     }
     let empty = costs.get(&0).ok_or("the empty call was not measured")?;
     let with_cost = |(region, ran): (u32, Ran)| {
-        let cost = costs.get(&region).ok_or_else(|| format!("{}: {} was not measured", ran.kernel, ran.name))?;
-        Ok(Ran { cost: cost.net(empty), ..ran })
+        let figures = costs.get(&region).ok_or_else(|| format!("{}: {} was not measured", ran.kernel, ran.name))?;
+        Ok(Ran { cost: Cost::new(figures, empty), ..ran })
     };
     runs.into_iter().filter(|(region, _)| *region != 0).map(with_cost).collect()
 }

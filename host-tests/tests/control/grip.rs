@@ -56,11 +56,6 @@ fn is_fast(reference: Reference) -> bool {
     reference.speed.0.to_num::<f64>().abs() > 31.0
 }
 
-/// Travel that a shorted motor coasts from this speed, mm.
-fn coasts_mm(speed: MillimetresPerSecond) -> f64 {
-    speed.0.to_num::<f64>() / (f64::from(CONFIG.damping_q17_per_s) / 131_072.0)
-}
-
 /// A grip with its touch, frame by frame.
 #[derive(Clone, Copy)]
 struct Hand {
@@ -168,25 +163,11 @@ fn a_hold_goes_quickly_over_what_is_left() {
     assert!(is_fast({ hand }.frame(7_000, &held, at(travel)).0));
 }
 
-/// Indentation at which a shorted motor stops: by its damping, its friction and the contact.
-fn stops_mm(from_mm: f64, speed: MillimetresPerSecond) -> f64 {
-    let c_per_s = f64::from(CONFIG.damping_q17_per_s) / 131_072.0;
-    let mm_per_s2_per_n = f64::from(CONFIG.bounds.acceleration_per_n) / 256.0;
-    let friction_n = 1e-6 * f64::from(CONFIG.params.friction_unm) * f64::from(CONFIG.params.reduction_mrad_per_mm);
-    let (mut d_mm, mut mm_per_s) = (from_mm, speed.0.to_num::<f64>());
-    let step_s = 1e-6;
-    while mm_per_s > 0.0 {
-        let force_n: f64 = CONFIG.tip.force(mm(d_mm)).0.to_num();
-        mm_per_s -= (c_per_s * mm_per_s + mm_per_s2_per_n * (force_n + friction_n)) * step_s;
-        d_mm += mm_per_s * step_s;
-    }
-    d_mm
-}
-
 /// Forward, a shorted motor alone would coast from the speed limit by 1.25 times the indentation left until 1.3 times
-/// the goal plus 0.4 N; the contact brakes the rest. The limit is not lower unless another one acts.
+/// the goal plus 0.4 N; the contact brakes the rest, as a test of the force loop shows. The limit is not lower unless
+/// another one acts.
 #[test]
-fn a_shorted_motor_stops_within_three_tenths_and_four_tenths_of_a_newton() {
+fn a_shorted_motor_would_coast_by_a_quarter_more_than_the_indentation_left() {
     let mut bounded = 0;
     for held_mn in [90, 200, 1_000, 3_000, 6_000] {
         let (hand, held, travel) = Hand::pressing_with(held_mn);
@@ -197,19 +178,13 @@ fn a_shorted_motor_stops_within_three_tenths_and_four_tenths_of_a_newton() {
                 continue;
             }
             let name = format!("{held_mn} to {goal_mn} mN");
-            let goal = newtons(goal_mn);
             let most: f64 = CONFIG.tip.indentation(newtons(goal_mn * 13 / 10 + 400)).0.to_num();
             let held_mm: f64 = held.indentation.0.to_num();
             let allowed_mm = 1.25 * (most - held_mm);
-            let coasts_mm = coasts_mm(reference.speed);
+            // By the damping alone.
+            let coasts_mm = reference.speed.0.to_num::<f64>() / (f64::from(CONFIG.damping_q17_per_s) / 131_072.0);
             assert!(coasts_mm <= allowed_mm + 1e-4, "{name}: {coasts_mm} of {allowed_mm} mm");
-            let stops_mm = mm(stops_mm(held_mm, reference.speed));
-            // From a light contact the speed itself may not be stopped in time: the contact does not help enough.
-            let most_n = 1.3e-3 * f64::from(goal_mn) + 0.4;
-            let most_n = if held_mn < 1_000 { 1.4 * most_n } else { most_n };
-            let stops_n: f64 = CONFIG.tip.force(stops_mm).0.to_num();
-            assert!(stops_n <= most_n, "{name}: {stops_n} of {most_n} N");
-            let distance = minus(CONFIG.tip.indentation(goal), held.indentation);
+            let distance = minus(CONFIG.tip.indentation(newtons(goal_mn)), held.indentation);
             let (unbounded, _) = over(distance, SLACK, CONFIG.speed_max, at(travel));
             if reference != unbounded {
                 assert!(coasts_mm >= allowed_mm - 1e-4, "{name}: {coasts_mm} of {allowed_mm} mm");

@@ -173,12 +173,6 @@ fn a_fast_read_gives_way_to_another_packet() {
         assert_eq!(waiting.hear(&packet(2, 0x01, &[])).len(), 1, "a ping is answered as ever");
         assert!(waiting.hear(&[0; 40]).is_empty(), "the turn is over");
     }
-    // Data that cannot be read is zero, with its error; and nothing at all is sent where it would not fit.
-    let mut first = device(1);
-    let reply = first.hear(&packet(BROADCAST, 0x8A, &[0xFF, 0x7F, 3, 0, 1])).concat();
-    assert_eq!(reply[8..13], [7, 1, 0, 0, 0]);
-    assert!(first.hear(&packet(BROADCAST, 0x8A, &[0, 0, 1, 1, 1])).is_empty());
-    assert!(first.hear(&packet(BROADCAST, 0x8A, &[0, 0, 0xFF, 0xFF, 1])).is_empty());
 }
 
 #[test]
@@ -206,13 +200,20 @@ fn a_fast_read_makes_one_packet_of_equal_and_unequal_parts() {
 }
 
 #[test]
-fn a_part_of_a_fast_bulk_read_that_is_refused_is_zeros_and_a_packet_too_long_is_none() {
+fn a_part_of_a_fast_read_that_is_refused_is_zeros_and_a_packet_too_long_is_none() {
     let mut first = device(1);
-    let reply = first.hear(&packet(BROADCAST, 0x9A, &[1, 0xFF, 0x7F, 3, 0])).concat();
-    assert_eq!(reply[8..13], [7, 1, 0, 0, 0]);
-    assert_eq!(first.refused(StatusError::Access), 1);
-    let too_long = [1, 0, 0, 1, 1];
-    assert!(first.hear(&packet(BROADCAST, 0x9A, &too_long)).is_empty(), "257 bytes");
+    let mut ask = |address: [u8; 2], length: [u8; 2]| {
+        let sync = packet(BROADCAST, 0x8A, &[&address[..], &length, &[1]].concat());
+        let bulk = packet(BROADCAST, 0x9A, &[&[1], &address[..], &length].concat());
+        [sync, bulk].map(|request| first.hear(&request).concat())
+    };
+    for reply in ask([0xFF, 0x7F], [3, 0]) {
+        assert_eq!(reply[8..13], [7, 1, 0, 0, 0], "the error, and zeros");
+    }
+    for length in [[1, 1], [0xFF, 0xFF]] {
+        assert!(ask([0, 0], length).iter().all(Vec::is_empty), "beyond a packet's length");
+    }
+    assert_eq!(first.refused(StatusError::Access), 2);
     let overflows = [[1, 7, 0, 1, 0], [2, 0, 0, 0xFF, 0xFF]].concat();
     assert!(first.hear(&packet(BROADCAST, 0x9A, &overflows)).is_empty(), "beyond a packet's length");
     for params in [&[1][..], &[1, 7, 0, 1], &[1, 7, 0, 1, 0, 9]] {
@@ -331,17 +332,12 @@ fn factory_reset_keeps_what_it_is_told_to() {
 }
 
 #[test]
-fn unknown_instructions_are_refused() {
+fn unknown_instructions_and_missing_and_surplus_parameters_are_refused() {
     let mut bench = Bench::new();
     let known = [0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x08, 0x10, 0x20, 0x55];
     for instruction in (0..=255).filter(|number| !known.contains(number)) {
         assert_eq!(bench.ask(instruction, &[]), Answer { id: ID, error: 2, data: vec![] }, "{instruction:02X}");
     }
-}
-
-#[test]
-fn missing_and_surplus_parameters_are_refused() {
-    let mut bench = Bench::new();
     for params in [&[][..], &[7], &[7, 0], &[7, 0, 1], &[7, 0, 1, 0, 0]] {
         assert_eq!(bench.ask(0x02, params).number(), 5, "{params:?}");
     }

@@ -1,11 +1,12 @@
 //! The bench beside the emulator: steps the world, watches the bridge, the bus and the log.
 
-use crate::board::{FingerBoard, Surroundings};
+use crate::board::Surroundings;
 use crate::faults::ExternalClock;
 use crate::flash::Programmer;
 use crate::front_end::Shared;
 use crate::image::Firmware;
 use crate::log::Log;
+use crate::part::Part;
 use crate::report::{BridgeEdge, Latency, Record, Trace};
 use crate::scene::host::Host as SceneHost;
 use crate::wire::TimedByte;
@@ -92,7 +93,7 @@ impl Bench {
     }
 
     /// The core touched a register.
-    pub fn accessed(&mut self, board: &mut FingerBoard, access: &Access) {
+    pub fn accessed(&mut self, board: &mut Part, access: &Access) {
         if access.kind != AccessKind::Write {
             return;
         }
@@ -105,7 +106,7 @@ impl Bench {
             }
             self.watch_bridge(board, at_ns);
         } else if access.address == USART2.base + CR3 {
-            board.wire().set_single(access.value & HDSEL != 0);
+            board.wire().single = access.value & HDSEL != 0;
         } else if access.address.wrapping_sub(DAC.base) < 0x400 {
             self.front_end.lock().write_dac(access.address - DAC.base, access.value, at_ns);
         } else if access.address.wrapping_sub(GPIOC.base) < 0x400 {
@@ -118,7 +119,7 @@ impl Bench {
     }
 
     /// Advances the world to an instant with the bridge state held so far, then reads the bridge again.
-    pub fn watch_bridge(&mut self, board: &mut FingerBoard, at_ns: u64) {
+    pub fn watch_bridge(&mut self, board: &mut Part, at_ns: u64) {
         let bridge = board.bridge();
         if bridge == self.bridge {
             return;
@@ -141,18 +142,18 @@ impl Bench {
         }
     }
 
-    fn turn_encoder(&mut self, board: &mut FingerBoard, now_ns: u64) {
+    fn turn_encoder(&mut self, board: &mut Part, now_ns: u64) {
         let counts = self.front_end.lock().world.encoder_counts(now_ns);
         if counts != self.encoder && now_ns > self.encoder_ns {
             let left = counts.wrapping_sub(self.encoder);
-            self.encoder += board.part.turn_encoder(self.encoder_ns, now_ns, left);
+            self.encoder += board.turn_encoder(self.encoder_ns, now_ns, left);
         }
         self.encoder_ns = now_ns;
     }
 
     /// The part had something to do at an instant between two of the grid: a new duty may be in use. Where that was the
     /// end of a frame the image looks at the encoder next.
-    pub fn stopped(&mut self, board: &mut FingerBoard, at_ns: u64) {
+    pub fn stopped(&mut self, board: &mut Part, at_ns: u64) {
         self.watch_bridge(board, at_ns);
         if !self.follows_frames {
             return;
@@ -166,7 +167,7 @@ impl Bench {
     }
 
     /// An instant of the grid was reached.
-    pub fn step(&mut self, session: &mut Session<FingerBoard>, host: &mut dyn Host) {
+    pub fn step(&mut self, session: &mut Session<Part>, host: &mut dyn Host) {
         let now_ns = self.next_ns;
         let board = session.board_mut();
         self.watch_bridge(board, now_ns);
@@ -200,7 +201,7 @@ impl Bench {
 
     /// Time of the next stop: the next instant of the grid, or an earlier one at which the host begins to send. A byte
     /// begins at a stop.
-    pub fn next_stop(&self, board: &mut FingerBoard, now: VirtualNanos) -> VirtualNanos {
+    pub fn next_stop(&self, board: &mut Part, now: VirtualNanos) -> VirtualNanos {
         let sends_ns = board.wire().sends_ns().filter(|sends_ns| *sends_ns > now.0);
         VirtualNanos(sends_ns.map_or(self.next_ns, |sends_ns| sends_ns.min(self.next_ns)))
     }

@@ -2,28 +2,19 @@
 
 use crate::bench::STEP_NS;
 use crate::converter::ROOM_C;
-use crate::front_end::Shared;
 use crate::part::Part;
 use crate::scene::finger::Finger;
-use crate::wire::Wire;
 use rigless::device::Level;
-use rigless::emulator::CoreSpec;
 use rigless::machine::armv7m::{Core, Fpu, MpuRegions, Variant};
 use rigless::machine::{Board, Target};
 use rigless::mcu::{Mcu, Operate};
 use rigless::snapshot::Store;
-use rigless::soc::Error;
-use rigless::soc::stm32f427::generated::flash::{Register, optcr};
 use rigless::soc::stm32f427::peripherals::gpio::{Gpio, Pin};
 use rigless::soc::stm32f427::peripherals::tim::Channel;
 use sim::mechanics::Bridge;
 use sim::plant::Plant;
 use std::num::{NonZeroU32, NonZeroU64};
 
-/// The clock that the ST-LINK feeds to PH0.
-const HSE_HZ: u64 = 8_000_000;
-/// The microcontroller's supply.
-const VDD_MV: u32 = 3_300;
 const CORE_HZ: NonZeroU64 = NonZeroU64::new(168_000_000).expect("the core is clocked");
 /// Instructions that the core retires in a second, constant: a CPI of 1.34 at 168 MHz, as in the cycle estimate of the
 /// control step.
@@ -35,41 +26,19 @@ const PORT_C: usize = 2;
 /// TIM1's alternate function on PA8 and PA9.
 const TIM1_FUNCTION: u8 = 1;
 
-/// The microcontroller on its board.
-#[derive(Debug)]
-pub struct FingerBoard {
-    pub part: Part,
-}
-
 // A run has no snapshot.
-impl Store for FingerBoard {}
+impl Store for Part {}
 
-impl FingerBoard {
-    /// Powered, with nothing run, with bits 3:2 of the option bytes.
-    pub fn new(front_end: Shared, brown_out_bits: u8) -> Result<Self, Error> {
-        let mut part = Part::new(front_end)?;
-        part.chip.rcc.attach_crystals(HSE_HZ, 0);
-        part.chip.set_supply(VDD_MV);
-        let (flash, registers) = part.chip.program();
-        let loaded = optcr::BOR_LEV.set(registers.get(Register::Optcr), brown_out_bits.into());
-        flash.keep_options(loaded, registers.get(Register::Optcr1), registers);
-        Ok(Self { part })
-    }
-
-    /// The host's end of the bus.
-    pub fn wire(&mut self) -> &mut Wire {
-        self.part.wire()
-    }
-
+impl Part {
     /// Returns true while the transceiver drives the line.
     pub fn transmits(&mut self) -> bool {
-        level(&mut self.part, PORT_C, 8) == Level::High
+        level(self, PORT_C, 8) == Level::High
     }
 
     /// State of the bridge by its inputs: IN1 and IN2 averaged over the PWM period. It coasts while it sleeps or both
     /// are low.
     pub fn bridge(&mut self) -> Bridge {
-        if level(&mut self.part, PORT_C, 9) == Level::Low {
+        if level(self, PORT_C, 9) == Level::Low {
             return Bridge::Coast;
         }
         let (in1, in2) = (self.high_share(1, 8), self.high_share(2, 9));
@@ -79,12 +48,12 @@ impl FingerBoard {
     /// The share of the time that a bridge input is high; low when its pin is not the timer's (pulled down outside).
     fn high_share(&mut self, channel: u8, pin: u8) -> f64 {
         let pin = Pin::new(pin).expect("ports have 16 pins");
-        let (_, registers) = self.part.chip.port(PORT_A);
+        let (_, registers) = self.chip.port(PORT_A);
         if Gpio::function(pin, registers) != Some(TIM1_FUNCTION) {
             return 0.0;
         }
         let channel = Channel::new(channel).expect("timers have channels 1 and 2");
-        let (timer, registers) = self.part.pwm_timer();
+        let (timer, registers) = self.pwm_timer();
         timer.high_share(channel, registers)
     }
 }
@@ -94,7 +63,7 @@ fn level(part: &mut Part, port: usize, pin: u8) -> Level {
     port.level(Pin::new(pin).expect("ports have 16 pins"), registers)
 }
 
-impl Board for FingerBoard {
+impl Board for Part {
     fn name(&self) -> &'static str {
         "fingertip"
     }
@@ -104,22 +73,15 @@ impl Board for FingerBoard {
     }
 
     fn mcu(&mut self, target: usize) -> Option<&mut dyn Mcu> {
-        self.part.set_laying_out(false);
-        (target == 0).then_some(&mut self.part)
+        self.set_laying_out(false);
+        (target == 0).then_some(self)
     }
 
     /// The emulator asks for the targets when it lays out memory, and for the microcontroller from then on.
     fn targets(&mut self) -> Vec<Target<'_>> {
-        self.part.set_laying_out(true);
-        let core = self.core();
-        vec![Target::new("stm32", &mut self.part, core)]
-    }
-}
-
-impl FingerBoard {
-    fn core(&self) -> CoreSpec {
-        let lines = u32::from(self.part.cpu().interrupt_lines);
-        Core {
+        self.set_laying_out(true);
+        let lines = u32::from(self.cpu().interrupt_lines);
+        let core = Core {
             variant: Variant::M4,
             clock_hz: CORE_HZ,
             interrupt_lines: NonZeroU32::new(lines).expect("the part has interrupts"),
@@ -128,7 +90,8 @@ impl FingerBoard {
             instructions_per_second: INSTRUCTIONS_PER_SECOND,
             boot: "flash",
         }
-        .spec_with_parts(&rigless::cpu::armv7m::windows(self.part.bus()), Fpu::FpV4Sp, MpuRegions::Eight)
+        .spec_with_parts(&rigless::cpu::armv7m::windows(self.bus()), Fpu::FpV4Sp, MpuRegions::Eight);
+        vec![Target::new("stm32", self, core)]
     }
 }
 
@@ -165,7 +128,7 @@ impl Surroundings {
     /// Sets the bridge state from now on. The plant gets it with each step instead.
     pub fn hold(&mut self, bridge: Bridge) {
         if let Self::Scene(finger) = self {
-            finger.hold(bridge);
+            finger.bridge = bridge;
         }
     }
 

@@ -166,7 +166,7 @@ impl Converter {
             words.push(front_end.word(self.nth, input, self.inside_on, self.after(begun_ns, cycles)));
             cycles += CONVERSION_CYCLES;
         }
-        self.injected = Injected::new(words, self.after(begun_ns, cycles));
+        self.injected = Injected { words, done_ns: self.after(begun_ns, cycles) };
     }
 
     fn refresh(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
@@ -345,26 +345,21 @@ pub fn injected_inputs(registers: &RegisterFile) -> Vec<usize> {
     places[3 - jsqr::JL.get(sequence) as usize..].iter().map(|place| place.get(sequence) as usize).collect()
 }
 
-/// Words of a group under way.
+/// Words of a group under way, and the instant at which they are done.
 #[derive(Clone, Debug, Default)]
-pub struct Injected {
+struct Injected {
     words: Vec<u16>,
     done_ns: u64,
 }
 
 impl Injected {
-    /// These words, done at an instant.
-    pub fn new(words: Vec<u16>, done_ns: u64) -> Self {
-        Self { words, done_ns }
-    }
-
     /// Returns true while conversions run.
-    pub fn runs(&self, now_ns: u64) -> bool {
+    fn runs(&self, now_ns: u64) -> bool {
         now_ns < self.done_ns
     }
 
     /// Updates the completed conversions, and their flag in a status.
-    pub fn show(&mut self, now_ns: u64, status: u64, registers: &mut RegisterFile) -> u64 {
+    fn show(&mut self, now_ns: u64, status: u64, registers: &mut RegisterFile) -> u64 {
         if self.runs(now_ns) || self.words.is_empty() {
             return status;
         }

@@ -18,26 +18,19 @@ use sim::demo::{self, Check, Forces, Run, Taxels, Trace, what};
 use sim::scene::Scene;
 use sim::watch::{Step, Summary, Watch};
 use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::path::Path;
 use std::time::Instant;
 
-#[derive(Clone, Debug)]
-pub struct Plan {
-    pub image: PathBuf,
-    /// Shorter, and without the second run.
-    pub quick: bool,
-}
-
-/// Runs the demonstration and takes its figures.
-pub fn run(plan: &Plan) -> Result<(Figures, Run), Error> {
+/// Runs the demonstration and takes its figures; a quick one is shorter, and without the second run.
+pub fn run(image: &Path, quick: bool) -> Result<(Figures, Run), Error> {
     let begun = Instant::now();
-    let scene = demo::scene(plan.quick)?;
-    let repeat = (!plan.quick).then(|| {
-        let (image, scene) = (plan.image.clone(), scene.clone());
+    let scene = demo::scene(quick)?;
+    let repeat = (!quick).then(|| {
+        let (image, scene) = (image.to_owned(), scene.clone());
         std::thread::spawn(move || simulate(&image, &scene, &mut Trace::new(&scene)).map(|summary| summary.digest))
     });
 
-    let mut boards = Boards::power_on(&plan.image, &scene)?;
+    let mut boards = Boards::power_on(image, &scene)?;
     let flash = Flashable::of(boards.rigs[0].image())?;
     flash.check_loaded(&mut boards.rigs[0])?;
     let from = Counts::of(&mut boards.rigs[0])?;

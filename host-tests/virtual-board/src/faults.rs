@@ -1,8 +1,8 @@
 //! Faults that can be injected during a run, in addition to the defects of the world itself (`Plant::faults`).
 
 use crate::Error;
-use crate::board::FingerBoard;
-use crate::rig::Rig;
+use crate::part::Part;
+use crate::rig::{Rig, Stand};
 use rigless::device::{DeviceContext, RegisterFile};
 use rigless::emulator::{Access, AccessKind, Host, InterruptLine, Stop};
 use rigless::session::Session;
@@ -53,26 +53,31 @@ pub enum Fault {
 }
 
 impl Fault {
-    fn apply(self, defect: bool, session: &mut Session<FingerBoard>, host: &mut dyn Host, stop: Stop) {
+    fn apply(self, defect: bool, stand: &mut Stand<'_>) {
+        let Stand { session, host, stop, bench } = stand;
         match self {
-            Self::ConvertersStall => session.board().part.front_end().lock().trigger_cut = defect,
-            Self::TriggerMissed => session.board().part.front_end().lock().trigger_missed = defect,
-            Self::ScanInterruptLost => session.board().part.front_end().lock().scan_interrupt_lost = defect,
-            Self::BridgeFault => session.board_mut().part.set_bridge_well(stop.at, !defect),
-            Self::CoreHangs => host.hold(defect),
-            Self::ClockLost => {}
+            Self::ConvertersStall => bench.front_end.lock().trigger_cut = defect,
+            Self::TriggerMissed => bench.front_end.lock().trigger_missed = defect,
+            Self::ScanInterruptLost => bench.front_end.lock().scan_interrupt_lost = defect,
+            Self::BridgeFault => {
+                session.board_mut().set_bridge_well(stop.at, !defect);
+                bench.watch_bridge(session.board_mut(), bench.next_ns);
+            }
+            Self::CoreHangs => {
+                host.hold(defect);
+                bench.core_held = defect;
+            }
+            Self::ClockLost => bench.clock.set_lost(defect, session, *host, *stop),
             Self::StoreAt(address) if defect => {
                 for (place, halfword) in store_at(address.into()).into_iter().enumerate() {
-                    host.program(FREE_FLASH + 2 * place as u64, Width::W16, halfword)
-                        .expect("the flash can be programmed");
+                    program(*host, FREE_FLASH + 2 * place as u64, Width::W16, halfword);
                 }
-                host.program(HALFWAY_VECTOR, Width::W32, FREE_FLASH | 1).expect("the flash can be programmed");
+                program(*host, HALFWAY_VECTOR, Width::W32, FREE_FLASH | 1);
             }
-            Self::StoreAt(_) => {}
             Self::BusMemoryLost if defect => {
                 let mut access = |kind, address, value| {
                     let access = Access::new(kind, address, Width::W32, value).at(stop.instruction_count, stop.at);
-                    session.access(access, host).0
+                    session.access(access, *host).0
                 };
                 let control = access(AccessKind::Read, DMA1_S5CR, 0);
                 access(AccessKind::Write, DMA1_S5CR, control & !ENABLE);
@@ -80,9 +85,8 @@ impl Fault {
                 access(AccessKind::Write, DMA1_S5M0AR, NOWHERE);
                 access(AccessKind::Write, DMA1_S5CR, control | ENABLE);
             }
-            Self::BusMemoryLost => {}
             Self::BusError { from, to } if defect => session.fail_next(from, to),
-            Self::BusError { .. } => {}
+            Self::StoreAt(_) | Self::BusMemoryLost | Self::BusError { .. } => {}
         }
     }
 }
@@ -96,31 +100,20 @@ fn store_at(address: u64) -> [u64; 6] {
     [low, low_rest, high, high_rest, 0x6000, 0x4770]
 }
 
+/// Writes to the flash.
+pub fn program(host: &mut dyn Host, address: u64, width: Width, value: u64) {
+    host.program(address, width, value).expect("the flash can be programmed");
+}
+
 impl Rig {
     /// Breaks something from now on.
     pub fn inject(&mut self, fault: Fault) -> Result<(), Error> {
-        self.set(fault, true)
+        self.with(move |stand| fault.apply(true, stand))
     }
 
     /// Mends it again.
     pub fn mend(&mut self, fault: Fault) -> Result<(), Error> {
-        self.set(fault, false)
-    }
-
-    fn set(&mut self, fault: Fault, defect: bool) -> Result<(), Error> {
-        self.with(move |stand| {
-            fault.apply(defect, stand.session, stand.host, stand.stop);
-            if fault == Fault::CoreHangs {
-                stand.bench.core_held = defect;
-            }
-            if fault == Fault::ClockLost {
-                stand.bench.clock.set_lost(defect, stand.session, stand.host, stand.stop);
-            }
-            if fault == Fault::BridgeFault {
-                let at_ns = stand.bench.next_ns;
-                stand.bench.watch_bridge(stand.session.board_mut(), at_ns);
-            }
-        })
+        self.with(move |stand| fault.apply(false, stand))
     }
 }
 
@@ -150,24 +143,24 @@ pub struct ExternalClock {
 
 impl ExternalClock {
     /// Stops the clock, or restores it for the next start.
-    pub fn set_lost(&mut self, lost: bool, session: &mut Session<FingerBoard>, host: &mut dyn Host, stop: Stop) {
+    pub fn set_lost(&mut self, lost: bool, session: &mut Session<Part>, host: &mut dyn Host, stop: Stop) {
         self.lost = lost;
         let guarded = |clocks: &mut Rcc, registers: &mut RegisterFile, context: &mut DeviceContext<'_>| {
             let guarded = cr::CSSON.is_set(registers.get(Register::Cr));
             clocks.fail_hse(registers, context);
             guarded
         };
-        if lost && session.board_mut().part.chip.drive_clocks(stop.at, guarded) {
+        if lost && session.board_mut().chip.drive_clocks(stop.at, guarded) {
             let [handler, guard] =
                 [NMI_VECTOR, GUARD_VECTOR].map(|vector| host.read(vector, Width::W32).expect("the vectors are flash"));
             self.vector = Some(guard);
-            host.program(GUARD_VECTOR, Width::W32, handler).expect("the flash can be programmed");
+            program(host, GUARD_VECTOR, Width::W32, handler);
             session.pulse(GUARD_LINE, host);
         }
     }
 
     /// The core touched a register.
-    pub fn accessed(&mut self, session: &mut Session<FingerBoard>, host: &mut dyn Host, access: &Access) {
+    pub fn accessed(&mut self, session: &mut Session<Part>, host: &mut dyn Host, access: &Access) {
         let pll = access.kind == AccessKind::Write && access.address == RCC.base + PLLCFGR;
         if pll && (access.value >> 24 & 0b1111 < 2 || access.value >> 28 & 0b111 < 2) {
             self.wrong_pll = Some(access.value);
@@ -183,7 +176,7 @@ impl ExternalClock {
     /// The part was reset.
     pub fn restarted(&mut self, host: &mut dyn Host) {
         if let Some(vector) = self.vector.take() {
-            host.program(GUARD_VECTOR, Width::W32, vector).expect("the flash can be programmed");
+            program(host, GUARD_VECTOR, Width::W32, vector);
         }
     }
 }

@@ -5,7 +5,8 @@
 //! then programs and erases here, under the interface's registers. While a word is programmed the core stalls, as one
 //! that runs from the same bank does. Errors that the interface would flag are not modelled.
 
-use crate::board::FingerBoard;
+use crate::faults::program;
+use crate::part::Part;
 use rigless::emulator::{Access, AccessKind, Host};
 use rigless::mcu::Operate;
 use rigless::session::Session;
@@ -56,7 +57,7 @@ impl Default for Programmer {
 
 impl Programmer {
     /// The core stored something somewhere.
-    pub fn stored(&mut self, session: &mut Session<FingerBoard>, host: &mut dyn Host, access: &Access) {
+    pub fn stored(&mut self, session: &mut Session<Part>, host: &mut dyn Host, access: &Access) {
         if access.kind != AccessKind::Write {
             return;
         }
@@ -65,9 +66,6 @@ impl Programmer {
             return;
         }
         let control = session.mcu().registers("FLASH").map_or(0, |registers| registers.get(Register::Cr));
-        let program = |host: &mut dyn Host, address, width, value| {
-            host.program(address, width, value).expect("the flash can be programmed");
-        };
         if to_sectors && cr::PG.is_set(control) {
             // Programming only clears bits.
             let before = host.read(access.address, access.width).unwrap_or(0);

@@ -11,8 +11,9 @@ use std::path::{Path, PathBuf};
 /// An ELF as the linker left it and as it is flashed.
 #[derive(Clone, Debug)]
 pub struct Firmware {
-    path: PathBuf,
-    elf: Vec<u8>,
+    pub path: PathBuf,
+    /// The file's bytes.
+    pub elf: Vec<u8>,
     symbols: Vec<(String, u64)>,
 }
 
@@ -23,17 +24,7 @@ impl Firmware {
         let file =
             object::File::parse(elf.as_slice()).map_err(|why| Error::NotAnImage(path.into(), why.to_string()))?;
         let symbols = file.symbols().filter_map(|symbol| Some((symbol.name().ok()?.to_owned(), symbol.address())));
-        let symbols = symbols.collect();
-        Ok(Self { path: path.into(), elf, symbols })
-    }
-
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// The file's bytes.
-    pub fn elf(&self) -> &[u8] {
-        &self.elf
+        Ok(Self { path: path.into(), symbols: symbols.collect(), elf })
     }
 
     /// The address of an item of the firmware's, by the end of its path: module and name.
@@ -67,13 +58,13 @@ pub struct Flashable {
 impl Flashable {
     /// Lays out the loadable segments of an image by their load addresses.
     pub fn of(image: &Firmware) -> Result<Self, Error> {
-        let fail = |why: &str| Error::NotAnImage(image.path().into(), why.to_owned());
-        let file = ElfFile::<FileHeader32<LittleEndian>>::parse(image.elf()).map_err(|why| fail(&why.to_string()))?;
+        let fail = |why: &str| Error::NotAnImage(image.path.clone(), why.to_owned());
+        let file = ElfFile::<FileHeader32<LittleEndian>>::parse(&*image.elf).map_err(|why| fail(&why.to_string()))?;
         let mut segments = Vec::new();
         for header in file.elf_program_headers() {
             if header.p_type(LittleEndian) == PT_LOAD && header.p_filesz(LittleEndian) > 0 {
                 let bytes =
-                    header.data(LittleEndian, image.elf()).map_err(|()| fail("a segment lies outside the file"))?;
+                    header.data(LittleEndian, &*image.elf).map_err(|()| fail("a segment lies outside the file"))?;
                 segments.push((header.p_paddr(LittleEndian), bytes));
             }
         }
@@ -99,7 +90,7 @@ impl Flashable {
     /// Checks that the emulated flash holds exactly these bytes.
     pub fn check_loaded(&self, rig: &mut Rig) -> Result<(), Error> {
         let Self { base, bytes } = self.clone();
-        let path = rig.image().path().to_owned();
+        let path = rig.image().path.clone();
         let differs = rig.with(move |stand| {
             let at = |place: usize| u64::from(base) + place as u64;
             let mut places = bytes.iter().enumerate();

@@ -25,7 +25,8 @@ pub struct Log {
     block: Option<u64>,
     /// Bytes received since the last whole frame.
     partial: Vec<u8>,
-    frames: Vec<Frames>,
+    /// All frames so far.
+    pub frames: Vec<Frames>,
 }
 
 impl Log {
@@ -57,11 +58,6 @@ impl Log {
     pub fn restart(&mut self) {
         self.partial.clear();
     }
-
-    /// All frames so far.
-    pub fn frames(&self) -> &[Frames] {
-        &self.frames
-    }
 }
 
 /// The log as text, by the table in the ELF of the image.
@@ -87,11 +83,11 @@ pub mod text {
         pub fn log(&mut self) -> Result<Vec<LogLine>, Error> {
             let frames = self.with(|stand| {
                 stand.bench.log.drain(stand.bench.next_ns, stand.host);
-                stand.bench.log.frames().to_vec()
+                stand.bench.log.frames.clone()
             })?;
             let image = self.image();
-            let table = Table::parse(image.elf()).map_err(|why| {
-                Error::NotAnImage(image.path().into(), format!("its defmt table cannot be read: {why}"))
+            let table = Table::parse(&image.elf).map_err(|why| {
+                Error::NotAnImage(image.path.clone(), format!("its defmt table cannot be read: {why}"))
             })?;
             Ok(table.map_or_else(Vec::new, |table| frames.iter().flat_map(|frames| decode(&table, frames)).collect()))
         }

@@ -9,7 +9,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
-use virtual_board::demo::{self, Plan};
+use virtual_board::demo;
 #[cfg(feature = "scenes")]
 use virtual_board::scene::simulate;
 use virtual_board::serve::Board;
@@ -97,7 +97,7 @@ fn main() -> ExitCode {
         Command::Bringup { image, frames, estimates, json } => {
             bringup(&image, frames, estimates.as_deref(), json.as_deref())
         }
-        Command::Demo { image, json, out, quick } => demo(image, json.as_deref(), &out, quick),
+        Command::Demo { image, json, out, quick } => demo(&image, json.as_deref(), &out, quick),
         Command::Serve { image, pty, tcp, distance_mm } => {
             let place = tcp.map_or_else(|| Place::Pty(pty), Place::Tcp);
             serve(&image, &place, distance_mm)
@@ -152,8 +152,8 @@ pub fn bringup(image: &Path, frames: u32, estimates: Option<&Path>, json: Option
 }
 
 /// Runs it, prints the table, writes figures and pictures.
-pub fn demo(image: PathBuf, json: Option<&Path>, out: &Path, quick: bool) -> Result<(), Error> {
-    let (figures, run) = demo::run(&Plan { image, quick })?;
+pub fn demo(image: &Path, json: Option<&Path>, out: &Path, quick: bool) -> Result<(), Error> {
+    let (figures, run) = demo::run(image, quick)?;
     // The files first: the reader of the output may close the pipe.
     let drawn = draw(&run, &figures.forces, out);
     if let Some(path) = json {

@@ -18,6 +18,7 @@ use rigless::device::{Device, ErasedDevice, Level, RegisterFile, ResetCause};
 use rigless::mcu::Mcu;
 use rigless::soc::stm32f427::Stm32f427;
 use rigless::soc::stm32f427::generated::c_adc::{self, ccr};
+use rigless::soc::stm32f427::generated::flash::{Register as FlashRegister, optcr};
 use rigless::soc::stm32f427::generated::rcc::{Register, apb1enr, csr};
 use rigless::soc::stm32f427::peripherals::gpio::Pin;
 use rigless::soc::stm32f427::peripherals::tim::Channel;
@@ -25,6 +26,10 @@ use rigless::soc::stm32f427::peripherals::{CONVERTERS, SERIAL_INTERFACES};
 use rigless::soc::{Bus, Error};
 use rigless::time::VirtualNanos;
 
+/// The clock that the ST-LINK feeds to PH0.
+const HSE_HZ: u64 = 8_000_000;
+/// The microcontroller's supply.
+const VDD_MV: u32 = 3_300;
 /// Clock of the buses after reset, Hz: the internal oscillator.
 const RESET_HZ: u64 = 16_000_000;
 const WINDOW_WATCHDOG: &str = "WWDG";
@@ -74,8 +79,8 @@ pub struct Part {
 }
 
 impl Part {
-    /// Out of power-on, the converters on a front end.
-    pub fn new(front_end: Shared) -> Result<Self, Error> {
+    /// Out of power-on, with nothing run: the converters on a front end, and bits 3:2 of the option bytes.
+    pub fn new(front_end: Shared, brown_out_bits: u8) -> Result<Self, Error> {
         let chip = Stm32f427::new()?;
         let mut wiring = vec![Model::Chip; chip.bus().slots().len()];
         for (nth, name) in CONVERTERS.iter().enumerate() {
@@ -112,6 +117,11 @@ impl Part {
             common_slot,
         };
         part.drive_inputs(VirtualNanos(0));
+        part.chip.rcc.attach_crystals(HSE_HZ, 0);
+        part.chip.set_supply(VDD_MV);
+        let (flash, registers) = part.chip.program();
+        let loaded = optcr::BOR_LEV.set(registers.get(FlashRegister::Optcr), brown_out_bits.into());
+        flash.keep_options(loaded, registers.get(FlashRegister::Optcr1), registers);
         Ok(part)
     }
 
@@ -238,7 +248,7 @@ impl Mcu for Part {
             Some(Model::WindowWatchdog) => {
                 let (clocks, registers) = self.chip.clocks();
                 let enabled = apb1enr::WWDGEN.is_set(registers.get(Register::Apb1enr));
-                self.window_watchdog.set_clock(clocks.pclk1(registers));
+                self.window_watchdog.clock_hz = clocks.pclk1(registers);
                 enabled.then_some(&mut self.window_watchdog as &mut dyn ErasedDevice)
             }
             Some(Model::None) => None,

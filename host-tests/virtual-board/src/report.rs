@@ -115,7 +115,7 @@ impl Rig {
     /// Pins whose mode does not fit the board's wiring.
     pub fn miswired_pins(&mut self) -> Result<Vec<String>, Error> {
         self.with(|stand| {
-            let chip = &mut stand.session.board_mut().part.chip;
+            let chip = &mut stand.session.board_mut().chip;
             let mut wrong = Vec::new();
             for (port, pins, wanted) in WIRED {
                 let (_, registers) = chip.port(port);

@@ -4,10 +4,11 @@
 //! at a halt, between two instructions; nothing runs without an order. The same calls give the same run.
 
 use crate::bench::{Bench, STEP_NS};
-use crate::board::{FingerBoard, Surroundings};
+use crate::board::Surroundings;
 use crate::flash::SECTOR;
 use crate::front_end::{ScanCounts, Shared};
 use crate::image::Firmware;
+use crate::part::Part;
 use crate::scene::finger::Finger;
 use crate::{Error, converter};
 use fingertip::chip::Factory;
@@ -53,7 +54,7 @@ fn images(image: &Firmware, options: &Options) -> Result<Vec<Image>, Error> {
     let read = |path: &Path, bytes: Vec<u8>, at| {
         Image::new(path, bytes, at).map_err(|why| Error::NotAnImage(path.into(), why.to_string()))
     };
-    let mut images = vec![read(image.path(), image.elf().to_vec(), None)?];
+    let mut images = vec![read(&image.path, image.elf.clone(), None)?];
     let Factory { reference, sensor: [cold, hot] } = options.factory;
     let factory = [reference, cold, hot].map(u16::to_le_bytes).concat();
     images.push(read(Path::new("factory"), factory, Some(converter::FACTORY_AT))?);
@@ -89,7 +90,7 @@ impl Rig {
         let image = Firmware::read(image)?;
         let images = images(&image, options)?;
         let front_end = Shared::new(world.into());
-        let board = FingerBoard::new(front_end.clone(), options.brown_out_bits)?;
+        let board = Part::new(front_end.clone(), options.brown_out_bits)?;
         let session = Session::new(Box::new(board), 0, VirtualNanos(STEP_NS)).map_err(failure)?;
         let bench = Bench::new(front_end, &image);
         let (orders, ordered) = mpsc::channel();
@@ -230,7 +231,7 @@ fn failure(error: emulator::Error) -> Error {
 /// The run at a halt, between two instructions.
 pub struct Stand<'a> {
     /// The board, its registers and the emulator's reports.
-    pub session: &'a mut Session<FingerBoard>,
+    pub session: &'a mut Session<Part>,
     /// The guest's memory and interrupt lines.
     pub host: &'a mut dyn Host,
     pub stop: Stop,
@@ -249,7 +250,7 @@ struct Hall {
 
 impl Hall {
     /// Executes orders until one continues the run; returns false after the last order.
-    fn halt(&mut self, session: &mut Session<FingerBoard>, stop: Stop, host: &mut dyn Host) -> bool {
+    fn halt(&mut self, session: &mut Session<Part>, stop: Stop, host: &mut dyn Host) -> bool {
         let Self { bench, orders, reached, until_ns } = self;
         if reached.send(bench.next_ns).is_err() {
             return false;
@@ -267,8 +268,8 @@ impl Hall {
     }
 }
 
-impl Driver<FingerBoard> for Hall {
-    fn on_settled(&mut self, session: &mut Session<FingerBoard>, host: &mut dyn Host, settled: Settled) {
+impl Driver<Part> for Hall {
+    fn on_settled(&mut self, session: &mut Session<Part>, host: &mut dyn Host, settled: Settled) {
         if let Settled::Stop(stop) = &settled
             && self.bench.flash.word_done(stop.at.0)
         {
@@ -285,7 +286,7 @@ impl Driver<FingerBoard> for Hall {
         }
     }
 
-    fn on_stop(&mut self, session: &mut Session<FingerBoard>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
+    fn on_stop(&mut self, session: &mut Session<Part>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
         if stop.at.0 >= self.bench.next_ns {
             self.bench.step(session, host);
             if self.bench.next_ns >= self.until_ns && !self.halt(session, stop, host) {

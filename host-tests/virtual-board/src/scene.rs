@@ -137,7 +137,8 @@ impl Boards {
         for rig in &mut self.rigs {
             costs.extend(rig.finger(|finger| finger.costs())?);
             // The host is removed: the line is free for other requests.
-            let of_link = rig.with(|stand| stand.bench.host.take().map(|host| host.costs().collect::<Vec<_>>()))?;
+            let of_link =
+                rig.with(|stand| stand.bench.host.take().map(|host| host.link.costs().collect::<Vec<_>>()))?;
             costs.extend(of_link.into_iter().flatten());
             digests.push(rig.trace_hash()?);
         }
@@ -161,7 +162,7 @@ fn set_out(rig: &mut Rig, now_ns: u64, second_s: f64, wants_pressures: bool) -> 
     rig.set_out(now_ns + MS)?;
     rig.ask(move |stand| {
         let host = stand.bench.host.as_mut();
-        host.map_or_else(Made::default, |host| (host.take_shown(), host.trouble(now_ns)))
+        host.map_or_else(Made::default, |host| (std::mem::take(&mut host.shown), host.trouble(now_ns)))
     })
 }
 
@@ -171,7 +172,7 @@ fn begin(bench: &mut Bench, now_ns: u64, second_s: f64, wants_pressures: bool) {
         finger.wants_pressures = wants_pressures;
     }
     if let Some(host) = &mut bench.host {
-        host.run_at(now_ns, second_s);
+        host.clock.run_at(now_ns, second_s);
     }
 }
 

@@ -1,9 +1,11 @@
 //! The emulated board as a finger that is served: no faster than real time, and often slower.
 
+use crate::client::Client;
 use crate::{Error, Rig};
 use fingertip::params::Params;
 use fingertip::shipped::address;
 use serve::Finger;
+use std::fmt::Display;
 
 /// Time after which the image has started, ms.
 const BOOT_MS: u64 = 20;
@@ -22,10 +24,9 @@ impl Board {
     /// longer than clients wait. Ends with a reboot.
     pub fn warm(mut rig: Rig) -> Result<Self, Error> {
         rig.run_ms(BOOT_MS)?;
-        let state = (address::PRESENT_MODE, address::LOOP_TIME_US + 2 - address::PRESENT_MODE);
-        let warmed = rig.client(WAIT_NS, |bus| {
+        asked(&mut rig, |bus| {
             bus.ping(ID)?;
-            bus.read(ID, state.0, state.1)?;
+            bus.read(ID, address::PRESENT_MODE, address::LOOP_TIME_US + 2 - address::PRESENT_MODE)?;
             bus.read(ID, address::PRESSURES, 200)?;
             bus.sync_read_u32(&[ID], address::PRESENT_FORCE_MN)?;
             bus.reg_write_u8(ID, address::STATUS_RETURN_LEVEL, 2)?;
@@ -34,30 +35,29 @@ impl Board {
             bus.write_u32(ID, address::PARAMS, Params::DEFAULT.tip_radius_um as u32)?;
             // Refused, as it is not tared: that takes its way too.
             let _ = bus.write_u8(ID, address::MEASURE, 3);
-            bus.write_u8(ID, address::TARE, 1)
+            bus.write_u8(ID, address::TARE, 1).map(drop)
         })?;
-        warmed.map_err(silent)?;
         rig.run_ms(TARE_MS)?;
-        let warmed = rig.client(WAIT_NS, |bus| {
+        asked(&mut rig, |bus| {
             bus.write_u8(ID, address::TORQUE_ENABLE, 1)?;
-            bus.write_u32(ID, address::GOAL_FORCE_MN, 0)
+            bus.write_u32(ID, address::GOAL_FORCE_MN, 0).map(drop)
         })?;
-        warmed.map_err(silent)?;
         rig.run_ms(TORQUE_MS)?;
-        let warmed = rig.client(WAIT_NS, |bus| {
+        asked(&mut rig, |bus| {
             bus.write_u8(ID, address::TORQUE_ENABLE, 0)?;
             bus.write_u8(ID, address::CLEAR_FAULT, 1)?;
-            bus.reboot(ID)
+            bus.reboot(ID).map(drop)
         })?;
-        warmed.map_err(silent)?;
         rig.run_ms(BOOT_MS)?;
-        rig.client(WAIT_NS, |bus| bus.ping(ID))?.map_err(silent)?;
+        asked(&mut rig, |bus| bus.ping(ID).map(drop))?;
         Ok(Self(rig))
     }
 }
 
-fn silent(why: impl std::fmt::Display) -> Error {
-    Error::Client(std::io::Error::other(format!("the board does not answer: {why}")))
+/// Has a client ask the board, which must answer.
+fn asked<E: Display + Send>(rig: &mut Rig, job: fn(&mut Client) -> Result<(), E>) -> Result<(), Error> {
+    let silent = |why| Error::Client(std::io::Error::other(format!("the board does not answer: {why}")));
+    rig.client(WAIT_NS, job)?.map_err(silent)
 }
 
 impl Finger for Board {

@@ -23,7 +23,7 @@ pub struct PwmTimer {
     clock_hz: u64,
     awake_until_ns: u64,
     on: bool,
-    counts: Counts,
+    pub counts: Counts,
 }
 
 /// Events that can shift the phase of the PWM. The image must not shift it while it turns the outputs on.
@@ -40,10 +40,6 @@ impl PwmTimer {
     pub fn new(clock_hz: u64) -> Self {
         let timer = Tim::with_clock(clock_hz, Counter::Narrow);
         Self { timer, clock_hz, awake_until_ns: 0, on: false, counts: Counts::default() }
-    }
-
-    pub fn counts(&self) -> Counts {
-        self.counts
     }
 
     /// Share of a period for which a channel's output is high; 0 if it is not driven.
@@ -194,7 +190,7 @@ impl ScanTimer {
         self.reference = Level::Low;
         self.updates_seen = self.timer.dma_requests().update;
         self.updates_served = self.updates_seen;
-        self.updates.stop();
+        self.updates.running = None;
         self.wake = None;
     }
 
@@ -221,7 +217,7 @@ impl ScanTimer {
         self.updates_served += passed as u64;
         if let Some(scan) = &mut self.front_end.lock().scan {
             scan.due_ns.extend(self.updates.next_ns(passed));
-            if !self.updates.running() {
+            if !self.updates.running.is_some() {
                 scan.due_ns.push_back(now_ns);
             }
         }
@@ -241,14 +237,14 @@ impl ScanTimer {
     /// Starts or stops the updates if the image started or stopped the timer.
     fn follow(&mut self, registers: &RegisterFile, context: &mut DeviceContext<'_>) {
         let runs = cr1::CEN.is_set(registers.get(Register::Cr1));
-        if runs == self.updates.running() {
+        if runs == self.updates.running.is_some() {
             return;
         }
         if runs {
             let cycles = (registers.get(Register::Arr) + 1) * (registers.get(Register::Psc) + 1);
             self.updates.start(context.now().0, cycles);
         } else {
-            self.updates.stop();
+            self.updates.running = None;
         }
         self.sleep(context);
     }
@@ -346,15 +342,6 @@ impl Updates {
         self.running = Some((since as u64, cycles));
     }
 
-    fn stop(&mut self) {
-        self.running = None;
-    }
-
-    /// Returns true while the timer runs.
-    fn running(&self) -> bool {
-        self.running.is_some()
-    }
-
     /// Times of the next `count` updates, ns; empty while the timer is stopped.
     fn next_ns(&self, count: usize) -> impl DoubleEndedIterator<Item = u64> + use<> {
         let Self { hz, epoch_ns, running } = *self;
@@ -443,9 +430,9 @@ mod tests {
             let counted = part.read(VirtualNanos(at_ns), TIM1.base + 0x24, Width::W32).expect("a counter");
             assert_eq!(counted, at_ns % PERIOD_NS * CLOCK_HZ / 1_000_000_000, "turn {turn}");
         }
-        assert_eq!(part.pair().0.counts(), Counts { turned_on: 10_000, restarted: 0 });
+        assert_eq!(part.pair().0.counts, Counts { turned_on: 10_000, restarted: 0 });
         write(&mut part, 2_000_000_000, 0x14, 1);
-        assert_eq!(part.pair().0.counts().restarted, 1);
+        assert_eq!(part.pair().0.counts.restarted, 1);
     }
 
     #[test]
@@ -458,8 +445,6 @@ mod tests {
         assert_eq!(updates.next_ns(3).collect::<Vec<_>>(), [1_137, 1_179, 1_221]);
         updates.pass(2);
         assert_eq!(updates.next_ns(1).collect::<Vec<_>>(), [1_221]);
-        updates.stop();
-        assert!(!updates.running());
     }
 
     #[test]

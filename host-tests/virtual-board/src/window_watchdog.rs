@@ -16,7 +16,7 @@ const CYCLES: u64 = 4_096;
 /// WWDG of the part.
 #[derive(Debug, Default)]
 pub struct WindowWatchdog {
-    clock_hz: u64,
+    pub clock_hz: u64,
     divider: u32,
     /// The count, and the tick since time 0 in which it was that.
     since: Option<(u64, u64)>,
@@ -25,10 +25,6 @@ pub struct WindowWatchdog {
 }
 
 impl WindowWatchdog {
-    pub fn set_clock(&mut self, hz: u64) {
-        self.clock_hz = hz;
-    }
-
     fn tick(&self, now: VirtualNanos) -> u64 {
         (u128::from(now.0) * u128::from(self.clock_hz) / 1_000_000_000) as u64 / (CYCLES << self.divider)
     }
@@ -109,11 +105,8 @@ mod tests {
     use rigless::soc::stm32f427::builder;
     use rigless::soc::stm32f427::generated::WWDG;
 
-    const CLOCK_HZ: u64 = 42_000_000;
-
     fn running(divider: u64, count: u64) -> Single<WindowWatchdog> {
-        let mut watchdog = WindowWatchdog::default();
-        watchdog.set_clock(CLOCK_HZ);
+        let watchdog = WindowWatchdog { clock_hz: 42_000_000, ..WindowWatchdog::default() };
         let mut part = Single::new(builder(), "WWDG", watchdog).expect("the part has a WWDG");
         for (offset, value) in [(4, divider << 7 | 0x7f), (0, 0x80 | count)] {
             assert_eq!(part.write(VirtualNanos(1), WWDG.base + offset, Width::W32, value), Ok(()));

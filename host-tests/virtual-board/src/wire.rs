@@ -23,7 +23,8 @@ pub struct TimedByte {
 pub struct Wire {
     outgoing: VecDeque<(u64, u8)>,
     incoming: Vec<TimedByte>,
-    single: bool,
+    /// Single-wire mode: the receiver is on the transmit pin and receives what the port sends.
+    pub single: bool,
 }
 
 // A run has no snapshot.
@@ -33,11 +34,6 @@ impl Wire {
     /// Queues bytes that start no earlier than an instant; each follows the one before it.
     pub fn send(&mut self, from_ns: u64, bytes: &[u8]) {
         self.outgoing.extend(bytes.iter().map(|byte| (from_ns, *byte)));
-    }
-
-    /// Sets single-wire mode: the receiver is on the transmit pin and receives what the port sends.
-    pub fn set_single(&mut self, single: bool) {
-        self.single = single;
     }
 
     /// Earliest time at which the next byte may be sent, ns.

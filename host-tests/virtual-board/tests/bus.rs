@@ -116,7 +116,7 @@ const TURNS: u64 = 10;
 fn turning_the_bridge_on_keeps_the_phase_of_the_pwm(rig: &mut Rig) {
     let_go(rig);
     rig.run_ms(100).expect("it runs");
-    let counts = |rig: &mut Rig| rig.with(|stand| stand.session.board_mut().part.pwm_timer().0.counts());
+    let counts = |rig: &mut Rig| rig.with(|stand| stand.session.board_mut().pwm_timer().0.counts);
     let before = counts(rig).expect("it runs");
     for _ in 0..TURNS {
         for (torque, ms) in [(1, 1), (0, 40)] {

@@ -181,7 +181,7 @@ fn the_bridge_keeps_step_with_the_scan(rig: &mut Rig) {
         let frame = Config::shipped(&params).expect("a scan").timing.frame().0;
         let period = rig
             .with(|stand| {
-                let (timer, registers) = stand.session.board_mut().part.pwm_timer();
+                let (timer, registers) = stand.session.board_mut().pwm_timer();
                 timer.period_ticks(registers) as u32
             })
             .expect("it runs");

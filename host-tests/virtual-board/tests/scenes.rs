@@ -5,7 +5,7 @@ use sim::demo::{draw, missed, table};
 use sim::scene::{self, Scene, read};
 use sim::watch::{Agreement, BEYOND_MM, BEYOND_N, Controller, Path, Step, Summary, Watch};
 use sim::{cores, metrics};
-use virtual_board::demo::{self, Plan};
+use virtual_board::demo;
 use virtual_board::scene::simulate;
 
 /// Touches a wall 1 mm away.
@@ -206,7 +206,7 @@ fn long_every_other_scene_of_the_library_holds_its_bounds_on_the_image() {
 
 #[test]
 fn every_bound_holds_and_the_pictures_are_drawn() {
-    let (figures, run) = demo::run(&Plan { image: image(), quick: true }).expect("the demonstration runs");
+    let (figures, run) = demo::run(&image(), true).expect("the demonstration runs");
     assert_eq!(missed(&figures.checks), 0, "\n{}", table(&figures.checks, &figures.forces));
     assert_eq!(figures.forces.steps.len(), 4);
     assert_eq!(run.pictures.iter().map(|picture| picture.goal_n).collect::<Vec<_>>(), [1.0, 2.0, 5.0]);

@@ -2,6 +2,7 @@
 
 use super::model::{ALL, FITTED, FORMS, Law, Parameters, Path, index};
 use super::{NoDrive, Record};
+use crate::robust::{huber, huber_cost};
 use nalgebra::{Cholesky, Matrix3, SMatrix, SVector, Vector3};
 
 /// A vector over all parameters.
@@ -98,7 +99,7 @@ impl Problem<'_> {
         let uneven = at.own.iter().map(|own| (own[2] / self.uneven_v).powi(2));
         prior.sum::<f64>()
             + uneven.sum::<f64>()
-            + residuals.iter().flatten().map(|residual| huber(residual / scale)).sum::<f64>()
+            + residuals.iter().flatten().map(|residual| huber_cost(residual / scale, HUBER)).sum::<f64>()
     }
 
     /// Normal equations with the prior: matrix and gradient of the fitted parameters, 1 and 0 for the others.
@@ -332,7 +333,7 @@ impl Block {
         };
         for ((row, own), residual) in shared.iter().zip(&own).zip(residuals) {
             let residual = residual / scale;
-            let weight = (HUBER / residual.abs().max(1e-9)).min(1.0);
+            let weight = huber(residual, HUBER);
             block.matrix += row * row.transpose() * weight;
             block.gradient += row * (weight * residual);
             block.corner += own * own.transpose() * weight;
@@ -378,11 +379,6 @@ fn scale(residuals: &[Vec<f64>]) -> f64 {
     let middle = all.len() / 2;
     let square = all.iter().map(|residual| residual * residual).sum::<f64>() / all.len() as f64;
     (1.4826 * *all.select_nth_unstable_by(middle, f64::total_cmp).1).max(OUTLIERS * square.sqrt())
-}
-
-fn huber(r: f64) -> f64 {
-    let r = r.abs();
-    if r <= HUBER { r * r } else { HUBER * (2.0 * r - HUBER) }
 }
 
 /// First guess: a line through the strokes' voltages over their largest speeds.

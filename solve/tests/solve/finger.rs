@@ -309,15 +309,6 @@ pub fn cycle(mm_per_s: f64, hold_s: f64) -> Vec<Part> {
     ]
 }
 
-/// The same in stairs: short moves, each held for a while.
-pub fn stairs(mm_per_s: f64, held_s: f64) -> Vec<Part> {
-    let up = (0..=20).map(|step| 0.15 * f64::from(step));
-    let down = (0..=20).rev().map(|step| 0.15 * f64::from(step) - 0.15);
-    up.chain(down)
-        .flat_map(|to_mm| [Part::Ramp { to_mm, mm_per_s, step_mm: 9.0 }, Part::Hold { ends_s: vec![held_s] }])
-        .collect()
-}
-
 /// Pause in the air before a tare, s.
 const PAUSE_S: f64 = 10.0;
 

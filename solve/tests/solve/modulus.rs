@@ -1,6 +1,6 @@
 //! Young's modulus of drawn tips.
 
-use crate::finger::{Draw, FRAME_NS, Finger, Part, Place, cycle, plan, presses, stairs};
+use crate::finger::{Draw, FRAME_NS, Finger, Part, Place, cycle, plan, presses};
 use fingertip::params::Params;
 use solve::gains::Verdict;
 use solve::gains::{Condition, NoGains};
@@ -43,14 +43,9 @@ fn three_presses_give_a_better_one() {
     assert!(median < 1.0 && worst < 4.0 && within >= 2.0 && sigma < 1.4, "{median} {worst} {within} {sigma}");
 }
 
-/// Other motions give a worse one, and say so.
+/// A record that ends at the deepest place, as one that filled the memory, shows less than both strokes.
 #[test]
-fn other_motions_are_solved_too() {
-    for (name, plan) in [("5 mm/s", cycle(5.0, 3.0)), ("2 mm/s", cycle(2.0, 3.0)), ("stairs", stairs(2.0, 0.1))] {
-        let [median, worst, .., within] = summary(name, &errors(300..303, 1, &plan));
-        assert!(median < 4.0 && worst < 10.0 && within >= 2.0, "{name} {median} {worst} {within}");
-    }
-    // The forward stroke alone shows less than both strokes.
+fn the_forward_stroke_alone_is_solved_too() {
     let [median, worst, .., within] = summary("in alone", &errors(300..303, 1, &cycle(5.0, 3.0)[..2]));
     assert!(median < 6.0 && within >= 2.0, "{median} {worst} {within}");
 }

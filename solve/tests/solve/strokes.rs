@@ -29,53 +29,33 @@ fn tell(name: &str, values: &[(f64, usize)]) -> f64 {
     *worst
 }
 
-/// Errors of the results of many drives.
-#[derive(Default)]
-struct Figures {
-    /// Errors of each quantity, in percent.
-    errors: [Vec<(f64, usize)>; 5],
-    refused: Vec<usize>,
-    /// Drives with an error beyond 5 % and two standard uncertainties.
-    silent: Vec<usize>,
-    measured: usize,
-}
-
 /// Standard uncertainties up to which k and tau count as measured.
 const MEASURED: [f64; 2] = [0.025, 0.05];
 
-impl Figures {
-    /// Measures drives, `number` by `number`, and keeps this number of strokes.
-    fn of(
-        name: &str,
-        numbers: Range<usize>,
-        strokes: usize,
-        draw: impl Fn(&mut fastrand::Rng, usize) -> SimulatedDrive,
-    ) -> Self {
-        let mut figures = Self::default();
-        let count = numbers.len();
-        for number in numbers {
-            let mut rng = fastrand::Rng::with_seed(number as u64);
-            let mut rig = Rig::new(draw(&mut rng, number), rng.u64(..));
-            figures.add(number, &mut rig, strokes);
-        }
-        let Self { errors, refused, silent, measured } = &figures;
-        println!("{name}: {measured} of {count} measured, refused {refused:?}, silently wrong {silent:?}");
-        for (name, errors) in QUANTITIES.iter().zip(errors) {
-            tell(&format!("{name} %"), errors);
-        }
-        figures
-    }
-
-    fn add(&mut self, number: usize, rig: &mut Rig, strokes: usize) {
-        let record = measure(rig, strokes);
+/// Measures drives, number by number, of which it keeps this number of strokes, and judges the results by the bounds that
+/// hold for every population in the air. At least `least` of the drives must be measured.
+fn judge(
+    name: &str,
+    numbers: Range<usize>,
+    strokes: usize,
+    least: usize,
+    draw: impl Fn(&mut fastrand::Rng, usize) -> SimulatedDrive,
+) {
+    // Errors of each quantity, in percent, and drives with an error beyond 5 % and two standard uncertainties.
+    let (mut errors, mut silent) = (QUANTITIES.map(|_| Vec::new()), Vec::new());
+    let (mut refused, mut measured, count) = (Vec::new(), 0, numbers.len());
+    for number in numbers {
+        let mut rng = fastrand::Rng::with_seed(number as u64);
+        let mut rig = Rig::new(draw(&mut rng, number), rng.u64(..));
+        let record = measure(&mut rig, strokes);
         assert!(rig.travel_mm < TRAVEL_MM && rig.force_n == 0.0, "drive {number}: {} mm", rig.travel_mm);
         let d = &rig.drive;
         let found = match solve(&record) {
             Ok(found) => found,
             Err(refusal) => {
                 println!("drive {number}: {refusal} {d:?}");
-                self.refused.push(number);
-                return;
+                refused.push(number);
+                continue;
             }
         };
         let pairs = [
@@ -87,54 +67,48 @@ impl Figures {
         ];
         for (place, (found, truth)) in pairs.into_iter().enumerate() {
             let error = (found.value / truth - 1.0).abs();
-            self.errors[place].push((100.0 * error, number));
+            errors[place].push((100.0 * error, number));
             if place < 2 && error > 0.05 && found.relative() < 0.5 * error {
-                self.silent.push(number);
+                silent.push(number);
             }
         }
         let precise = pairs[0].0.relative() < MEASURED[0] && pairs[1].0.relative() < MEASURED[1];
-        self.measured += usize::from(precise);
+        measured += usize::from(precise);
         if !precise {
             println!("drive {number} is not measured: {found:?} {d:?}");
         }
     }
-
-    /// The bounds that hold for every population in the air.
-    fn judge(&self, measured: usize) {
-        assert!(self.silent.is_empty());
-        assert!(self.measured >= measured, "{} measured", self.measured);
-        // By encoders of 256 to 4096 counts, k cannot be exact for every drive of a population.
-        if measured >= 20 {
-            let worst = self.errors[0].iter().map(|(value, _)| *value).fold(0.0, f64::max);
-            assert!((0.1..5.0).contains(&worst), "{worst}");
-        }
-    }
+    println!("{name}: {measured} of {count} measured, refused {refused:?}, silently wrong {silent:?}");
+    let [worst, ..] =
+        core::array::from_fn::<_, 5, _>(|place| tell(&format!("{} %", QUANTITIES[place]), &errors[place]));
+    assert!(silent.is_empty() && measured >= least, "{measured} measured");
+    // By encoders of 256 to 4096 counts, k cannot be exact for every drive of a population.
+    assert!(least < 20 || (0.1..5.0).contains(&worst), "{worst}");
 }
 
 #[test]
 fn ordinary_drives_are_measured() {
-    Figures::of("ordinary", 0..30, ALL, |rng, _| SimulatedDrive::ordinary(rng)).judge(27);
+    judge("ordinary", 0..30, ALL, 27, |rng, _| SimulatedDrive::ordinary(rng));
 }
 
 #[test]
 fn varied_drives_are_measured() {
-    Figures::of("varied", 0..30, ALL, |rng, _| SimulatedDrive::varied(rng)).judge(27);
+    judge("varied", 0..30, ALL, 27, |rng, _| SimulatedDrive::varied(rng));
 }
 
 /// Slow strokes alone do not separate k from friction that falls with speed. The uncertainties must cover that.
 #[test]
 fn slow_strokes_alone_say_how_little_they_tell() {
-    Figures::of("slow", 0..4, SLOW, |rng, _| SimulatedDrive::varied(rng)).judge(0);
+    judge("slow", 0..4, SLOW, 0, |rng, _| SimulatedDrive::varied(rng));
 }
 
 /// Friction that changes along the travel and from stroke to stroke is not in the model.
 #[test]
 fn friction_that_is_not_even_is_not_silently_wrong() {
-    let draw = |rng: &mut fastrand::Rng, number| {
+    judge("uneven", 0..8, ALL, 4, |rng, number| {
         let ripple = if number % 2 == 0 { 0.05 } else { 0.0 };
         SimulatedDrive { ripple, unrest: 0.05, ..SimulatedDrive::varied(rng) }
-    };
-    Figures::of("uneven", 0..8, ALL, draw).judge(4);
+    });
 }
 
 /// Motors that are nothing like the reference, known as far as their sheets go, and one that is far from its sheet.
@@ -145,32 +119,16 @@ fn other_motors_are_measured_too() {
     let motors = [
         // Without a gear on a short crank; a small quick one with a high gear; three times the inertia of the sheet.
         SimulatedDrive {
-            k: 16e-3,
-            sheet_k: 16e-3,
-            winding_ohm: 8.0,
-            ohmmeter_ohm: 8.7,
-            inertia: 8e-7,
-            sheet_inertia: 8e-7,
             rad_per_mm: 0.4,
             friction_nm: 0.3e-3,
             stiction: 0.0,
             counts_per_turn: 4096.0,
-            ..drive.clone()
+            ..drive.clone().of_sheet(16e-3, 8.0, 8e-7)
         },
-        SimulatedDrive {
-            k: 3.2e-3,
-            sheet_k: 3.2e-3,
-            winding_ohm: 9.0,
-            ohmmeter_ohm: 9.7,
-            inertia: 0.1e-7,
-            sheet_inertia: 0.1e-7,
-            rad_per_mm: 18.75,
-            friction_nm: 0.05e-3,
-            ..drive.clone()
-        },
+        SimulatedDrive { rad_per_mm: 18.75, friction_nm: 0.05e-3, ..drive.clone().of_sheet(3.2e-3, 9.0, 0.1e-7) },
         SimulatedDrive { inertia: 2.1e-7, ..drive },
     ];
-    Figures::of("other", 0..3, ALL, |_, number| motors[number].clone()).judge(2);
+    judge("other", 0..3, ALL, 2, |_, number| motors[number].clone());
 }
 
 #[test]
@@ -260,47 +218,36 @@ fn params(rig: &Rig) -> Params {
 fn measure(rig: &mut Rig, strokes: usize) -> Record {
     let params = params(rig);
     let config = Config::shipped(&params).expect("a sheet that is allowed");
-    let first = rig.view();
-    let mut run =
-        Strokes::begin(Task::Strokes, first.count, fingertip::measure::BuiltIn::PROOF.expect("it is built in"));
+    let proof = fingertip::measure::BuiltIn::PROOF.expect("it is built in");
+    let mut run = Strokes::begin(Task::Strokes, rig.view(0.0).encoder, proof);
     let mut standing = MeasureStatus::running(Task::Strokes);
-    let mut bytes = vec![0; 4 * ROWS];
-    let (mut check, mut length, mut begun, mut applied, mut full) = (CHECK, 0, 0, 0.0, false);
+    let (mut kept, mut begun, mut applied) = (Vec::new(), 0, 0.0);
     while run.running() {
-        let now = rig.view();
-        let view = StrokeInputs {
-            encoder: now.count,
-            force: Newtons::from_bits((now.force_n * 65_536.0) as i32),
-            supply_mv: (1e3 * now.supply_v).round() as u16,
-            applied: (4e3 * applied) as i32,
-        };
-        run.observe(&view, &mut standing, &config);
+        let inputs = rig.view(applied);
+        run.observe(&inputs, &mut standing, &config);
         let row = run.row();
         begun += usize::from(row == Some(Kept::Stroke));
-        if let Some(row) = row.filter(|_| begun <= strokes && !full) {
-            let row: Row<'_, 10, 10> = match row {
-                Kept::Stroke => Row::Stroke,
-                Kept::Sample(count, voltage) => Row::Sample { count, voltage },
-            };
-            let mut out = Out::new(&mut bytes[length..], 0, check);
-            out.row(&row);
-            full = out.full;
-            if !full {
-                (check, length) = (out.check, length + out.count);
-            }
-        }
-        let duty = (f64::from(run.voltage_mv()) * 1e-3 / now.supply_v * PWM).round() / PWM;
-        applied = duty * now.supply_v;
+        kept.extend(row.filter(|_| begun <= strokes));
+        let supply_v = 1e-3 * f64::from(inputs.supply_mv);
+        let duty = (f64::from(run.voltage_mv()) * 1e-3 / supply_v * PWM).round() / PWM;
+        applied = duty * supply_v;
         rig.frame(duty);
     }
     assert_ne!(standing.state, MeasureState::Running);
+    let ended = if kept.len() > ROWS { Ended::Full } else { standing.ended };
+    kept.truncate(ROWS);
+    let mut bytes = vec![0; 4 * kept.len()];
+    let mut out = Out::new(&mut bytes, 0, CHECK);
+    for row in &kept {
+        out.row::<10, 10>(&match *row {
+            Kept::Stroke => Row::Stroke,
+            Kept::Sample(count, voltage) => Row::Sample { count, voltage },
+        });
+    }
     let [frame_ns, delay_ns] = [FRAME_S, DELAY_S].map(|time_s| (1e9 * time_s).round() as u32);
-    let rows = (length / 4) as u32;
-    let ended = if full { Ended::Full } else { standing.ended };
-    let value = standing.value;
-    let head = Head { kind: 2, shape: [10; 2], ended, rows, check, frame_ns, origin: run.origin(), delay_ns, value };
-    let series = [&head.bytes(), &bytes[..length]].concat();
-    record::strokes(&series, &params).expect("a series")
+    let (rows, origin, value) = (kept.len() as u32, run.origin(), standing.value);
+    let head = Head { kind: 2, shape: [10; 2], ended, rows, frame_ns, origin, delay_ns, value, ..Head::NONE };
+    record::strokes(&crate::sealed(&head, &bytes), &params).expect("a series")
 }
 
 // A drive as it comes, and something in its way: winding, friction that falls with speed, gear with play, encoder, supply
@@ -403,6 +350,12 @@ impl SimulatedDrive {
         }
     }
 
+    /// With these values, which the sheet has as well.
+    fn of_sheet(self, k: f64, winding_ohm: f64, inertia: f64) -> Self {
+        let ohmmeter_ohm = winding_ohm + 0.7;
+        Self { k, sheet_k: k, winding_ohm, ohmmeter_ohm, inertia, sheet_inertia: inertia, ..self }
+    }
+
     pub fn ohm(&self) -> f64 {
         self.winding_ohm + self.bridge_ohm
     }
@@ -414,14 +367,6 @@ impl SimulatedDrive {
     fn force_n(&self, tip_mm: f64) -> f64 {
         self.object.map_or(0.0, |(distance, kpa)| PI * kpa * 1e-3 * (tip_mm - distance).max(0.0).powi(2))
     }
-}
-
-/// Inputs of the controller in a frame.
-#[derive(Clone, Copy, Debug)]
-struct RigReading {
-    pub count: i32,
-    pub force_n: f64,
-    pub supply_v: f64,
 }
 
 struct Rig {
@@ -473,12 +418,18 @@ impl Rig {
         self.duty = duty;
     }
 
-    pub fn view(&mut self) -> RigReading {
+    /// Inputs of the controller in a frame, after one with this voltage at the motor.
+    pub fn view(&mut self, applied_v: f64) -> StrokeInputs {
         let count = (self.angle * self.drive.counts_per_turn / TAU).floor() as i32;
         let force_n = if self.drive.blind { 0.0 } else { self.drive.force_n(self.tip_mm) };
         // A converter's noise and steps.
-        let supply_v = ((self.supply_v + uniform(&mut self.rng, -4e-3, 4e-3)) * 1e3).round() * 1e-3;
-        RigReading { count: count * self.drive.counts, force_n, supply_v }
+        let supply_mv = (1e3 * (self.supply_v + uniform(&mut self.rng, -4e-3, 4e-3))).round() as u16;
+        StrokeInputs {
+            encoder: count * self.drive.counts,
+            force: Newtons::from_bits((force_n * 65_536.0) as i32),
+            supply_mv,
+            applied: (4e3 * applied_v) as i32,
+        }
     }
 
     fn step(&mut self, duty: f64) {

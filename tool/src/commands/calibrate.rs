@@ -16,7 +16,6 @@ const GOALS_N: [f64; 3] = [1.0, 2.5, 4.0];
 /// Name of the press after the controller became warmer.
 const WARM: &str = "warm.fts";
 
-/// Options of the calibration.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fingertip calibrate --session finger-1                  (leads through all of it; asks before it writes)\n  \
@@ -175,7 +174,6 @@ fn temperature(args: &Calibrate, procedure: &mut Procedure<'_>) -> Result<(), Er
     Ok(())
 }
 
-/// Options of the presses.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fingertip identify                                      (asks before it writes)\n  \
@@ -211,7 +209,6 @@ const JOG: &str = "jog";
 const STROKES: &str = "strokes.fts";
 const DIRECTION: &str = "direction_confirmed";
 
-/// Options of the commissioning.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fingertip commission                                    (watch the tip; asks before it writes)\n  \

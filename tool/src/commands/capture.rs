@@ -21,12 +21,9 @@ const LOOK: Duration = Duration::from_millis(5);
 const ARMED: i64 = CaptureState::Armed as i64;
 const RECORDING: i64 = CaptureState::Recording as i64;
 const DONE: i64 = CaptureState::Done as i64;
-/// A value of `TARE_STATE`.
-const TARE_REFUSED: i64 = Taring::Refused as i64;
 /// Licence of contributed captures.
 const LICENCE: &str = "Apache-2.0 OR MIT, as the project: contributed by who captured it";
 
-/// Options of a capture.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fingertip capture --out tare.mcap    (nothing moves: a tare, and the frames after it)\n  \
@@ -142,7 +139,7 @@ fn keep(args: &Args, client: &mut Client, interrupt: &Interrupt, json: bool) -> 
     // After a refused tare no capture begins, and a press would still use the old zero.
     while client.again(|client| client.number(address::CAPTURE_STATE))? == ARMED && Instant::now() < until {
         let state = client.again(|client| client.number(address::TARE_STATE))?;
-        if state == TARE_REFUSED {
+        if state == Taring::Refused as i64 {
             client.again(|client| client.set(address::CAPTURE, 0))?;
             return Err(no_tare(state));
         }
@@ -221,7 +218,6 @@ fn about(args: &Args, ended_ns: u64, client: &mut Client) -> Result<About, Error
     Ok(about)
 }
 
-/// Options of a replay.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  fingertip replay press.mcap\n  fingertip replay captures")]
 pub struct Replay {

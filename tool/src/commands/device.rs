@@ -9,7 +9,6 @@ use fingertip::store::BAUD_RATES;
 use serde_json::{Map, json};
 use std::time::{Duration, Instant};
 
-/// Ports and speeds to scan.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  fingertip scan\n  fingertip --port /dev/ttyUSB0 scan --speeds 57600,1000000")]
 pub struct Scan {
@@ -156,7 +155,6 @@ pub fn info(client: &mut Client, json: bool) -> Result<(), Error> {
 const STATE_FIRST: u16 = address::PRESENT_MODE;
 const STATE_LENGTH: u16 = 54;
 
-/// Options of the measurement.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  fingertip latency --seconds 10")]
 pub struct Latency {

@@ -11,7 +11,6 @@ use fingertip::pressure::GAIN_ONE;
 use fingertip::shipped::{Config, Gains, address};
 use fingertip::store::BAUD_RATES;
 use serde_json::{Map, json};
-use std::fmt::Write as _;
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -87,10 +86,10 @@ pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Err
             }
         }),
         Command::Backup { file, force } => {
-            let kept = Backup { values: read_all(client)?, gains: Some(read_gains(client)?) };
-            write_backup(file, *force, client, &kept)?;
-            let count = kept.values.len();
-            told(json, &kept.values, &format!("{count} parameters and the taxels' gains in {}", file.display()));
+            let (values, gains) = (read_all(client)?, read_gains(client)?);
+            write_backup(file, *force, client, &values, &gains)?;
+            let count = values.len();
+            told(json, &values, &format!("{count} parameters and the taxels' gains in {}", file.display()));
             Ok(())
         }
         Command::Restore { file, save } => {
@@ -199,7 +198,7 @@ pub(super) fn save(client: &mut Client, json: bool) -> Result<(), Error> {
     }
 }
 
-fn diff(file: Option<&std::path::Path>, client: &mut Client, json: bool) -> Result<(), Error> {
+fn diff(file: Option<&Path>, client: &mut Client, json: bool) -> Result<(), Error> {
     let (now, gains_now) = (read_all(client)?, read_gains(client)?);
     let (other, other_gains, what) = match file {
         Some(path) => {
@@ -421,9 +420,13 @@ struct Backup {
 }
 
 /// Writes it, whole or not at all.
-fn write_backup(path: &Path, force: bool, client: &mut Client, kept: &Backup) -> Result<(), Error> {
-    let Backup { values, gains } = kept;
-    let gains = gains.as_deref().unwrap_or_default();
+fn write_backup(
+    path: &Path,
+    force: bool,
+    client: &mut Client,
+    values: &[Value],
+    gains: &[Vec<u16>],
+) -> Result<(), Error> {
     let information = client.number(address::MODEL_INFORMATION)?;
     let pong = client.ping()?;
     let mut text = format!(
@@ -436,14 +439,11 @@ fn write_backup(path: &Path, force: bool, client: &mut Client, kept: &Backup) ->
     );
     for (register, value) in values {
         let doc = register.doc.trim();
-        // Writing to a string does not fail.
-        let _ = writeln!(text, "{} = {value}  # {doc} {} to {}.", name(register), register.min, register.max);
+        text += &format!("{} = {value}  # {doc} {} to {}.\n", name(register), register.min, register.max);
     }
-    if !gains.is_empty() {
-        let _ = writeln!(text, "\n# What each taxel's reading is multiplied by, in 16384ths.\n[{GAINS}]");
-    }
+    text += &format!("\n# What each taxel's reading is multiplied by, in 16384ths.\n[{GAINS}]\n");
     for (row, gains) in gains.iter().enumerate() {
-        let _ = writeln!(text, "row_{row} = {gains:?}");
+        text += &format!("row_{row} = {gains:?}\n");
     }
     whole::write(path, force, text.as_bytes())
 }
@@ -462,9 +462,8 @@ fn read_backup(path: &Path) -> Result<Backup, Error> {
         && (count != entries as i64 || !text.ends_with('\n'))
     {
         let why = format!(
-            "it was cut, or changed: it has {} of {count} entries, and its last line may not be whole. \
-             Where that is meant, take out the line `{ENTRIES}`",
-            entries
+            "it was cut, or changed: it has {entries} of {count} entries, and its last line may not be whole. \
+             Where that is meant, take out the line `{ENTRIES}`"
         );
         return Err(Error::file("read", path, why));
     }
@@ -477,25 +476,25 @@ fn read_backup(path: &Path) -> Result<Backup, Error> {
         }
     }
     wrong.extend(twice(&values));
-    let mut gains = rows.map(|_| Vec::new());
-    for (row, key) in (0..).map(|row| (row, format!("row_{row}"))).take(rows.map_or(0, |rows| rows.len())) {
-        let numbers = rows.and_then(|rows| rows.get(&key)).and_then(|item| item.as_array());
-        let gain = |value: &toml_edit::Value| {
-            value
-                .as_integer()
-                .and_then(|gain| u16::try_from(gain).ok())
-                .filter(|gain| (Gains::MIN..=Gains::MAX).contains(gain))
-        };
-        match (numbers.map(|numbers| numbers.iter().map(gain).collect::<Option<Vec<u16>>>()), &mut gains) {
-            (Some(Some(row)), Some(gains)) => gains.push(row),
-            (None, _) => wrong.push(format!("[{GAINS}] lacks {key}: rows count from 0")),
-            _ => wrong.push(format!(
-                "[{GAINS}] row_{row}: a gain is a whole number from {} to {}",
-                Gains::MIN,
-                Gains::MAX
-            )),
+    let gain = |value: &toml_edit::Value| {
+        let gain = value.as_integer().and_then(|gain| u16::try_from(gain).ok());
+        gain.filter(|gain| (Gains::MIN..=Gains::MAX).contains(gain))
+    };
+    let gains = rows.map(|rows| {
+        let mut gains = Vec::new();
+        for key in (0..rows.len()).map(|row| format!("row_{row}")) {
+            let numbers = rows.get(&key).and_then(|item| item.as_array());
+            match numbers.map(|numbers| numbers.iter().map(gain).collect::<Option<Vec<u16>>>()) {
+                Some(Some(row)) => gains.push(row),
+                None => wrong.push(format!("[{GAINS}] lacks {key}: rows count from 0")),
+                Some(None) => {
+                    let (min, max) = (Gains::MIN, Gains::MAX);
+                    wrong.push(format!("[{GAINS}] {key}: a gain is a whole number from {min} to {max}"));
+                }
+            }
         }
-    }
+        gains
+    });
     if wrong.is_empty() { Ok(Backup { values, gains }) } else { Err(Error::file("read", path, wrong.join("; "))) }
 }
 

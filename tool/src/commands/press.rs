@@ -24,7 +24,6 @@ const SETTLED_S: f64 = 0.1;
 /// A status packet's error for a value beyond what other registers allow.
 const BEYOND: u8 = 6;
 
-/// Options of a press.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  fingertip press 1.5\n  fingertip press 0.5 --seconds 10 --tolerance-percent 2\n\n\

@@ -41,7 +41,6 @@ const YIELD: Duration = Duration::from_millis(1);
 /// Packets that wait and go before reads.
 static URGENT: AtomicUsize = AtomicUsize::new(0);
 
-/// Address that serves clients.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fingertip --port /dev/ttyUSB0 share\n  \

@@ -20,8 +20,6 @@ const WATCHDOG: i64 = WATCHDOG_MS / 20;
 const RELEASE_S: f64 = 10.0;
 /// Longest wait for the controller, for example if no frames come and its clock does not advance.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// `MEASURE`: stops the motion.
-const STOP_MOTION: i64 = Task::Stop as i64;
 /// Time between two reads of the state.
 const LOOK: Duration = Duration::from_millis(10);
 /// A released tip below this speed and this force is clear of the object.
@@ -97,7 +95,7 @@ pub(super) fn release(within_s: f64, client: &mut Client) -> Result<State, Error
             return Ok(state);
         }
         if measures {
-            client.again(|client| client.set(address::MEASURE, STOP_MOTION))?;
+            client.again(|client| client.set(address::MEASURE, Task::Stop as i64))?;
         }
         if state.goal_mn != 0 {
             client.again(|client| client.set(address::GOAL_FORCE_MN, 0))?;
@@ -125,7 +123,6 @@ const ROLL_OUT: Duration = Duration::from_secs(2);
 /// A tip that still presses with more force gets a hint.
 const RESIDUAL_MN: i64 = 50;
 
-/// Options of a stop.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fingertip stop\n  \
@@ -265,7 +262,6 @@ pub fn recover(client: &mut Client, json: bool) -> Result<(), Error> {
 const TARE_RUNNING: i64 = Taring::Running as i64;
 const TARE_DONE: i64 = Taring::Done as i64;
 
-/// Options of the tare.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  fingertip tare")]
 pub struct Tare {

@@ -6,7 +6,6 @@ use crate::numbers;
 #[cfg(feature = "foxglove")]
 pub use server::run;
 
-/// Address of the stream.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fingertip stream    (in Foxglove: Open connection, Foxglove WebSocket, ws://localhost:8765)")]

@@ -16,7 +16,6 @@ use std::time::{Duration, Instant};
 /// Time span that is shown.
 const PAST_S: f64 = 10.0;
 
-/// Options of the view.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  fingertip view --rate-hz 30    (q ends)")]
 pub struct Args {

@@ -1,7 +1,7 @@
 //! Ends of commands: the exit codes of docs/host.md, errors in JSON, and the help of every command; and robustness against
 //! any request and any failure of the controller.
 
-use crate::served::{Served, ended, line_with};
+use crate::served::{Served, ended, line_with, program};
 use fingertip::link::packet::instruction::REBOOT;
 use serde_json::Value;
 use std::fs;
@@ -67,27 +67,6 @@ fn errors_in_json_are_the_last_line_of_standard_error() {
 }
 
 #[test]
-fn a_press_reports_whether_the_force_was_reached_and_held() {
-    let finger = Served::begin("wall");
-    finger.done(&["tare"]);
-    let press = |arguments: &[&str]| {
-        let output = finger.start(&[&["press", "0.5", "--json"], arguments].concat()).wait_with_output();
-        let output = output.expect("it ends");
-        let report: Value = serde_json::from_slice(&output.stdout).expect("JSON");
-        (output.status.code(), report)
-    };
-    let (code, report) = press(&["--seconds", "0.3", "--within-s", "3600"]);
-    assert_eq!((code, &report["reached"], &report["held"]), (Some(0), &true.into(), &true.into()), "{report}");
-    assert_eq!((&report["tolerance_mn"], &report["states_outside"]), (&25.0.into(), &0.into()));
-    let least_mn = report["least_mn"].as_i64().expect("a number");
-    assert!(least_mn >= 475 && report["most_mn"].as_i64() <= Some(525), "{report}");
-    finger.command("remove");
-    let (code, report) = press(&["--within-s", "0.5"]);
-    assert_eq!((code, &report["reached"], &report["held"]), (Some(1), &false.into(), &false.into()), "{report}");
-    assert_eq!((&report["states"], &report["mean_mn"]), (&0.into(), &Value::Null));
-}
-
-#[test]
 fn a_press_rewrites_one_line_of_a_terminal() {
     let finger = Served::begin("wall");
     finger.done(&["tare"]);
@@ -105,8 +84,8 @@ fn a_press_rewrites_one_line_of_a_terminal() {
 
 /// Looks at the help of a command and of all that are below it.
 fn walk(path: &[&str]) -> usize {
-    let output = std::process::Command::new(env!("CARGO_BIN_EXE_fingertip")).args(path).arg("--help").output();
-    let text = String::from_utf8(output.expect("it starts").stdout).expect("UTF-8");
+    let output = program(path).arg("--help").output().expect("it starts");
+    let text = String::from_utf8(output.stdout).expect("UTF-8");
     assert!(text.contains("Example"), "{path:?}: {text}");
     let commands = text.split("\nCommands:\n").nth(1).and_then(|rest| rest.split("\n\n").next()).unwrap_or_default();
     let names = commands.lines().filter_map(|line| line.split_whitespace().next()).filter(|name| *name != "help");

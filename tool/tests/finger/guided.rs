@@ -1,9 +1,8 @@
 //! The guided procedures: `commission`, `identify` and `calibrate` against a served finger.
 
 use crate::served::{self, Served};
-use crate::stopped::{RESIDUAL_N, end_behind, is_at_rest};
+use crate::stopped::{ENDS, End, RESIDUAL_N, end_behind, is_at_rest};
 use fingertip::link::packet::instruction::REBOOT;
-use rustix::process::Signal;
 use serde_json::{Value, json};
 use std::fs;
 use std::io::{BufRead as _, BufReader, Write as _};
@@ -91,8 +90,7 @@ fn a_killed_session_resumes_where_it_was() {
     let listed = || fs::read_to_string(finger.file("killed/session.json")).is_ok_and(|text| text.contains("press-1"));
     let mut child = finger.start(&[&calibrate[..], &["--json"]].concat());
     Served::wait_for(listed);
-    child.kill().expect("it runs");
-    child.wait().expect("it ends");
+    finger.kill(&mut child);
     finger.done(&["stop"]);
     finger.done(&["recover"]);
     let bytes = fs::read(&record).expect("it was kept");
@@ -207,23 +205,6 @@ fn a_program_is_asked_nothing() {
     }
 }
 
-/// Early end of a procedure: by a signal, a cable that is pulled out, or a controller without power.
-#[derive(Clone, Copy, Debug)]
-enum End {
-    Signal(Signal),
-    Cable,
-    Power,
-}
-
-const ENDS: [End; 6] = [
-    End::Signal(Signal::INT),
-    End::Signal(Signal::TERM),
-    End::Signal(Signal::HUP),
-    End::Signal(Signal::KILL),
-    End::Cable,
-    End::Power,
-];
-
 /// Force at the tip that the dry friction of the scene's motor holds, N: 0.12 mN m, a gear of 43, a drum of 12 mm.
 const FRICTION_N: f64 = 0.12e-3 * 43.0 / 12e-3;
 
@@ -261,14 +242,7 @@ fn resumes(procedure: &[&str], end: End, packets: u64, reference: &Value) -> (bo
         (parameters(&finger), finger.file("session"), format!("{end:?} after {packets} packets"));
     let arguments = [procedure, &["--session", &session]].concat();
     let json = [&arguments[..], &["--json"]].concat();
-    match end {
-        End::Signal(signal) => end_behind(&finger, packets, &json, Some(signal)),
-        End::Cable => end_behind(&finger, packets, &json, None),
-        End::Power => {
-            finger.command(&format!("restart after {packets}"));
-            end_behind(&finger, u64::MAX, &json, Some(Signal::KILL));
-        }
-    }
+    end_behind(&finger, packets, &json, end);
     // After a loss of power nothing drives the finger away: the motor's friction holds the tip in place.
     let left_n = if matches!(end, End::Power) { FRICTION_N } else { RESIDUAL_N };
     let state = finger.command("state");

@@ -79,13 +79,21 @@ fn it_tares_presses_and_lets_go() {
     let held = finger.json(&["press", "1.5", "--seconds", "0.3", "--within-s", "3600"]);
     let mean_mn = held["mean_mn"].as_f64().expect("a number");
     assert!((1_470.0..=1_530.0).contains(&mean_mn) && held["held_s"].as_f64() >= Some(0.3), "{held}");
+    assert_eq!((&held["reached"], &held["held"], &held["states_outside"]), (&true.into(), &true.into(), &0.into()));
+    let [least_mn, most_mn] = ["least_mn", "most_mn"].map(|name| held[name].as_i64().expect("a number"));
+    assert!(held["tolerance_mn"] == 75.0 && least_mn >= 1_425 && most_mn <= 1_575, "{held}");
     let info = finger.json(&["info"]);
     assert_eq!((&info["torque_enable"], &info["goal_mn"], &info["bus_watchdog_ms"]), (&0.into(), &0.into(), &0.into()));
     let why = finger.refused(&["press", "9"]);
     assert!(why.contains("goal_force_mn to 9000") && why.contains("error 6"), "{why}");
     assert!(why.contains("force_max_mn is 7000"), "{why}");
     finger.command("remove");
-    finger.refuses(&["press", "1", "--within-s", "0.5"], &["not reached", "mode approach"]);
+    let press = finger.start(&["press", "1", "--within-s", "0.5", "--json"]).wait_with_output().expect("it ends");
+    let (code, why) = served::ended(&press);
+    assert!(code == Some(1) && why.contains("not reached") && why.contains("mode approach"), "{why}");
+    let report: serde_json::Value = serde_json::from_slice(&press.stdout).expect("JSON");
+    assert_eq!((&report["reached"], &report["held"], &report["states"]), (&false.into(), &false.into(), &0.into()));
+    assert!(report["mean_mn"].is_null(), "{report}");
     assert_eq!(finger.json(&["info"])["torque_enable"], 0, "torque is off all the same");
 }
 

@@ -1,7 +1,7 @@
 //! Recordings: their times, their owners, and the rest of one whose program was killed. Captures: taken, kept as files,
 //! replayed; and files that are not as they were written. And what the program shows on a screen.
 
-use crate::served::{Served, ended};
+use crate::served::{Served, ended, program};
 use fingertip::shipped::address;
 use fingertip_cli::commands::view::{Seen, draw};
 use fingertip_cli::recordings::{Topic, of_bytes, through_the_core};
@@ -14,8 +14,6 @@ use ratatui::layout::Rect;
 use serde_json::Value;
 use sim::recording::{SCALARS, schemas};
 use std::fs;
-use std::path::Path;
-use std::process::Command;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Host's time, s since 1970.
@@ -157,8 +155,7 @@ fn a_killed_recording_is_kept_and_can_be_read() {
         let (file, part) = (finger.file(name), finger.file(&format!("{name}.part")));
         let mut child = finger.start(&["record", "--rate-hz", "0", &file]);
         Served::wait_for(|| fs::metadata(&part).is_ok_and(|part| part.len() > 300_000));
-        child.kill().expect("it runs");
-        child.wait().expect("it ends");
+        finger.kill(&mut child);
         let bytes = fs::read(&part).expect("it is there");
         if name.ends_with(".mcap") {
             let messages = readable(&bytes).0;
@@ -309,13 +306,18 @@ fn a_file_that_is_not_as_it_was_written_is_refused() {
     finger.refuses(&["replay", folder.to_str().expect("text")], &["no capture there"]);
 }
 
-/// A schema that both have.
+/// A schema that both have: the scenes', and the own one, whose messages have its names.
 fn both(topic: Topic) -> [Value; 2] {
     let name = topic.schema_name();
     let scenes = schemas().into_iter().find(|(_, known, _)| *known == name);
     let (kind, _, scenes) = scenes.unwrap_or_else(|| panic!("the scenes have no {name}"));
     assert_eq!(topic.name(1), format!("/finger0/{kind}"));
-    [scenes.into_bytes(), topic.schema()].map(|schema| serde_json::from_slice(&schema).expect("JSON"))
+    let message = topic.message(&Stamp::default(), &State::default());
+    let [scenes, own, message] =
+        [scenes.into_bytes(), topic.schema(), message].map(|json| serde_json::from_slice(&json).expect("JSON"));
+    let message: Value = message;
+    assert_eq!(message.as_object().expect("a map").keys().collect::<Vec<_>>(), names(&own));
+    [scenes, own]
 }
 
 fn names(schema: &Value) -> Vec<&str> {
@@ -323,24 +325,14 @@ fn names(schema: &Value) -> Vec<&str> {
 }
 
 #[test]
-fn the_scalars_are_those_of_the_scenes_that_a_controller_knows() {
+fn the_messages_are_those_of_the_scenes_that_a_controller_knows() {
     let [scenes, own] = both(Topic::Scalars);
     let own = names(&own);
     assert_eq!(names(&scenes), SCALARS.map(|(name, ..)| name));
     let known: Vec<&str> = names(&scenes).into_iter().filter(|name| own.contains(name)).collect();
     assert_eq!(known, own, "by the same names, in the same order");
-    let message: Value =
-        serde_json::from_slice(&Topic::Scalars.message(&Stamp::default(), &State::default())).expect("JSON");
-    assert_eq!(message.as_object().expect("a map").keys().collect::<Vec<_>>(), own);
-}
-
-#[test]
-fn the_picture_is_that_of_the_scenes() {
     let [scenes, own] = both(Topic::Image);
     assert_eq!(scenes, own);
-    let message: Value =
-        serde_json::from_slice(&Topic::Image.message(&Stamp::default(), &State::default())).expect("JSON");
-    assert_eq!(message.as_object().expect("a map").keys().collect::<Vec<_>>(), names(&own));
 }
 
 // What `view` shows, by the characters on a screen of 80 x 24.
@@ -399,12 +391,7 @@ fn a_fault_and_a_lost_line_are_shown() {
     let lines = screen(&seen, 80, 24);
     assert_eq!(lines[23], "no answer of ID 1");
     assert!(lines[4].contains("supply low"), "the last state stays");
-}
-
-#[test]
-fn any_size_of_a_terminal_will_do() {
-    let mut seen = Seen::default();
-    seen.take(Ok(pressed(0)));
+    // Any size will do.
     for (width, height) in [(1, 1), (20, 5), (41, 12), (79, 23), (300, 100)] {
         screen(&seen, width, height);
     }
@@ -414,8 +401,7 @@ fn any_size_of_a_terminal_will_do() {
 
 #[test]
 fn every_capture_replays_to_the_bit() {
-    let captures = Path::new(env!("CARGO_MANIFEST_DIR")).join("../captures");
-    let output = Command::new(env!("CARGO_BIN_EXE_fingertip")).arg("replay").arg(captures).output().expect("it starts");
+    let output = program(&["replay", concat!(env!("CARGO_MANIFEST_DIR"), "/../captures")]).output().expect("it starts");
     let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
     assert!(output.status.success(), "{out}{err}");
     assert!(out.contains("press.mcap") && out.lines().all(|line| line.ends_with("the same to the bit")), "{out}");

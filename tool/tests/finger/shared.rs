@@ -1,16 +1,17 @@
 //! `fingertip share`: one client commands, all read, anyone stops.
 
-use crate::served::{Served, client, line_with, packet};
+use crate::served::{Served, client, line_with};
 use crate::stopped::RESIDUAL_N;
 use fingertip::link::packet::{BROADCAST, instruction};
 use fingertip::shipped::address;
 use fingertip_cli::Client;
+use fingertip_cli::client::packet;
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
 use std::process::{Child, Output, Stdio};
 
 /// Time that a client of the broker waits by its `--timeout-ms`.
-const TIMEOUT: &str = "3000";
+const TIMEOUT: &str = "6000";
 
 /// A served finger and a broker in front of it.
 struct Shared {
@@ -205,14 +206,14 @@ fn a_finger_of_a_group_is_stopped_once_its_commander_has_left() {
     assert_eq!(client.number(address::TORQUE_ENABLE).expect("it answers"), 1, "nobody commanded it");
 }
 
-/// Each of their packets waits for nothing, for 2 s.
+/// Each of their packets waits for nothing, for 4 s.
 #[test]
 fn clients_that_ask_an_absent_id_do_not_starve_a_press() {
     let shared = Shared::begin("wall");
     assert!(shared.output(&["tare"]).status.success());
     let mut press = shared.client();
     // What is left of `TIMEOUT` is for its own answer: a USB port may delay it.
-    press.timeout = std::time::Duration::from_millis(2_500);
+    press.timeout = std::time::Duration::from_millis(5_500);
     for (register, value) in [(address::BUS_WATCHDOG, 25), (address::TORQUE_ENABLE, 1), (address::GOAL_FORCE_MN, 1_000)]
     {
         press.set(register, value).expect("it obeys");

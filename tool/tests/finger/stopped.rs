@@ -41,18 +41,28 @@ pub fn is_at_rest(finger: &Served, what: &str) {
 fn a_signal_leaves_every_motion_at_rest_and_clear_of_the_object() {
     let finger = Served::patient("wall");
     for (arguments, mode) in MOTIONS {
-        for signal in [Signal::INT, Signal::TERM, Signal::HUP] {
+        for signal in [Signal::INT, Signal::TERM, Signal::HUP, Signal::KILL] {
             let what = format!("{arguments:?} {signal:?}");
             let parameters = finger.json(&["params", "get"]);
             let child = caught(&finger, arguments, mode);
             Served::signal(&child, signal);
             let (code, said) = ended(&child.wait_with_output().expect("it ends"));
-            assert_eq!(code, Some(130), "{what}: {said}");
-            assert!(said.contains("interrupted before its end; torque is off"), "{what}: {said}");
+            if signal == Signal::KILL {
+                // The controller releases the object by itself once its bus is silent.
+                finger.until_alone("BusSilent");
+            }
             assert!(finger.true_force_n() < RESIDUAL_N, "{what}: {}", finger.command("state"));
+            if signal == Signal::KILL {
+                let stopped = finger.json(&["stop"]);
+                assert_eq!((&stopped["mode"], &stopped["fault"]), (&"fault".into(), &7.into()), "{what}: {stopped}");
+                finger.done(&["recover"]);
+            } else {
+                assert_eq!(code, Some(130), "{what}: {said}");
+                assert!(said.contains("interrupted before its end; torque is off"), "{what}: {said}");
+            }
             is_at_rest(&finger, &what);
             assert_eq!(finger.json(&["params", "get"]), parameters, "{what}");
-            if ["Press:", "Strokes:"].contains(&mode) {
+            if signal != Signal::KILL && ["Press:", "Strokes:"].contains(&mode) {
                 let ended = finger.client().number(address::MEASURE_ENDED).expect("it answers");
                 assert_eq!(ended, Ended::Interrupted as i64, "{what}");
             }
@@ -60,25 +70,22 @@ fn a_signal_leaves_every_motion_at_rest_and_clear_of_the_object() {
     }
 }
 
-/// The controller releases the object by itself once its bus is silent.
-#[test]
-fn a_killed_command_leaves_no_force_and_the_fault_of_the_watchdog() {
-    let finger = Served::patient("wall");
-    for (arguments, mode) in MOTIONS {
-        let mut child = caught(&finger, arguments, mode);
-        child.kill().expect("it runs");
-        child.wait().expect("it ends");
-        finger.until_alone("BusSilent");
-        assert!(finger.true_force_n() < RESIDUAL_N, "{arguments:?}: {}", finger.command("state"));
-        let stopped = finger.json(&["stop"]);
-        assert_eq!((&stopped["mode"], &stopped["fault"]), (&"fault".into(), &7.into()), "{arguments:?}: {stopped}");
-        finger.done(&["recover"]);
-        is_at_rest(&finger, "recovered");
-    }
+/// Early end of a command: by a signal, a cable that is pulled out, or a controller without power.
+#[derive(Clone, Copy, Debug)]
+pub enum End {
+    Signal(Signal),
+    Cable,
+    Power,
 }
 
-/// Ends of a program: its signal, or a cable that is pulled out.
-const ENDS: [Option<Signal>; 5] = [Some(Signal::INT), Some(Signal::TERM), Some(Signal::HUP), Some(Signal::KILL), None];
+pub const ENDS: [End; 6] = [
+    End::Signal(Signal::INT),
+    End::Signal(Signal::TERM),
+    End::Signal(Signal::HUP),
+    End::Signal(Signal::KILL),
+    End::Cable,
+    End::Power,
+];
 
 /// One instant of every motion and end, drawn with a fixed seed. More with
 /// `INSTANTS=50 cargo test -p fingertip-cli --test finger any_instant -- --nocapture`.
@@ -91,12 +98,12 @@ fn a_program_that_ends_at_any_instant_leaves_no_force() {
         let short = arguments.iter().map(|word| if *word == "1000000" { "0.5" } else { *word });
         let arguments: Vec<&str> = short.collect();
         let packets = packets_of(&arguments);
-        for end in ENDS {
-            for _ in 0..instants {
-                ends_without_force(&arguments, end, random.u64(1..packets));
-            }
+        // Without power, friction holds the tip in place.
+        let ends = ENDS.into_iter().filter(|end| !matches!(end, End::Power));
+        for end in ends.flat_map(|end| std::iter::repeat_n(end, instants)) {
+            ends_without_force(&arguments, end, random.u64(1..packets));
         }
-        println!("{arguments:?}: no force left at {instants} instants of {} ends, {packets} packets", ENDS.len());
+        println!("{arguments:?}: no force left at {instants} instants of each end, {packets} packets");
     }
 }
 
@@ -116,7 +123,7 @@ fn packets_of(arguments: &[&str]) -> u64 {
 }
 
 /// Ends a command behind a number of its packets, and judges the true force 1 s later.
-fn ends_without_force(arguments: &[&str], end: Option<Signal>, packets: u64) {
+fn ends_without_force(arguments: &[&str], end: End, packets: u64) {
     let finger = Served::patient("wall");
     finger.done(&["tare"]);
     end_behind(&finger, packets, &with_file(arguments, &finger.file("ended.mcap")), end);
@@ -124,21 +131,28 @@ fn ends_without_force(arguments: &[&str], end: Option<Signal>, packets: u64) {
     assert!(finger.true_force_n() < RESIDUAL_N, "{arguments:?} {end:?} after {packets} packets: {state}");
 }
 
-/// Ends a command behind a number of its packets by a signal, or by a cable that is pulled out; then 1 s goes by.
-pub fn end_behind(finger: &Served, packets: u64, arguments: &[&str], end: Option<Signal>) {
+/// Ends a command behind a number of its packets; then 1 s goes by. Without power it ends by itself.
+pub fn end_behind(finger: &Served, packets: u64, arguments: &[&str], end: End) {
     let begun = finger.heard();
-    let mut arguments = arguments.to_vec();
-    if end.is_none() {
-        finger.command(&format!("deaf after {packets} for {}", u64::MAX));
-        arguments.extend(["--timeout-ms", "100"]);
+    let (mut arguments, mut behind) = (arguments.to_vec(), packets);
+    match end {
+        End::Signal(_) => {}
+        End::Cable => {
+            finger.command(&format!("deaf after {packets} for {}", u64::MAX));
+            arguments.extend(["--timeout-ms", "100"]);
+        }
+        End::Power => {
+            finger.command(&format!("restart after {packets}"));
+            behind = u64::MAX;
+        }
     }
     let mut child = finger.start(&arguments);
     let mut runs = || child.try_wait().expect("it was started").is_none();
-    while finger.heard() - begun < packets && runs() {
+    while finger.heard() - begun < behind && runs() {
         std::thread::sleep(Served::LOOK);
     }
     let (ended_s, runs) = (finger.now_s(), runs());
-    if let Some(signal) = end.filter(|_| runs) {
+    if let (End::Signal(signal), true) = (end, runs) {
         Served::signal(&child, signal);
     }
     child.wait().expect("it ends");

@@ -1,14 +1,13 @@
 //! A finger that is served from a thread, and `fingertip` set on it.
 #![allow(dead_code, reason = "each test takes what it needs")]
 
-use fingertip::link::Reply;
+use fingertip::link::packet::BROADCAST;
 use fingertip::link::packet::instruction::REBOOT;
-use fingertip::link::packet::{self, BROADCAST};
 use fingertip_cli::Client;
-use fingertip_cli::client::Reach;
-use rustix::process::Signal;
+use fingertip_cli::client::{Reach, packet};
+use rustix::process::{Pid, Signal};
 use serve::native::Native;
-use serve::{Place, Port, Stop};
+use serve::{Finger as _, Place, Port, Stop};
 use sim::effects::Named;
 use sim::native::served::Bus;
 use std::cell::RefCell;
@@ -22,18 +21,21 @@ use std::time::{Duration, Instant};
 /// Patience on the slowest machine, where an answer is expected.
 const PATIENCE: &str = "600000";
 
+/// A command, and the way of its answer.
+type Asked = (String, Sender<Result<String, String>>);
+
 pub struct Served {
     pub port: String,
     folder: PathBuf,
     stop: Stop,
-    commands: Sender<(String, Sender<Result<String, String>>)>,
+    commands: Sender<Asked>,
     thread: RefCell<Option<JoinHandle<()>>>,
 }
 
 /// A finger that executes commands between two polls.
 struct Told {
     native: Native<Named>,
-    commands: Receiver<(String, Sender<Result<String, String>>)>,
+    commands: Receiver<Asked>,
     line: Line,
 }
 
@@ -78,6 +80,10 @@ impl Told {
             ["deaf", "no", "more"] => line.ears = None,
             ["stall"] => line.stalled = Some(Vec::new()),
             ["go", "on"] => line.stalled.take().into_iter().flatten().for_each(|bytes| self.native.0.hear(&bytes)),
+            // These look on, and leave the finger's clock alone.
+            ["look"] => return Some(self.native.command("state")),
+            ["now"] => return Some(Ok(self.native.now_s().to_string())),
+            ["heard"] => return Some(Ok(line.heard.to_string())),
             ["restarted"] => return Some(Ok(line.restart.is_none().to_string())),
             ["unheard"] => return Some(Ok(line.ears.map_or(0, |(.., unheard)| unheard).to_string())),
             _ => return None,
@@ -95,20 +101,11 @@ impl serve::Finger for Told {
 
     fn run_until(&mut self, time_s: f64) -> Result<(), Self::Error> {
         while let Ok((command, answer)) = self.commands.try_recv() {
-            // A look leaves the finger's clock alone.
-            let look = match command.as_str() {
-                "look" => Some(self.native.command("state")),
-                "now" => Some(Ok(self.native.now_s().to_string())),
-                "heard" => Some(Ok(self.line.heard.to_string())),
-                _ => None,
-            };
-            if let Some(look) = look {
-                answer.send(look).expect("somebody waits for it");
-                continue;
-            }
             let done = self.told(&command).unwrap_or_else(|| self.native.command(&command));
             // What was broken or mended acts on the next frames; whoever asks then finds it so.
-            (0..20).for_each(|_| self.native.0.frame());
+            if !["look", "now", "heard"].contains(&command.as_str()) {
+                (0..20).for_each(|_| self.native.0.frame());
+            }
             answer.send(done).expect("somebody waits for it");
         }
         let mut in_state = |word: &str| self.native.command("state").is_ok_and(|state| state.contains(word));
@@ -179,8 +176,7 @@ impl Served {
         let thread = std::thread::spawn(move || {
             let native = Native(Bus::new(&scene).expect("a world"));
             let mut told = Told { native, commands: commanded, line: Line::default() };
-            let served = serve::serve(&mut told, &mut port, Duration::from_secs(3600), false);
-            served.map(drop).unwrap_or_else(|never| match never {});
+            let Ok(_) = serve::serve(&mut told, &mut port, Duration::from_secs(3600), false);
         });
         let folder =
             std::env::temp_dir().join(format!("fingertip-cli-{}-{}", std::process::id(), name.replace('/', "-")));
@@ -244,6 +240,13 @@ impl Served {
         killed
     }
 
+    /// Kills a command. The answer to its last request goes by before the next command would take it for its own.
+    pub fn kill(&self, child: &mut Child) {
+        child.kill().expect("it runs");
+        child.wait().expect("it ends");
+        (0..3).for_each(|_| drop(self.command("state")));
+    }
+
     pub fn start(&self, arguments: &[&str]) -> Child {
         self.fingertip(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts")
     }
@@ -255,8 +258,8 @@ impl Served {
     }
 
     pub fn fingertip(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_fingertip"));
-        command.env("FINGERTIP_PORT", &self.port).args(arguments);
+        let mut command = program(arguments);
+        command.env("FINGERTIP_PORT", &self.port);
         if !arguments.contains(&"--timeout-ms") && !arguments.contains(&"scan") {
             command.args(["--timeout-ms", PATIENCE]);
         }
@@ -287,14 +290,12 @@ impl Served {
 
     /// The same without a port.
     pub fn nobody(arguments: &[&str]) -> String {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_fingertip"));
-        complained(&command.env_remove("FINGERTIP_PORT").args(arguments).output().expect("it starts"))
+        complained(&program(arguments).output().expect("it starts"))
     }
 
     pub fn not_understood(arguments: &[&str]) -> String {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_fingertip"));
-        let (code, err) =
-            ended(&command.env("FINGERTIP_PORT", "/nowhere").args(arguments).output().expect("it starts"));
+        let output = program(arguments).env("FINGERTIP_PORT", "/nowhere").output();
+        let (code, err) = ended(&output.expect("it starts"));
         assert_eq!(code, Some(2), "{arguments:?}: {err}");
         err
     }
@@ -320,9 +321,7 @@ impl Served {
     }
 
     pub fn signal(child: &Child, signal: Signal) {
-        let pid = i32::try_from(child.id()).expect("a process number");
-        let pid = rustix::process::Pid::from_raw(pid).expect("a process number");
-        rustix::process::kill_process(pid, signal).expect("it runs");
+        rustix::process::kill_process(Pid::from_child(child), signal).expect("it runs");
     }
 
     /// Waits until the finger's state has this word, its mode for example. The finger's clock runs by itself.
@@ -366,23 +365,22 @@ impl Drop for Served {
     }
 }
 
+/// `fingertip` without a port.
+pub fn program(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_fingertip"));
+    command.env_remove("FINGERTIP_PORT").args(arguments);
+    command
+}
+
 /// A client of a port whose answers come in the end.
 pub fn client(port: &str) -> Client {
     let reach = Reach { port: Some(port.into()), baud: 1_000_000, ids: vec![1], timeout_ms: 600_000 };
     Client::open(&reach).expect("it listens")
 }
 
-pub fn packet(id: u8, instruction: u8, params: &[u8]) -> Vec<u8> {
-    let mut packet = Reply::new();
-    let mut sender = packet::Sender::new(&mut packet, id, instruction);
-    params.iter().for_each(|byte| sender.push(*byte));
-    sender.finish();
-    packet.to_vec()
-}
-
 /// An instruction to all devices without parameters; no device answers.
 fn instruction(number: u8) -> Vec<u8> {
-    packet(BROADCAST, number, &[])
+    packet(BROADCAST, number, &[]).to_vec()
 }
 
 /// Reads lines up to one with this text, which is returned; later ones are read and dropped, so that nothing blocks.

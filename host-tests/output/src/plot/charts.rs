@@ -1,9 +1,6 @@
 //! Charts over time: the whole run, and each change of the goal at a larger scale.
 
-use super::{
-    Area, FAINT, FINE, FONT, GOAL_INK, INK, LABEL_PX, PALE_INK, PlotError, SECOND_INK, TITLE_PX, failed, fine_picture,
-    number,
-};
+use super::{Area, Curve, Curves, FINE, FONT, LABEL_PX, PlotError, failed, fine_picture};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
@@ -44,30 +41,38 @@ pub struct Panel<'a> {
 /// Force against goal, indentation and duty over the whole run.
 pub fn overview(trace: &[Sample]) -> Result<String, PlotError> {
     let end_s = trace.last().ok_or_else(|| PlotError("the trace is empty".into()))?.time_s;
+    let points = |value: fn(&Sample) -> f64| thinned(trace.iter().map(|s| (s.time_s, value(s))).collect());
+    let (force, goal) = (points(|s| s.true_force_n), steps_of(trace, |s| (s.time_s, s.goal_n)));
+    let top_n = top(force.iter().chain(&goal).map(|(_, n)| *n));
+    let indentation = points(|s| s.indentation_mm);
+    let top_mm = top(indentation.iter().map(|(_, mm)| *mm));
+    let duty = points(|s| 100.0 * s.duty);
+    let mean = thinned(smoothed(trace.iter().map(|s| (s.time_s, 100.0 * s.duty)).collect()));
+    let panel = |title: &str, y, y_range, curves| Curves {
+        title: title.into(),
+        x: "time, s",
+        y,
+        x_range: [0.0, end_s],
+        y_range,
+        curves,
+    };
+    let panels = [
+        panel(
+            "Contact force (solid) and goal (dashed)",
+            "N",
+            [0.0, top_n],
+            vec![Curve::Dashed(goal), Curve::Solid(force)],
+        ),
+        panel("Indentation of the fingertip", "mm", [0.0, top_mm], vec![Curve::Solid(indentation)]),
+        panel(
+            "Duty of the bridge: as it was (pale) and its mean of 10 ms",
+            "%",
+            [-100.0, 100.0],
+            vec![Curve::Pale(duty), Curve::Solid(mean)],
+        ),
+    ];
     fine_picture((WIDTH_PX, 640), |area| {
-        let panels = area.split_evenly((3, 1));
-        let points = |value: fn(&Sample) -> f64| thinned(trace.iter().map(|s| (s.time_s, value(s))).collect());
-        let force = points(|s| s.true_force_n);
-        let goal = steps_of(trace, |s| (s.time_s, s.goal_n));
-        let top_n = top(force.iter().chain(&goal).map(|(_, n)| *n));
-        let frame =
-            |title, unit, low, high| Frame { title, x: "time, s", unit, x_range: [0.0, end_s], range: [low, high] };
-        frame("Contact force (solid) and goal (dashed)", "N", 0.0, top_n).draw(&panels[0], |chart| {
-            chart.dashed(&goal)?;
-            chart.solid(&force)
-        })?;
-        let indentation = points(|s| s.indentation_mm);
-        let top_mm = top(indentation.iter().map(|(_, mm)| *mm));
-        frame("Indentation of the fingertip", "mm", 0.0, top_mm).draw(&panels[1], |chart| chart.solid(&indentation))?;
-        let duty = points(|s| 100.0 * s.duty);
-        let mean = thinned(smoothed(trace.iter().map(|s| (s.time_s, 100.0 * s.duty)).collect()));
-        frame("Duty of the bridge: as it was (pale) and its mean of 10 ms", "%", -100.0, 100.0).draw(
-            &panels[2],
-            |chart| {
-                chart.pale(&duty)?;
-                chart.solid(&mean)
-            },
-        )
+        panels.iter().zip(area.split_evenly((3, 1))).try_for_each(|(panel, area)| panel.draw(&area))
     })
 }
 
@@ -88,16 +93,19 @@ pub fn steps(panels: &[Panel<'_>]) -> Result<String, PlotError> {
 
 /// Legend of the panels' lines.
 fn draw_key(area: &Area<'_>) -> Result<(), PlotError> {
-    let range = [0.0, 6.0];
-    let context = ChartBuilder::on(area).margin(20 * FINE).build_cartesian_2d(0.0..1.0, range[0]..range[1]);
-    let mut chart = Chart { context: context.map_err(failed)?, range };
-    chart.solid(&[(0.08, 5.0), (0.22, 5.0)])?;
-    chart.dashed(&[(0.08, 4.0), (0.22, 4.0)])?;
-    chart.dotted([(0.15, 2.6), (0.15, 3.4)])?;
+    let chart = ChartBuilder::on(area).margin(20 * FINE).build_cartesian_2d(0.0..1.0, 0.0..6.0);
+    let mut chart = chart.map_err(failed)?;
+    for curve in [
+        Curve::Solid(vec![(0.08, 5.0), (0.22, 5.0)]),
+        Curve::Dashed(vec![(0.08, 4.0), (0.22, 4.0)]),
+        Curve::Dotted(vec![(0.15, 2.6), (0.15, 3.4)]),
+    ] {
+        curve.draw(&mut chart)?;
+    }
     for (y, text) in [(5.0, "contact force"), (4.0, "goal"), (3.0, "earliest arrival that"), (2.4, "the motor allows")]
     {
         let style = TextStyle::from((FONT, LABEL_PX * FINE)).pos(Pos::new(HPos::Left, VPos::Center));
-        chart.context.draw_series([Text::new(text, (0.3, y), style)]).map_err(failed)?;
+        chart.draw_series([Text::new(text, (0.3, y), style)]).map_err(failed)?;
     }
     Ok(())
 }
@@ -110,110 +118,10 @@ fn draw_panel(panel: &Panel<'_>, area: &Area<'_>) -> Result<(), PlotError> {
     let force: Vec<_> = samples.iter().map(|s| (ms(s), s.true_force_n)).collect();
     let goal = steps_of(&samples, |s| (ms(s), s.goal_n));
     let high = top(force.iter().chain(&goal).map(|(_, n)| *n));
-    let frame =
-        Frame { title: &panel.title, x: "time, ms", unit: "N", x_range: [-before_ms, after_ms], range: [0.0, high] };
-    frame.draw(area, |chart| {
-        if let Some(optimal_ms) = panel.time_optimal_ms {
-            chart.upright(optimal_ms)?;
-        }
-        chart.dashed(&goal)?;
-        chart.solid(&force)
-    })
-}
-
-/// A chart's title, axes and ranges.
-pub(super) struct Frame<'a> {
-    pub title: &'a str,
-    pub x: &'a str,
-    pub unit: &'a str,
-    pub x_range: [f64; 2],
-    pub range: [f64; 2],
-}
-
-type Points = [(f64, f64)];
-type Cartesian = Cartesian2d<plotters::coord::types::RangedCoordf64, plotters::coord::types::RangedCoordf64>;
-
-/// Axes of a chart.
-pub(super) struct Chart<'a, 'b> {
-    context: ChartContext<'a, SVGBackend<'b>, Cartesian>,
-    range: [f64; 2],
-}
-
-impl Frame<'_> {
-    pub fn draw<'b>(
-        &self,
-        area: &Area<'b>,
-        draw: impl FnOnce(&mut Chart<'_, 'b>) -> Result<(), PlotError>,
-    ) -> Result<(), PlotError> {
-        let ([left, right], [low, high]) = (self.x_range, self.range);
-        // The margin below the title keeps it off the numbers of the axis.
-        let area = area.margin(6 * FINE, 0, 0, 0).titled(self.title, (FONT, TITLE_PX * FINE)).map_err(failed)?;
-        let context = ChartBuilder::on(&area)
-            .margin(8 * FINE)
-            .margin_right(18 * FINE)
-            .x_label_area_size(36 * FINE)
-            .y_label_area_size(52 * FINE)
-            .build_cartesian_2d(left..right, low..high)
-            .map_err(failed)?;
-        let mut chart = Chart { context, range: self.range };
-        chart
-            .context
-            .configure_mesh()
-            .light_line_style(TRANSPARENT)
-            .bold_line_style(FAINT.stroke_width(FINE))
-            .axis_style(BLACK.stroke_width(FINE))
-            .set_all_tick_mark_size(5 * FINE)
-            .label_style((FONT, LABEL_PX * FINE))
-            .x_desc(self.x)
-            .y_desc(self.unit)
-            .x_label_formatter(&number)
-            .y_label_formatter(&number)
-            .y_labels(6)
-            .x_labels(10)
-            .draw()
-            .map_err(failed)?;
-        draw(&mut chart)
-    }
-}
-
-impl Chart<'_, '_> {
-    pub fn solid(&mut self, points: &Points) -> Result<(), PlotError> {
-        self.line(points, INK.stroke_width(2 * FINE))
-    }
-
-    pub fn pale(&mut self, points: &Points) -> Result<(), PlotError> {
-        self.line(points, PALE_INK.stroke_width(FINE))
-    }
-
-    /// A thin line in a second colour, to lie on top of another.
-    pub fn second(&mut self, points: &Points) -> Result<(), PlotError> {
-        self.line(points, SECOND_INK.stroke_width(FINE))
-    }
-
-    fn line(&mut self, points: &Points, style: ShapeStyle) -> Result<(), PlotError> {
-        self.context.draw_series(LineSeries::new(points.iter().copied(), style)).map(drop).map_err(failed)
-    }
-
-    pub fn dashed(&mut self, points: &Points) -> Result<(), PlotError> {
-        let line = DashedLineSeries::new(points.iter().copied(), 7 * FINE, 4 * FINE, GOAL_INK.stroke_width(2 * FINE));
-        self.context.draw_series(line).map(drop).map_err(failed)
-    }
-
-    /// A circle at each point.
-    pub fn circles(&mut self, points: &Points) -> Result<(), PlotError> {
-        let circles = points.iter().map(|point| Circle::new(*point, 4 * FINE, BLACK.stroke_width(FINE)));
-        self.context.draw_series(circles).map(drop).map_err(failed)
-    }
-
-    /// A dotted upright line.
-    fn upright(&mut self, x: f64) -> Result<(), PlotError> {
-        self.dotted(self.range.map(|y| (x, y)))
-    }
-
-    fn dotted(&mut self, ends: [(f64, f64); 2]) -> Result<(), PlotError> {
-        let line = DashedLineSeries::new(ends, 2 * FINE, 3 * FINE, BLACK.stroke_width(FINE));
-        self.context.draw_series(line).map(drop).map_err(failed)
-    }
+    let earliest = panel.time_optimal_ms.map(|optimal_ms| Curve::Dotted(vec![(optimal_ms, 0.0), (optimal_ms, high)]));
+    let curves = earliest.into_iter().chain([Curve::Dashed(goal), Curve::Solid(force)]).collect();
+    let (title, x_range) = (panel.title.clone(), [-before_ms, after_ms]);
+    Curves { title, x: "time, ms", y: "N", x_range, y_range: [0.0, high], curves }.draw(area)
 }
 
 /// The top of an axis: a little above the largest value.

@@ -6,7 +6,7 @@
 //! plane without friction: d = x, F = pi Y d^2. All forces of a step are the mean slope of one energy, so a step
 //! creates no energy.
 
-use crate::effects::{Build, Description, Metered, Part, normal_within_3};
+use crate::effects::{self, Build, Description, Metered, Parts, normal_within_3};
 use crate::mechanics::decay;
 use crate::scene::tables::Key;
 use crate::watch::{Cost, Truth};
@@ -23,8 +23,11 @@ pub struct Surface {
 }
 
 impl Surface {
-    fn part(plain: bool, height_mm: impl Fn(f64, f64, f64) -> f64 + Send + 'static) -> Part {
-        Part::Shape(Box::new(Self { plain, height_mm: Box::new(height_mm) }))
+    fn add<F>(build: &Build, parts: &mut Parts<effects::Named>, plain: bool, height_mm: F)
+    where
+        F: Fn(f64, f64, f64) -> f64 + Send + 'static,
+    {
+        parts.contact.shape.push(build.part(Box::new(Self { plain, height_mm: Box::new(height_mm) })));
     }
 }
 
@@ -55,12 +58,12 @@ pub struct Grip {
 }
 
 named! {
-    Shape(shape: Surface),
-    Memory(memory: Relaxation),
-    Series(series: f64),
-    Strength(strength: BreakableObject),
-    Tangent(tangent: Grip),
-    Body(body: f64),
+    shape: Surface,
+    memory: Relaxation,
+    series: f64,
+    strength: BreakableObject,
+    tangent: Grip,
+    body: f64,
 }
 
 impl Named {
@@ -142,7 +145,7 @@ pub const EFFECTS: &[Description] = &[
             Key::number("along_rows_deg", "Tilt along the rows.", -45.0, 45.0, 0.0),
         ],
         zero: &[("along_columns_deg", 0.0), ("along_rows_deg", 0.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let slope = |name| {
                 let angle = build.number(name) * (core::f64::consts::PI / 180.0);
                 libm::tan(angle)
@@ -150,7 +153,8 @@ pub const EFFECTS: &[Description] = &[
             let (x, y) = (slope("along_columns_deg"), slope("along_rows_deg"));
             // Additional reach of a slope into the tip, as a share of its radius.
             let over = (1.0 + x * x + y * y).sqrt() - 1.0;
-            Surface::part(x == 0.0 && y == 0.0, move |x_mm, y_mm, radius_mm| x * x_mm + y * y_mm - over * radius_mm)
+            let height_mm = move |x_mm, y_mm, radius_mm| x * x_mm + y * y_mm - over * radius_mm;
+            Surface::add(build, parts, x == 0.0 && y == 0.0, height_mm);
         },
     },
     Description {
@@ -161,9 +165,9 @@ pub const EFFECTS: &[Description] = &[
         reference: "as `tilted_plane`; Hertz compares with a radius 1 / (1/a + 1/R)",
         keys: &[Key::number("curvature_per_mm", "1 / radius; 0 is a plane.", 0.0, 1.0, 0.05)],
         zero: &[("curvature_per_mm", 0.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let per_mm = build.number("curvature_per_mm");
-            Surface::part(per_mm == 0.0, move |x_mm, y_mm, _| round(per_mm, x_mm * x_mm + y_mm * y_mm))
+            Surface::add(build, parts, per_mm == 0.0, move |x, y, _| round(per_mm, x * x + y * y));
         },
     },
     Description {
@@ -177,10 +181,10 @@ pub const EFFECTS: &[Description] = &[
             Key::number("axis_deg", "Angle from the columns to the axis.", -180.0, 180.0, 90.0),
         ],
         zero: &[("curvature_per_mm", 0.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let angle = build.number("axis_deg") * (core::f64::consts::PI / 180.0);
             let (across, per_mm) = ([-libm::sin(angle), libm::cos(angle)], build.number("curvature_per_mm"));
-            Surface::part(per_mm == 0.0, move |x_mm, y_mm, _| {
+            Surface::add(build, parts, per_mm == 0.0, move |x_mm, y_mm, _| {
                 let across_mm = across[0] * x_mm + across[1] * y_mm;
                 round(per_mm, across_mm * across_mm)
             })
@@ -197,10 +201,10 @@ pub const EFFECTS: &[Description] = &[
             Key::number("towards_deg", "Direction: 0 along the columns, 90 along the rows.", -180.0, 180.0, 0.0),
         ],
         zero: &[("offset_mm", 20.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let angle = build.number("towards_deg") * (core::f64::consts::PI / 180.0);
             let (towards, offset_mm) = ([libm::cos(angle), libm::sin(angle)], build.number("offset_mm"));
-            Surface::part(offset_mm >= LARGEST_TIP_MM, move |x_mm, y_mm, _| {
+            Surface::add(build, parts, offset_mm >= LARGEST_TIP_MM, move |x_mm, y_mm, _| {
                 if towards[0] * x_mm + towards[1] * y_mm > offset_mm { NOTHING_MM } else { 0.0 }
             })
         },
@@ -220,9 +224,10 @@ pub const EFFECTS: &[Description] = &[
             Key::number("tau_s", "Time constant.", 0.0001, 10000.0, 0.5),
         ],
         zero: &[("share", 0.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let (share, tau_s) = (build.number("share"), build.number("tau_s"));
-            Part::Memory(Box::new(Relaxation { share, tau_s, remembered_n: 0.0, last_s: 0.0, left: [1.0; 2] }))
+            let memory = Relaxation { share, tau_s, remembered_n: 0.0, last_s: 0.0, left: [1.0; 2] };
+            parts.contact.memory.push(build.part(Box::new(memory)));
         },
     },
     Description {
@@ -233,7 +238,7 @@ pub const EFFECTS: &[Description] = &[
         reference: "two springs in series; a soft ball 0.1 to 2 mm/N",
         keys: &[Key::number("yield_mm_per_n", "Compliance; 0 is rigid.", 0.0, 1000.0, 0.5)],
         zero: &[("yield_mm_per_n", 0.0)],
-        build: |build: &Build| Part::Series(Box::new(build.number("yield_mm_per_n"))),
+        build: |build, parts| parts.contact.series.push(build.part(Box::new(build.number("yield_mm_per_n")))),
     },
     Description {
         name: "breakable_object",
@@ -246,9 +251,9 @@ pub const EFFECTS: &[Description] = &[
             Key::number("left", "Share of the force that remains afterwards.", 0.001, 1.0, 0.2),
         ],
         zero: &[("force_n", 1000000.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let (force_n, left) = (build.number("force_n"), build.number("left"));
-            Part::Strength(Box::new(BreakableObject { force_n, left, broken: false }))
+            parts.contact.strength.push(build.part(Box::new(BreakableObject { force_n, left, broken: false })))
         },
     },
     Description {
@@ -272,7 +277,7 @@ pub const EFFECTS: &[Description] = &[
             Key::number("drift_from_s", "Start of that motion.", 0.0, 1000000.0, 0.0),
         ],
         zero: &[("drift_mm_per_s", 0.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let number = |name| build.number(name);
             let spread = number("spread_percent") / 100.0;
             let drawn = 1.0 + spread * normal_within_3(&mut build.rng());
@@ -284,7 +289,7 @@ pub const EFFECTS: &[Description] = &[
                 drift_mm_per_s: number("drift_mm_per_s"),
                 drift_from_s: number("drift_from_s"),
             };
-            Part::Tangent(Box::new(grip))
+            parts.contact.tangent.push(build.part(Box::new(grip)))
         },
     },
     Description {
@@ -298,7 +303,7 @@ pub const EFFECTS: &[Description] = &[
         reference: "Newton; g = 9.80665 m/s^2",
         keys: &[Key::number("mass_g", "Mass; 0 is a fixed object.", 0.0, 10000.0, 20.0)],
         zero: &[("mass_g", 0.0)],
-        build: |build: &Build| Part::Body(Box::new(build.number("mass_g") * 1e-3)),
+        build: |build, parts| parts.contact.body.push(build.part(Box::new(build.number("mass_g") * 1e-3))),
     },
 ];
 

@@ -6,7 +6,7 @@
 //! gear follow. The count of the encoder is computed where it is read. Without effects the drive has a rotor without
 //! friction, a winding that is a resistance, an ideal source, and a rigid transmission.
 
-use crate::effects::{Build, Description, Metered, Part};
+use crate::effects::{Description, Metered};
 use crate::mechanics::decay;
 use crate::scene::tables::Key;
 use crate::setup::Setup;
@@ -87,7 +87,7 @@ pub type Play = dyn FnMut(f64, f64) -> f64 + Send;
 /// Effect on a count of the encoder. It has no memory, as each read calls it.
 pub type Encoder = dyn FnMut(i32) -> i32 + Send;
 
-/// Stages as the finger calls them: of the named effects, or of `()`, which has none compiled in.
+/// Stages as the finger calls them: of the named effects, of the plant, or of `()`, which has none.
 pub trait Stages {
     /// True if no stage has an effect: the finger then calls none.
     fn none(&self) -> bool {
@@ -133,12 +133,12 @@ pub trait Stages {
 impl Stages for () {}
 
 named! {
-    Inertia(inertia: Inertia),
-    Electric(electric: dyn Electric),
-    Resist(resist: Resist),
-    Potential(potential: Cogging),
-    Play(play: Play),
-    Encoder(encoder: Encoder),
+    inertia: Inertia,
+    electric: dyn Electric,
+    resist: Resist,
+    potential: Cogging,
+    play: Play,
+    encoder: Encoder,
 }
 
 impl Stages for Named {
@@ -204,10 +204,11 @@ pub const EFFECTS: &[Description] = &[
             Key::number("finger_g", "Mass that moves with the tip.", 0.0, 1000.0, 30.0),
         ],
         zero: &[("gear_g_cm2", 0.0), ("finger_g", 0.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let gear_kg_m2 = build.number("gear_g_cm2") * 1e-7;
             let finger_kg = build.number("finger_g") * 1e-3;
-            Part::Inertia(Box::new(move |m_per_rad| gear_kg_m2 + finger_kg * m_per_rad * m_per_rad))
+            let inertia_kg_m2 = move |m_per_rad| gear_kg_m2 + finger_kg * m_per_rad * m_per_rad;
+            parts.drive.inertia.push(build.part(Box::new(inertia_kg_m2)));
         },
     },
     Description {
@@ -221,9 +222,9 @@ pub const EFFECTS: &[Description] = &[
         reference: "docs/runs.md: 0.1 Ohm",
         keys: &[Key::number("source_ohm", "Resistance of source, wires and connectors.", 0.0, 100.0, 0.1)],
         zero: &[("source_ohm", 0.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let ohm = build.number("source_ohm");
-            Part::Electric(Box::new(move |circuit: &mut Circuit| circuit.source_ohm += ohm))
+            parts.drive.electric.push(build.part(Box::new(move |circuit: &mut Circuit| circuit.source_ohm += ohm)))
         },
     },
     Description {
@@ -243,17 +244,17 @@ pub const EFFECTS: &[Description] = &[
             Key::number("magnet_per_k", "Change of the torque constant per K.", -0.01, 0.01, -0.001),
         ],
         zero: &[("k_per_w", 0.0), ("ambient_c", 25.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let [ambient_c, k_per_w, tau_s, magnet_per_k] =
                 ["ambient_c", "k_per_w", "tau_s", "magnet_per_k"].map(|name| build.number(name));
-            Part::Electric(Box::new(ThermalDerating {
+            parts.drive.electric.push(build.part(Box::new(ThermalDerating {
                 ambient_c,
                 k_per_w,
                 tau_s,
                 magnet_per_k,
                 winding_c: ambient_c,
                 cold_ohm: 0.0,
-            }))
+            })))
         },
     },
     Description {
@@ -268,9 +269,9 @@ pub const EFFECTS: &[Description] = &[
         reference: "FAULHABER data sheet 1331 T 006 SR: 70 uH",
         keys: &[Key::number("inductance_uh", "Inductance of the winding.", 0.0, 100000.0, 70.0)],
         zero: &[("inductance_uh", 0.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let henry = build.number("inductance_uh") * 1e-6;
-            Part::Electric(Box::new(move |circuit: &mut Circuit| circuit.henry += henry))
+            parts.drive.electric.push(build.part(Box::new(move |circuit: &mut Circuit| circuit.henry += henry)))
         },
     },
     Description {
@@ -281,12 +282,12 @@ pub const EFFECTS: &[Description] = &[
         reference: "FAULHABER data sheet 1331 ... SR: 0.12 mNm",
         keys: &[Key::number("torque_mnm", "Friction torque at the motor's shaft.", 0.0, 20.0, 0.12)],
         zero: &[("torque_mnm", 0.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let torque_nm = build.number("torque_mnm") * 1e-3;
-            Part::Resist(Box::new(move |_, friction| {
+            parts.drive.resist.push(build.part(Box::new(move |_, friction| {
                 friction.sliding_nm += torque_nm;
                 friction.holding_nm += torque_nm;
-            }))
+            })))
         },
     },
     Description {
@@ -304,14 +305,14 @@ pub const EFFECTS: &[Description] = &[
             Key::number("speed_rad_per_s", "Speed at which half of it remains.", 0.01, 10000.0, 5.0),
         ],
         zero: &[("torque_mnm", 0.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let torque_nm = build.number("torque_mnm") * 1e-3;
             let half_rad_per_s = build.number("speed_rad_per_s");
-            Part::Resist(Box::new(move |speed_rad_per_s, friction| {
+            parts.drive.resist.push(build.part(Box::new(move |speed_rad_per_s, friction| {
                 let share = speed_rad_per_s / half_rad_per_s;
                 friction.sliding_nm += torque_nm / (1.0 + share * share);
                 friction.holding_nm += torque_nm;
-            }))
+            })))
         },
     },
     Description {
@@ -322,9 +323,9 @@ pub const EFFECTS: &[Description] = &[
         reference: "grease and eddy currents; a tenth of k_t^2 / R of the reference motor is 1 uNm s",
         keys: &[Key::number("torque_unm_s", "Torque per speed at the shaft of the motor.", 0.0, 10000.0, 0.1)],
         zero: &[("torque_unm_s", 0.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let nm_s = build.number("torque_unm_s") * 1e-6;
-            Part::Resist(Box::new(move |_, friction| friction.viscous_nm_s += nm_s))
+            parts.drive.resist.push(build.part(Box::new(move |_, friction| friction.viscous_nm_s += nm_s)))
         },
     },
     Description {
@@ -338,9 +339,9 @@ pub const EFFECTS: &[Description] = &[
         reference: "docs/runs.md: FAULHABER 14/1 at 43:1, 70 %, github.com/ekrimsk/MGDB",
         keys: &[Key::number("efficiency", "Share of the torque that drives the load.", 0.1, 1.0, 0.7)],
         zero: &[("efficiency", 1.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let share = 1.0 / build.number("efficiency") - 1.0;
-            Part::Resist(Box::new(move |_, friction| friction.load_share += share))
+            parts.drive.resist.push(build.part(Box::new(move |_, friction| friction.load_share += share)))
         },
     },
     Description {
@@ -357,11 +358,9 @@ pub const EFFECTS: &[Description] = &[
             Key::whole("teeth", "Periods per turn of the motor, N.", 1, 1000, 12),
         ],
         zero: &[("torque_mnm", 0.0)],
-        build: |build: &Build| {
-            Part::Potential(Box::new(Cogging {
-                torque_nm: build.number("torque_mnm") * 1e-3,
-                teeth: build.number("teeth"),
-            }))
+        build: |build, parts| {
+            let (torque_nm, teeth) = (build.number("torque_mnm") * 1e-3, build.number("teeth"));
+            parts.drive.potential.push(build.part(Box::new(Cogging { torque_nm, teeth })));
         },
     },
     Description {
@@ -376,13 +375,13 @@ pub const EFFECTS: &[Description] = &[
         reference: "the play operator; FAULHABER 14/1: at most 3 degrees at the output without load, 0.6 mm on a drum of 12 mm radius",
         keys: &[Key::number("play_um", "Play at the tip.", 0.0, 10000.0, 100.0)],
         zero: &[("play_um", 0.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let play_mm = build.number("play_um") * 1e-3;
             let mut tip_mm = 0.0_f64;
-            Part::Play(Box::new(move |flank_mm, surface_mm| {
+            parts.drive.play.push(build.part(Box::new(move |flank_mm, surface_mm| {
                 tip_mm = tip_mm.min(surface_mm).min(flank_mm + play_mm).max(flank_mm);
                 tip_mm
-            }))
+            })))
         },
     },
     Description {
@@ -393,9 +392,9 @@ pub const EFFECTS: &[Description] = &[
         reference: "an IE2-400 instead of one with 1600 counts per turn: 4",
         keys: &[Key::whole("step_counts", "Counts by which the reading jumps.", 1, 4096, 4)],
         zero: &[("step_counts", 1.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let step = build.values.whole("step_counts") as i32;
-            Part::Encoder(Box::new(move |count| count.div_euclid(step).wrapping_mul(step)))
+            parts.drive.encoder.push(build.part(Box::new(move |count| count.div_euclid(step).wrapping_mul(step))))
         },
     },
 ];

@@ -1,6 +1,6 @@
 //! Effects on the clock of the controller, interference, and packets of the host.
 
-use crate::effects::{Build, Description, Metered, Part, normal, waiting_s};
+use crate::effects::{Description, Metered, normal, waiting_s};
 use crate::scene::tables::{Key, Kind};
 use crate::watch::Cost;
 use fingertip::link::packet::{CRC_START, HEADER, instruction, update_crc};
@@ -8,7 +8,7 @@ use fingertip::link::packet::{CRC_START, HEADER, instruction, update_crc};
 /// Effect on packets from the host: time of arrival for a time of sending, s; none if the packet is lost.
 pub type Packets = dyn FnMut(f64) -> Option<f64> + Send;
 
-/// Stages as the board and the host call them: of the named effects, or of `()`, which has none compiled in.
+/// Stages as the board and the host call them: of the named effects, or of `()`, which has none.
 pub trait Stages {
     /// Duration of a second of the controller in the world.
     fn second_s(&mut self, _time_s: f64) -> f64 {
@@ -24,8 +24,8 @@ pub trait Stages {
 impl Stages for () {}
 
 named! {
-    Clock(clock: f64),
-    Packets(packets: Packets),
+    clock: f64,
+    packets: Packets,
 }
 
 impl Stages for Named {
@@ -49,7 +49,10 @@ pub const EFFECTS: &[Description] = &[
         reference: "STM32F446 data sheet: internal oscillator +-1 % at 25 C; crystals some 50 ppm",
         keys: &[Key::number("fast_ppm", "Deviation of the clock; negative is slow.", -50_000.0, 50_000.0, 50.0)],
         zero: &[("fast_ppm", 0.0)],
-        build: |build: &Build| Part::Clock(Box::new(1.0 / (1.0 + build.number("fast_ppm") * 1e-6))),
+        build: |build, parts| {
+            let second_s = 1.0 / (1.0 + build.number("fast_ppm") * 1e-6);
+            parts.link.clock.push(build.part(Box::new(second_s)));
+        },
     },
     Description {
         name: "burst",
@@ -66,13 +69,13 @@ pub const EFFECTS: &[Description] = &[
             Key::number("amplitude_codes", "Largest deviation, 12-bit codes.", 0.0, 4096.0, 100.0),
         ],
         zero: &[("amplitude_codes", 0.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let [rate_per_s, length_us, amplitude_codes] =
                 ["rate_per_s", "length_us", "amplitude_codes"].map(|name| build.number(name));
             let length_s = length_us * 1e-6;
             let mut rng = build.rng();
             let (mut next_s, mut until_s) = (None, f64::NEG_INFINITY);
-            Part::Codes(Box::new(move |_, time_s, codes| {
+            parts.sensor.codes.push(build.part(Box::new(move |_, time_s, codes| {
                 let mut begin_s = next_s.unwrap_or_else(|| time_s + waiting_s(&mut rng, rate_per_s));
                 while begin_s <= time_s {
                     until_s = begin_s + length_s;
@@ -82,7 +85,7 @@ pub const EFFECTS: &[Description] = &[
                 if time_s < until_s {
                     codes.iter_mut().for_each(|code| *code += amplitude_codes * (2.0 * rng.f64() - 1.0));
                 }
-            }))
+            })))
         },
     },
     Description {
@@ -100,14 +103,14 @@ pub const EFFECTS: &[Description] = &[
             },
         ],
         zero: &[("delay_ms", 0.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let delay_s = build.number("delay_ms") * 1e-3;
             let is_normal = build.values.word("distribution") == "normal";
             let mut rng = build.rng();
-            Part::Packets(Box::new(move |sent_s| {
+            parts.link.packets.push(build.part(Box::new(move |sent_s| {
                 let draw = if is_normal { normal(&mut rng).abs() } else { rng.f64() };
                 Some(sent_s + delay_s * draw)
-            }))
+            })))
         },
     },
     Description {
@@ -118,10 +121,10 @@ pub const EFFECTS: &[Description] = &[
         reference: "a Bernoulli channel",
         keys: &[Key::number("lost_percent", "Share of the packets that are lost.", 0.0, 100.0, 1.0)],
         zero: &[("lost_percent", 0.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let lost = build.number("lost_percent") / 100.0;
             let mut rng = build.rng();
-            Part::Packets(Box::new(move |sent_s| (rng.f64() >= lost).then_some(sent_s)))
+            parts.link.packets.push(build.part(Box::new(move |sent_s| (rng.f64() >= lost).then_some(sent_s))))
         },
     },
     Description {
@@ -135,15 +138,15 @@ pub const EFFECTS: &[Description] = &[
         reference: "DYNAMIXEL Protocol 2.0, CRC-16/BUYPASS; a binary symmetric channel",
         keys: &[Key::number("bit_error_ppm", "Probability per bit.", 0.0, 1e6, 100.0)],
         zero: &[("bit_error_ppm", 0.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let flips = build.number("bit_error_ppm") * 1e-6;
             let mut rng = build.rng();
-            Part::Packets(Box::new(move |sent_s| {
+            parts.link.packets.push(build.part(Box::new(move |sent_s| {
                 let mut flipped = || (0..8).fold(0u8, |mask, bit| mask | u8::from(rng.f64() < flips) << bit);
                 let body = BODY.map(|byte| byte ^ flipped());
                 let sum = update_crc(CRC_START, &BODY) ^ u16::from_le_bytes([flipped(), flipped()]);
                 (update_crc(CRC_START, &body) == sum).then_some(sent_s)
-            }))
+            })))
         },
     },
 ];

@@ -6,7 +6,7 @@
 
 mod floating;
 
-use crate::effects::{Build, Description, Metered, NamedEffect, Part, family_of, normal_within_3, normals};
+use crate::effects::{Description, Metered, NamedEffect, family_of, normal_within_3, normals};
 use crate::events::ArrayEvents;
 use crate::mechanics::decay;
 use crate::scene::Scene;
@@ -49,7 +49,7 @@ pub type Volts = dyn FnMut(usize, f64, &mut Row) + Send;
 /// Effect on the codes of the converter before rounding: slot, time and codes as in [`Volts`].
 pub type Codes = dyn FnMut(usize, f64, &mut Row) + Send;
 
-/// Stages as the readout calls them: of the named effects, or of `()`, which has none compiled in.
+/// Stages as the readout calls them: of the named effects, of the plant, or of `()`, which has none.
 pub trait Stages {
     /// True if no stage has an effect: the readout is then ideal and calls none.
     fn none(&self) -> bool {
@@ -82,11 +82,11 @@ pub fn repeats(named: &NamedEffect) -> bool {
 }
 
 named! {
-    Pressure(pressure: dyn Pressure),
-    Conductance(conductance: Conductance),
-    Network(network: Network),
-    Volts(volts: Volts),
-    Codes(codes: Codes),
+    pressure: dyn Pressure,
+    conductance: Conductance,
+    network: Network,
+    volts: Volts,
+    codes: Codes,
 }
 
 impl Stages for Named {
@@ -215,16 +215,16 @@ pub const EFFECTS: &[Description] = &[
                 Phase Transitions, 1996, section 2.1",
         keys: &[Key::number("width_percent", "Width of the loop, of the pressure.", 0.0, 100.0, 10.0)],
         zero: &[("width_percent", 0.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let half = build.number("width_percent") / 200.0;
             let mut held_kpa = [Row::default(); ROWS];
-            Part::Pressure(Box::new(move |row: usize, _: f64, kpa: &mut Row| {
+            parts.sensor.pressure.push(build.part(Box::new(move |row: usize, _: f64, kpa: &mut Row| {
                 for (held, kpa) in held_kpa[row].iter_mut().zip(kpa) {
                     // Not clamp(): it panics at a negative pressure, which swaps the bounds.
                     *held = held.max(*kpa * (1.0 - half)).min(*kpa * (1.0 + half));
                     *kpa = *held;
                 }
-            }))
+            })))
         },
     },
     Description {
@@ -239,12 +239,12 @@ pub const EFFECTS: &[Description] = &[
         reference: "Interlink FSR 400 integration guide: drift under 5 % per decade of time; a Prony series with a term per decade",
         keys: &[Key::number("rate_percent_per_decade", "Growth of the reading.", 0.0, 50.0, 5.0)],
         zero: &[("rate_percent_per_decade", 0.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let share = build.number("rate_percent_per_decade") / 100.0;
-            let (mut since, mut crept_kpa) = (Since::default(), [[[0.0; COLUMNS]; TERMS]; ROWS]);
+            let (mut sampled_s, mut crept_kpa) = ([None; ROWS], [[[0.0; COLUMNS]; TERMS]; ROWS]);
             let (mut last_s, mut shares) = (0.0, [0.0; TERMS]);
-            Part::Pressure(Box::new(move |row: usize, time_s: f64, kpa: &mut Row| {
-                let step_s = since.step_s(row, time_s);
+            parts.sensor.pressure.push(build.part(Box::new(move |row: usize, time_s: f64, kpa: &mut Row| {
+                let step_s = sampled_s[row].replace(time_s).map_or(0.0, |before_s: f64| (time_s - before_s).max(0.0));
                 if step_s != last_s {
                     (last_s, shares) = (step_s, TAUS_S.map(|tau_s| gone(step_s / tau_s)));
                 }
@@ -258,7 +258,7 @@ pub const EFFECTS: &[Description] = &[
                 for (kpa, sum) in kpa.iter_mut().zip(sum) {
                     *kpa += share * sum;
                 }
-            }))
+            })))
         },
     },
     Description {
@@ -271,14 +271,14 @@ pub const EFFECTS: &[Description] = &[
         reference: "Interlink FSR 400 integration guide: part to part +-6 %; Tekscan sensors differ by 5 to 32 %",
         keys: &[Key::number("rms_percent", "Deviation of the taxels' gains.", 0.0, 50.0, 6.0)],
         zero: &[("rms_percent", 0.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let mut rng = build.rng();
             let share = build.number("rms_percent") / 100.0;
             let gains: [Row; ROWS] =
                 [(); ROWS].map(|()| Row::default().map(|_| (1.0 + share * normal_within_3(&mut rng)).max(0.0)));
-            Part::Pressure(Box::new(move |row: usize, _: f64, kpa: &mut Row| {
+            parts.sensor.pressure.push(build.part(Box::new(move |row: usize, _: f64, kpa: &mut Row| {
                 kpa.iter_mut().zip(gains[row]).for_each(|(kpa, gain)| *kpa *= gain);
-            }))
+            })))
         },
     },
     Description {
@@ -306,9 +306,9 @@ pub const EFFECTS: &[Description] = &[
             ),
         ],
         zero: &[("warming_k", 0.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let number = |name| build.number(name);
-            Part::Pressure(Box::new(TemperatureDrift {
+            parts.sensor.pressure.push(build.part(Box::new(TemperatureDrift {
                 warming_k: number("warming_k"),
                 time_constant_s: number("time_constant_s"),
                 gain_per_k: number("gain_percent_per_k") / 100.0,
@@ -318,7 +318,7 @@ pub const EFFECTS: &[Description] = &[
                     0.0 => number("time_constant_s"),
                     own => own,
                 },
-            }))
+            })))
         },
     },
     Description {
@@ -334,7 +334,7 @@ pub const EFFECTS: &[Description] = &[
             Key::number("at_s", "Time of the defect; -10 is before the tare.", -10.0, 1e6, -10.0),
         ],
         zero: &[],
-        build: |build: &Build| {
+        build: |build, parts| {
             let mut taxels = [[Taxel::Sound; COLUMNS]; ROWS];
             let shorted = Taxel::Fixed(Array::default().short_siemens);
             for (name, taxel) in [("stuck", Taxel::Stuck), ("shorted", shorted), ("dead", Taxel::Fixed(0.0))] {
@@ -343,7 +343,7 @@ pub const EFFECTS: &[Description] = &[
                 }
             }
             let at_s = build.number("at_s");
-            Part::Conductance(Box::new(move |row, time_s, siemens| {
+            parts.sensor.conductance.push(build.part(Box::new(move |row, time_s, siemens| {
                 if time_s < at_s {
                     return;
                 }
@@ -354,7 +354,7 @@ pub const EFFECTS: &[Description] = &[
                         Taxel::Fixed(fixed) => *siemens = fixed,
                     }
                 }
-            }))
+            })))
         },
     },
     Description {
@@ -370,14 +370,14 @@ pub const EFFECTS: &[Description] = &[
         reference: "D'Alessio, Measurement errors in the scanning of piezoresistive sensors arrays, Sensors and Actuators A 72 (1999)",
         keys: &[Key::number("hold_ohm", "Resistance to the virtual ground; 0 is perfect.", 0.0, 1e12, 1000.0)],
         zero: &[("hold_ohm", 0.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let hold_ohm = build.number("hold_ohm");
             let mut floating = Floating::new(1.0 / hold_ohm);
-            Part::Network(Box::new(move |row, array, seen| {
+            parts.sensor.network.push(build.part(Box::new(move |row, array, seen| {
                 if hold_ohm > 0.0 {
                     *seen = floating.seen(row, array);
                 }
-            }))
+            })))
         },
     },
     Description {
@@ -388,12 +388,12 @@ pub const EFFECTS: &[Description] = &[
         reference: "docs/board.md: 30 Ohm; R_min 1 kOhm in all ten columns loses 41 % at 70 Ohm and 4.8 % at 5 Ohm",
         keys: &[Key::number("switch_ohm", "Resistance of switch and trace, R_on.", 0.0, 300.0, 30.0)],
         zero: &[("switch_ohm", 0.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let switch_ohm = build.number("switch_ohm");
-            Part::Network(Box::new(move |_, _, seen| {
+            parts.sensor.network.push(build.part(Box::new(move |_, _, seen| {
                 let left = 1.0 + switch_ohm * seen.iter().sum::<f64>();
                 seen.iter_mut().for_each(|siemens| *siemens /= left);
-            }))
+            })))
         },
     },
     Description {
@@ -410,10 +410,10 @@ pub const EFFECTS: &[Description] = &[
             Key::number("after_us", "Time from the edge to the sample.", 0.1, 1000.0, 2.4),
         ],
         zero: &[("tau_us", 0.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let [tau_s, after_s] = ["tau_us", "after_us"].map(|key| build.number(key) * 1e-6);
             let mut settling = Settling::new(tau_s, after_s);
-            Part::Volts(Box::new(move |_, time_s, volts| settling.sample(time_s, volts)))
+            parts.sensor.volts.push(build.part(Box::new(move |_, time_s, volts| settling.sample(time_s, volts))))
         },
     },
     Description {
@@ -430,9 +430,11 @@ pub const EFFECTS: &[Description] = &[
             50.0,
         )],
         zero: &[("headroom_mv", 0.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let rail_v = Array::default().reference_v - build.number("headroom_mv") * 1e-3;
-            Part::Volts(Box::new(move |_, _, volts| volts.iter_mut().for_each(|volts| *volts = volts.min(rail_v))))
+            parts.sensor.volts.push(
+                build.part(Box::new(move |_, _, volts| volts.iter_mut().for_each(|volts| *volts = volts.min(rail_v)))),
+            )
         },
     },
     Description {
@@ -443,13 +445,13 @@ pub const EFFECTS: &[Description] = &[
         reference: "ST application note AN4073, averaging against converter noise: a few codes",
         keys: &[Key::number("rms_codes", "Deviation, 12-bit codes.", 0.0, 500.0, 1.5)],
         zero: &[("rms_codes", 0.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let rms_codes = build.number("rms_codes");
             let mut rng = build.rng();
-            Part::Codes(Box::new(move |_, _, codes| {
+            parts.sensor.codes.push(build.part(Box::new(move |_, _, codes| {
                 let noise: Row = normals(&mut rng);
                 codes.iter_mut().zip(noise).for_each(|(code, noise)| *code += rms_codes * noise);
-            }))
+            })))
         },
     },
     Description {
@@ -460,13 +462,13 @@ pub const EFFECTS: &[Description] = &[
         reference: "docs/board.md: the preload's spread and the amplifiers' offsets",
         keys: &[Key::number("rms_codes", "Deviation of the levels, 12-bit codes.", 0.0, 200.0, 5.0)],
         zero: &[("rms_codes", 0.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let mut rng = build.rng();
             let rms_codes = build.number("rms_codes");
             let offsets = [(); SLOTS].map(|()| Row::default().map(|_| rms_codes * normal_within_3(&mut rng)));
-            Part::Codes(Box::new(move |slot, _, codes| {
+            parts.sensor.codes.push(build.part(Box::new(move |slot, _, codes| {
                 codes.iter_mut().zip(offsets[slot]).for_each(|(code, offset)| *code += offset);
-            }))
+            })))
         },
     },
     Description {
@@ -483,10 +485,10 @@ pub const EFFECTS: &[Description] = &[
             Key::number("inl_codes", "Largest deviation from the line, in the middle, 12-bit codes.", -50.0, 50.0, 0.0),
         ],
         zero: &[("bits", 12.0), ("inl_codes", 0.0)],
-        build: |build: &Build| {
+        build: |build, parts| {
             let step = f64::from(1 << (12 - build.values.whole("bits")));
             let inl_codes = build.number("inl_codes");
-            Part::Codes(Box::new(move |_, _, codes| {
+            parts.sensor.codes.push(build.part(Box::new(move |_, _, codes| {
                 for code in codes {
                     let x = (*code / Array::CODES).clamp(0.0, 1.0);
                     let steps = (*code + inl_codes * 4.0 * x * (1.0 - x)) / step;
@@ -494,7 +496,7 @@ pub const EFFECTS: &[Description] = &[
                     let whole = f64::from(steps as i32);
                     *code = if whole > steps { whole - 1.0 } else { whole } * step;
                 }
-            }))
+            })))
         },
     },
 ];
@@ -532,17 +534,6 @@ struct Before {
     time_s: f64,
     edge_v: Row,
     end_v: Row,
-}
-
-/// Time of the last sample of each row.
-#[derive(Clone, Debug, Default)]
-pub struct Since([Option<f64>; ROWS]);
-
-impl Since {
-    /// Returns the time since the last sample of the row; 0 at the first one.
-    pub fn step_s(&mut self, row: usize, time_s: f64) -> f64 {
-        self.0[row].replace(time_s).map_or(0.0, |before| (time_s - before).max(0.0))
-    }
 }
 
 const TERMS: usize = 9;

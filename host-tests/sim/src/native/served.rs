@@ -11,6 +11,7 @@ use crate::native::{Begun, Board, SimError};
 use crate::scene::Scene;
 use crate::watch::Truth;
 use crate::world::World;
+use clap::ValueEnum;
 use fingertip::capture::Ended;
 use fingertip::frame::Sense;
 use fingertip::link::{Captured, Crash, Health, Reply, ResetCause};
@@ -22,7 +23,6 @@ use fingertip::shipped::{
 use fingertip::state::{Fault, Mode};
 use fingertip::store::settle;
 use std::collections::VecDeque;
-use std::str::FromStr;
 
 /// Bytes for the host.
 #[derive(Clone, Debug, PartialEq)]
@@ -404,10 +404,11 @@ impl<E: Set> Bus<E> {
 
     fn break_one(&mut self, kind: &str, finger: &str) -> Result<String, String> {
         let count = self.devices.len();
-        let broken = Broken::new(kind.parse()?);
+        let known = Kind::from_str(kind, false);
+        let broken = known.map_err(|_| format!("no fault `{kind}`: there are {}", Kind::names()))?;
         let device = finger.parse::<usize>().ok().and_then(|finger| self.devices.get_mut(finger.wrapping_sub(1)));
         let device = device.ok_or_else(|| format!("no finger `{finger}`: 1 to {count} are there"))?;
-        device.broken = Some(broken);
+        device.broken = Some(Broken { kind: broken, then: None });
         Ok(format!("finger {finger}: {kind} from now on; `mend` ends it"))
     }
 }
@@ -418,7 +419,7 @@ fn number(text: &str, name: &str, least: f64, most: f64) -> Result<f64, String> 
 }
 
 /// Defect of a finger.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Kind {
     /// No frame arrives: fault 1.
     LostFrames,
@@ -443,31 +444,10 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// All defects with their names.
-    pub const ALL: [(&'static str, Self); 10] = [
-        ("lost-frames", Self::LostFrames),
-        ("array-broken", Self::ArrayBroken),
-        ("row-stuck", Self::RowStuck),
-        ("array-frozen", Self::ArrayFrozen),
-        ("encoder-frozen", Self::EncoderFrozen),
-        ("supply-low", Self::SupplyLow),
-        ("supply-high", Self::SupplyHigh),
-        ("bridge", Self::Bridge),
-        ("encoder-reversed", Self::EncoderReversed),
-        ("leads-swapped", Self::LeadsSwapped),
-    ];
-
-    pub fn names() -> String {
-        Self::ALL.map(|(name, _)| name).join(", ")
-    }
-}
-
-impl FromStr for Kind {
-    type Err = String;
-
-    fn from_str(name: &str) -> Result<Self, String> {
-        let found = Self::ALL.iter().find(|(known, _)| *known == name);
-        found.map(|(_, kind)| *kind).ok_or_else(|| format!("no fault `{name}`: there are {}", Self::names()))
+    /// Names of all defects, as a command has them.
+    fn names() -> String {
+        let values = Self::value_variants().iter().filter_map(Self::to_possible_value);
+        values.map(|value| value.get_name().to_owned()).collect::<Vec<_>>().join(", ")
     }
 }
 
@@ -484,10 +464,6 @@ const STUCK_CODES: u16 = 1_000;
 const BEYOND_MV: i32 = 500;
 
 impl Broken {
-    fn new(kind: Kind) -> Self {
-        Self { kind, then: None }
-    }
-
     fn at_motor(&self, bridge: Bridge) -> Bridge {
         match (self.kind, bridge) {
             (Kind::LeadsSwapped, Bridge::Driven { duty }) => Bridge::Driven { duty: -duty },

@@ -240,17 +240,12 @@ pub fn read(file: &str, text: &str) -> Result<Population, SceneErrors> {
     let error = |(at, message, allowed): Wrong| SceneError::new(file, text, at, message, allowed);
     let document = Document::parse(text).map_err(|failure| SceneErrors(vec![not_toml(file, text, &failure)]))?;
     let root = document.as_table();
-    let mut wrong: Vec<Wrong> = Vec::new();
     let magnitude =
         root.get("magnitude").map_or(Some(1.0), |item| number(item.as_value()?)).filter(|magnitude| *magnitude > 0.0);
+    let mut parts = Parts { magnitude: magnitude.unwrap_or(1.0), ..Parts::default() };
     if magnitude.is_none() {
-        wrong.push((
-            item_span(root, "magnitude"),
-            "`magnitude` is a number above 0".into(),
-            "1 is as the file says".into(),
-        ));
+        parts.refuse(item_span(root, "magnitude"), "`magnitude` is a number above 0", "1 is as the file says");
     }
-    let mut parts = Parts { magnitude: magnitude.unwrap_or(1.0), variables: Vec::new(), keys: Vec::new(), wrong };
     parts.variables(root);
     parts.keys("", root);
     let events = parts.events(root);
@@ -287,6 +282,7 @@ pub fn read(file: &str, text: &str) -> Result<Population, SceneErrors> {
     Ok(population)
 }
 
+#[derive(Default)]
 struct Parts {
     magnitude: f64,
     variables: Vec<(String, Draw)>,
@@ -295,15 +291,18 @@ struct Parts {
 }
 
 impl Parts {
+    fn refuse(&mut self, at: Range<usize>, message: impl Into<String>, allowed: impl Into<String>) {
+        self.wrong.push((at, message.into(), allowed.into()));
+    }
+
     fn variables(&mut self, root: &Table) {
         let Some(item) = root.get("draw") else { return };
         let Some(table) = item.as_table() else {
-            self.wrong.push((key_span(root, "draw"), "`draw` is a table".into(), "[draw], once".into()));
-            return;
+            return self.refuse(key_span(root, "draw"), "`draw` is a table", "[draw], once");
         };
         for (name, item) in table.iter() {
             let Some(value) = item.as_value() else {
-                self.wrong.push((key_span(table, name), format!("`{name}` is no draw"), "a value or a draw".into()));
+                self.refuse(key_span(table, name), format!("`{name}` is no draw"), "a value or a draw");
                 continue;
             };
             match self.draw(value) {
@@ -349,7 +348,7 @@ impl Parts {
             let magnitude =
                 if self.magnitude == 1.0 { String::new() } else { format!(" at a magnitude of {}", self.magnitude) };
             let message = format!("`{key}` is drawn from {low} to {high}{magnitude}");
-            self.wrong.push((at.clone(), message, described.allowed()));
+            self.refuse(at.clone(), message, described.allowed());
         }
         let whole =
             described.is_some_and(|key| matches!(key.kind, Kind::Whole { .. } | Kind::Optional { whole: true, .. }));
@@ -367,7 +366,7 @@ impl Parts {
                 let names = KINDS.iter().map(|kind| kind.name);
                 let meant = did_you_mean(name, names.clone());
                 let allowed = format!("count, at_s, and a table for each of {}", names.collect::<Vec<_>>().join(", "));
-                self.wrong.push((key_span(table, name), format!("`{name}` is no kind of event{meant}"), allowed));
+                self.refuse(key_span(table, name), format!("`{name}` is no kind of event{meant}"), allowed);
                 continue;
             };
             let keys = own_keys(kind);
@@ -375,8 +374,7 @@ impl Parts {
                 given.iter().filter(|(name, _)| *name != "weight" && keys.iter().all(|key| key.name != *name))
             {
                 let allowed = keys.iter().map(|key| key.name).chain(["weight"]).collect::<Vec<_>>().join(", ");
-                let message = format!("unknown key `{name}` in [events.{}]", kind.name);
-                self.wrong.push((key_span(given, name), message, allowed));
+                self.refuse(key_span(given, name), format!("unknown key `{name}` in [events.{}]", kind.name), allowed);
             }
             for key in keys {
                 let place = self.drawn(given, key.name, &format!("events.{}", kind.name));
@@ -386,8 +384,7 @@ impl Parts {
             kinds.push((weight.unwrap_or(0.0), Draw::Always(Drawn::Word(kind.name.into()))));
         }
         if kinds.is_empty() {
-            let at = table.span().unwrap_or(0..0);
-            self.wrong.push((at, "[events] names no kind".into(), "[events.tare] and the like".into()));
+            self.refuse(table.span().unwrap_or(0..0), "[events] names no kind", "[events.tare] and the like");
         }
         let [count, at_s] = own.map(|name| self.drawn(table, name, "events"));
         let kind = Place { at: 0..0, key: "kind".into(), whole: false, draw: Some(Draw::Choice(kinds)) };
@@ -397,8 +394,7 @@ impl Parts {
     /// Reads a required draw.
     fn drawn(&mut self, table: &Table, name: &str, path: &str) -> Option<Place> {
         let Some(value) = table.get(name).and_then(Item::as_value) else {
-            let at = table.span().unwrap_or(0..0);
-            self.wrong.push((at, format!("[{path}] lacks `{name}`"), "a value or a draw".into()));
+            self.refuse(table.span().unwrap_or(0..0), format!("[{path}] lacks `{name}`"), "a value or a draw");
             return None;
         };
         let known = self.keys.len();
@@ -419,7 +415,7 @@ impl Parts {
         let sound = self.wrong.is_empty();
         for (at, name) in unused.into_iter().filter(|_| sound) {
             let allowed = format!("{{ is = \"{name}\" }} or {{ by = \"{name}\", ... }} at a key of the scene");
-            self.wrong.push((at, format!("`{name}` is drawn, and nothing uses it"), allowed));
+            self.refuse(at, format!("`{name}` is drawn, and nothing uses it"), allowed);
         }
     }
 
@@ -441,11 +437,8 @@ impl Parts {
                 None => {
                     let meant = if known { String::new() } else { did_you_mean(metric, metrics::names()) };
                     let message = format!("[[count]] is a metric and a number{meant}");
-                    self.wrong.push((
-                        table.span().unwrap_or(0..0),
-                        message,
-                        "metric = \"rest_duty_percent\", above = 2.0".into(),
-                    ));
+                    let example = "metric = \"rest_duty_percent\", above = 2.0";
+                    self.refuse(table.span().unwrap_or(0..0), message, example);
                 }
             }
         }

@@ -2,7 +2,7 @@
 
 use super::draw::Spread;
 use super::{Counted, Finger, Population};
-use crate::metrics::{Hold, shown};
+use crate::metrics::{Hold, Verdict, shown};
 use crate::part::{cannot_write, check};
 use crate::run::{Outcome, RunError, asked};
 use crate::sweep::complete;
@@ -59,6 +59,11 @@ pub struct Promise {
 }
 
 impl Promise {
+    pub fn of(verdict: &Verdict) -> Self {
+        let Verdict { bound, value, max, held } = verdict.clone();
+        Self { metric: bound.metric, value, min: bound.min, max, held }
+    }
+
     /// Distance beyond the bound as a share of the bound, negative within it; -1 for a count that is 0 as required.
     pub fn excess(&self) -> f64 {
         let Some(value) = self.value else { return if self.held { -1.0 } else { f64::INFINITY } };
@@ -74,21 +79,14 @@ impl Promise {
 
 impl Ran {
     pub fn new(number: usize, finger: &Finger, outcome: &Outcome) -> Self {
-        let promises = outcome.verdicts.iter().map(|verdict| Promise {
-            metric: verdict.bound.metric.clone(),
-            value: verdict.value,
-            min: verdict.bound.min,
-            max: verdict.max,
-            held: verdict.held,
-        });
         Self {
             finger: number + 1,
             seed: finger.scene.seed,
             inside: outcome.passed(),
             drawn: finger.drawn.iter().map(|(name, value)| (name.clone(), json!(value))).collect(),
-            promises: promises.collect(),
+            promises: outcome.verdicts.iter().map(Promise::of).collect(),
             holds: outcome.holds.clone(),
-            metrics: outcome.measured.0.iter().map(|(name, value)| (name.clone(), json!(value))).collect(),
+            metrics: outcome.measured.json(),
             digest: outcome.summary.digest.clone(),
         }
     }

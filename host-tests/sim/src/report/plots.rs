@@ -1,7 +1,7 @@
 //! Plots of a report, each also drawn for a page without a script.
 
 use crate::metrics::shown;
-use crate::report::trace::{Instant, Kept, Row, Strip, Track, Tracks};
+use crate::report::trace::{Drawn, Instant, Kept, QUANTITIES, Row, Strip, Track, Tracks};
 use maud::{Markup, html};
 use output::heatmap::Pressures;
 use output::plot::{Curve, Curves, PlotError, curves};
@@ -43,9 +43,7 @@ pub struct Plot {
 }
 
 pub fn all(tracks: &Tracks) -> Vec<Plot> {
-    let Tracks { goal, force, sensed, control_error, held_error, sensing_error, .. } = tracks;
-    let Tracks { indentation, duty, current, supply, winding, slip, height, .. } = tracks;
-    let Tracks { force_difference, travel_difference, .. } = tracks;
+    let Tracks { goal, force, sensed, control_error, held_error, quantities, differences, .. } = tracks;
     let line = |label, style, track: &Track| Line { label, style, kept: track.along(&tracks.time) };
     // A goal is not averaged within a stretch: its last value counts.
     let mut goal_line = line("goal", Style::Goal, goal);
@@ -79,22 +77,16 @@ pub fn all(tracks: &Tracks) -> Vec<Plot> {
             lines: vec![line("true", Style::Main, force), goal_line, line("sensed", Style::Second, sensed)],
         },
         control_error,
-        one("Sensed less the true force", "mN", sensing_error),
-        one("Indentation of the tip", "mm", indentation),
-        smooth("Duty of the bridge", "%", duty),
-        smooth("Current in the winding", "A", current),
     ];
-    // Constant quantities are not drawn.
-    for (title, unit, track) in [
-        ("Supply at the bridge", "V", supply),
-        ("Temperature of the winding", "C", winding),
-        ("Slip of the contact", "mm", slip),
-        ("Height of the object", "mm", height),
-        ("True force less the native board's", "N", force_difference),
-        ("Travel less the native board's", "mm", travel_difference),
-    ] {
-        if track.moves() {
-            plots.push(one(title, unit, track));
+    let others = [("True force less the native board's", "N"), ("Travel less the native board's", "mm")];
+    let others = others.map(|(title, unit)| (title, unit, Drawn::IfItMoves)).into_iter().zip(differences);
+    let own = QUANTITIES.map(|(title, unit, drawn, _)| (title, unit, drawn)).into_iter().zip(quantities);
+    for ((title, unit, drawn), track) in own.chain(others) {
+        match drawn {
+            Drawn::Smooth => plots.push(smooth(title, unit, track)),
+            Drawn::Plain => plots.push(one(title, unit, track)),
+            Drawn::IfItMoves if track.moves() => plots.push(one(title, unit, track)),
+            Drawn::IfItMoves => {}
         }
     }
     plots

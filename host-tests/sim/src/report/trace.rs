@@ -14,7 +14,7 @@ use serde::Serialize;
 const STRETCHES: u64 = 900;
 /// Number of stretches over which a noisy quantity is averaged.
 const OF_A_MEAN: usize = 9;
-/// Time after which the steady error is judged, as in `metrics::response`.
+/// Time after which the steady error is judged, as in the metric `steady_error_max_mn`.
 const HELD_AFTER_S: f64 = 0.1;
 /// Pressure maps of a run.
 const MAPS: usize = 150;
@@ -105,6 +105,31 @@ pub struct Instant {
     pub codes: [[i32; COLUMNS]; ROWS],
 }
 
+/// Way in which a quantity is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Drawn {
+    Plain,
+    /// With a mean over several stretches.
+    Smooth,
+    /// Only if it has different values.
+    IfItMoves,
+}
+
+/// Quantity with a plot of its own: title, unit, way of drawing, and value.
+type Quantity = (&'static str, &'static str, Drawn, fn(&Step) -> f64);
+
+/// Quantities with plots of their own, in the order of the plots.
+pub const QUANTITIES: [Quantity; 8] = [
+    ("Sensed less the true force", "mN", Drawn::Plain, |s| 1e3 * (newtons(s.status.contact.force) - s.truth.force_n)),
+    ("Indentation of the tip", "mm", Drawn::Plain, |s| s.truth.indentation_mm),
+    ("Duty of the bridge", "%", Drawn::Smooth, |s| 100.0 * duty(s.status.duty)),
+    ("Current in the winding", "A", Drawn::Smooth, |s| s.truth.current_a),
+    ("Supply at the bridge", "V", Drawn::IfItMoves, |s| s.truth.supply_v),
+    ("Temperature of the winding", "C", Drawn::IfItMoves, |s| s.truth.winding_c),
+    ("Slip of the contact", "mm", Drawn::IfItMoves, |s| s.truth.slip_mm),
+    ("Height of the object", "mm", Drawn::IfItMoves, |s| s.truth.object_mm[1]),
+];
+
 /// Quantities of a finger over time.
 #[derive(Clone, Debug, Default)]
 pub struct Tracks {
@@ -120,26 +145,10 @@ pub struct Tracks {
     pub control_error: Track,
     /// The control error while a force is held, `HELD_AFTER_S` after the goal changed or the touch.
     pub held_error: Track,
-    /// The sensed less the true force, mN.
-    pub sensing_error: Track,
-    /// Indentation, mm.
-    pub indentation: Track,
-    /// Duty, %.
-    pub duty: Track,
-    /// Current, A.
-    pub current: Track,
-    /// Supply, V.
-    pub supply: Track,
-    /// The winding's temperature, degrees C.
-    pub winding: Track,
-    /// Slip, mm.
-    pub slip: Track,
-    /// Height of the object, mm.
-    pub height: Track,
-    /// True force less that of the other board, N, if there is one.
-    pub force_difference: Track,
-    /// Travel less that of the other board, mm.
-    pub travel_difference: Track,
+    /// Tracks of the quantities with plots of their own.
+    pub quantities: [Track; QUANTITIES.len()],
+    /// True force, N, and travel, mm, less those of the other board, if there is one.
+    pub differences: [Track; 2],
     pub instants: Vec<Instant>,
     states: Vec<States>,
     first: Option<Frame>,
@@ -196,23 +205,14 @@ impl Watch for Trace {
             self.fingers.resize_with(step.finger + 1, Tracks::default);
         }
         let tracks = &mut self.fingers[step.finger];
-        let (goal_n, sensed_n) = (newtons(step.command.goal), newtons(status.contact.force));
-        for (track, value) in [
-            (&mut tracks.goal, goal_n),
-            (&mut tracks.force, truth.force_n),
-            (&mut tracks.sensed, sensed_n),
-            (&mut tracks.control_error, 1e3 * (truth.force_n - goal_n)),
-            (&mut tracks.sensing_error, 1e3 * (sensed_n - truth.force_n)),
-            (&mut tracks.indentation, truth.indentation_mm),
-            (&mut tracks.duty, 100.0 * duty(status.duty)),
-            (&mut tracks.current, truth.current_a),
-            (&mut tracks.supply, truth.supply_v),
-            (&mut tracks.winding, truth.winding_c),
-            (&mut tracks.slip, truth.slip_mm),
-            (&mut tracks.height, truth.object_mm[1]),
-            (&mut tracks.time, time_s),
-        ] {
-            track.add(stretch, value);
+        let goal_n = newtons(step.command.goal);
+        tracks.goal.add(stretch, goal_n);
+        tracks.force.add(stretch, truth.force_n);
+        tracks.sensed.add(stretch, newtons(status.contact.force));
+        tracks.control_error.add(stretch, 1e3 * (truth.force_n - goal_n));
+        tracks.time.add(stretch, time_s);
+        for (track, (.., value)) in tracks.quantities.iter_mut().zip(QUANTITIES) {
+            track.add(stretch, value(step));
         }
         let asked = (status.mode, step.command.goal);
         if tracks.asked != asked {
@@ -221,9 +221,8 @@ impl Watch for Trace {
         if status.mode == Mode::Force && time_s >= tracks.asked_s + HELD_AFTER_S {
             tracks.held_error.add(stretch, 1e3 * (truth.force_n - goal_n));
         }
-        if let Some([force_n, travel_mm]) = self.other.as_ref().and_then(|other| other.difference(step)) {
-            tracks.force_difference.add(stretch, force_n);
-            tracks.travel_difference.add(stretch, travel_mm);
+        if let Some(differences) = self.other.as_ref().and_then(|other| other.difference(step)) {
+            tracks.differences.iter_mut().zip(differences).for_each(|(track, value)| track.add(stretch, value));
         }
         // One for each stretch of the track of times.
         tracks.states.resize(tracks.time.0.len(), States::default());

@@ -43,8 +43,8 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn error(&mut self, at: Range<usize>, message: String, allowed: String) -> &mut SceneError {
-        self.errors.push(SceneError::new(self.file, self.text, at, message, allowed));
+    fn error(&mut self, at: Range<usize>, message: impl Into<String>, allowed: impl Into<String>) -> &mut SceneError {
+        self.errors.push(SceneError::new(self.file, self.text, at, message.into(), allowed.into()));
         self.errors.last_mut().expect("one was pushed")
     }
 
@@ -92,7 +92,7 @@ impl Reader<'_> {
             && let Err(error) = Config::shipped(&scene.params())
         {
             let at = root.get("controller").map_or(0..0, |_| key_span(root, "controller"));
-            self.error(at, format!("the controller refuses its parameters: {error}"), String::new());
+            self.error(at, format!("the controller refuses its parameters: {error}"), "");
         }
         Some(scene)
     }
@@ -106,8 +106,7 @@ impl Reader<'_> {
         match item.as_table_like() {
             Some(given) => self.values(table, given, at, false).unwrap_or_else(|| Values::defaults(table.keys)),
             None => {
-                let message = format!("`{}` is a table", table.name);
-                self.error(at, message, format!("[{}], once", table.name));
+                self.error(at, format!("`{}` is a table", table.name), format!("[{}], once", table.name));
                 Values::defaults(table.keys)
             }
         }
@@ -172,7 +171,7 @@ impl Reader<'_> {
             self.time("the events are", given, event.at_s, events.last().map(|before| before.at_s), duration_s);
             if movable && event.moves_object() {
                 let message = format!("`{}` cannot act on an object that the fingers move", kind.name);
-                self.error(item_span(given, "kind"), message, "without a mass in [effects.object_mass]".into());
+                self.error(item_span(given, "kind"), message, "without a mass in [effects.object_mass]");
             }
             events.push(event);
         }
@@ -182,8 +181,7 @@ impl Reader<'_> {
     fn effects(&mut self, root: &dyn TableLike) -> Vec<NamedEffect> {
         let Some(item) = root.get("effects") else { return Vec::new() };
         let Some(given) = item.as_table_like() else {
-            let allowed = "[effects.NAME] for each effect";
-            self.error(key_span(root, "effects"), "`effects` is a table of tables".into(), allowed.into());
+            self.error(key_span(root, "effects"), "`effects` is a table of tables", "[effects.NAME] for each effect");
             return Vec::new();
         };
         for (name, _) in given.iter().filter(|(name, _)| effects::all().all(|effect| effect.name != *name)) {
@@ -223,7 +221,7 @@ impl Reader<'_> {
             }
             if bounds.iter().any(|before| before.metric == bound.metric) {
                 let message = format!("bounds of `{}` for the second time", bound.metric);
-                self.error(metric(), message, "one [[expect]] a metric, with min, max or both".into());
+                self.error(metric(), message, "one [[expect]] a metric, with min, max or both");
             }
             let by_goal = metrics::BY_GOAL.iter().map(|(name, _)| *name);
             if bound.max_per_goal_n.is_some() {
@@ -240,14 +238,10 @@ impl Reader<'_> {
             }
             match (bound.min, bound.max) {
                 (None, None) => {
-                    self.error(place, format!("`{}` without a bound", bound.metric), "min, max or both".into());
+                    self.error(place, format!("`{}` without a bound", bound.metric), "min, max or both");
                 }
                 (Some(min), Some(max)) if min > max => {
-                    self.error(
-                        item_span(given, "min"),
-                        format!("min of {min} is above max of {max}"),
-                        "min <= max".into(),
-                    );
+                    self.error(item_span(given, "min"), format!("min of {min} is above max of {max}"), "min <= max");
                 }
                 _ => {}
             }
@@ -284,10 +278,8 @@ impl Reader<'_> {
                 values.insert(key.name, value);
             }
         }
-        let complete = table
-            .keys
-            .iter()
-            .all(|key| matches!(key.kind, Kind::Optional { .. }) || values.iter().any(|(name, _)| name == key.name));
+        let has = |key: &Key| values.iter().any(|(name, _)| name == key.name);
+        let complete = table.keys.iter().all(|key| matches!(key.kind, Kind::Optional { .. }) || has(key));
         (complete && self.errors.len() == errors).then_some(values)
     }
 

@@ -334,36 +334,29 @@ impl Values {
     }
 
     pub fn whole(&self, name: &str) -> i64 {
-        match self.get(name) {
-            Value::Whole(number) => *number,
-            other => panic!("{name} is no whole number but {other:?}"),
-        }
+        self.of(name, "whole number", |value| if let Value::Whole(number) = value { Some(*number) } else { None })
     }
 
     pub fn word(&self, name: &str) -> &'static str {
-        match self.get(name) {
-            Value::Word(word) => word,
-            other => panic!("{name} is no word but {other:?}"),
-        }
+        self.of(name, "word", |value| if let Value::Word(word) = value { Some(*word) } else { None })
     }
 
     pub fn pairs(&self, name: &str) -> &[[i64; 2]] {
-        match self.get(name) {
-            Value::Pairs(pairs) => pairs,
-            other => panic!("{name} holds no pairs but {other:?}"),
-        }
+        self.of(name, "list of pairs", |value| if let Value::Pairs(pairs) = value { Some(&pairs[..]) } else { None })
+    }
+
+    pub fn text(&self, name: &str) -> &str {
+        self.of(name, "text", |value| if let Value::Text(text) = value { Some(text.as_str()) } else { None })
+    }
+
+    fn of<'a, T>(&'a self, name: &str, kind: &str, value: impl FnOnce(&'a Value) -> Option<T>) -> T {
+        let found = self.get(name);
+        value(found).unwrap_or_else(|| panic!("{name} is no {kind} but {found:?}"))
     }
 
     /// Returns a number that may be missing.
     pub fn optional(&self, name: &str) -> Option<f64> {
         self.0.iter().any(|(known, _)| *known == name).then(|| self.number(name))
-    }
-
-    pub fn text(&self, name: &str) -> &str {
-        match self.get(name) {
-            Value::Text(text) => text,
-            other => panic!("{name} is no text but {other:?}"),
-        }
     }
 
     /// Returns all values, in the order of the description.

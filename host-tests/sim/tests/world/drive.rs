@@ -1,10 +1,10 @@
 //! Effects of motor and gear; no passive effect creates energy.
 
-use crate::{close, part, run, world};
+use crate::{close, parts, run, world};
 use core::f64::consts::TAU;
 use sim::cores;
-use sim::effects::drive::{Circuit, Friction};
-use sim::effects::{Named, Part};
+use sim::effects::Named;
+use sim::effects::drive::{Circuit, Friction, Stages as _};
 use sim::mechanics::Bridge;
 use sim::world::World;
 
@@ -76,12 +76,10 @@ fn stribeck_friction_breaks_away_higher_than_it_slides() {
     let both = format!("{dry}[effects.stribeck]\ntorque_mnm = 0.06\nspeed_rad_per_s = 5.0\n");
     close(breakaway_v(dry), 0.12 / 5.35 * 3.53, 1e-9);
     close(breakaway_v(&both), 0.18 / 5.35 * 3.53, 1e-9);
-    let Part::Resist(mut part) = part("[effects.stribeck]\ntorque_mnm = 0.06\nspeed_rad_per_s = 5.0\n", 1) else {
-        panic!()
-    };
+    let mut drive = parts("[effects.stribeck]\ntorque_mnm = 0.06\nspeed_rad_per_s = 5.0\n", 1).drive;
     for (speed, share) in [(0.0, 1.0), (5.0, 0.5), (-5.0, 0.5), (50.0, 1.0 / 101.0)] {
         let mut friction = Friction::default();
-        part(speed, &mut friction);
+        drive.friction(speed, &mut friction);
         close(friction.sliding_nm, 0.06e-3 * share, 1e-12);
     }
 }
@@ -129,7 +127,7 @@ fn the_play_is_as_wide_as_it_says() {
 fn the_winding_warms_up_like_its_closed_form() {
     let text = "[effects.thermal_derating]\nk_per_w = 46.0\ntau_s = 10.0\nambient_c = 30.0\nmagnet_per_k = -0.001\n";
     for step_s in [1e-4, 0.1, 3.0] {
-        let Part::Electric(mut part) = part(text, 1) else { panic!() };
+        let mut drive = parts(text, 1).drive;
         let cold = Circuit {
             source_v: 6.0,
             source_ohm: 0.0,
@@ -142,8 +140,8 @@ fn the_winding_warms_up_like_its_closed_form() {
         let current_a = 0.4_f64;
         for _ in 0..(15.0 / step_s) as u32 {
             let mut circuit = cold;
-            part.apply(&mut circuit);
-            part.after(step_s, &circuit, current_a * current_a * step_s);
+            drive.circuit(&mut circuit);
+            drive.heated(step_s, &circuit, current_a * current_a * step_s);
         }
         let time_s = f64::from((15.0 / step_s) as u32) * step_s;
         // tau dT/dt = K (1 + 0.0039 (T - 25)) - (T - 30), K = i^2 R R_th.
@@ -151,10 +149,10 @@ fn the_winding_warms_up_like_its_closed_form() {
         let rate = (1.0 - 0.0039 * k) / 10.0;
         let end = (k * (1.0 - 0.0039 * 25.0) + 30.0) / (1.0 - 0.0039 * k);
         let mut truth = sim::watch::Truth::default();
-        part.tell(&mut truth);
+        drive.tell(&mut truth);
         close(truth.winding_c, end + (30.0 - end) * (-rate * time_s).exp(), 1e-8);
         let mut circuit = cold;
-        part.apply(&mut circuit);
+        drive.circuit(&mut circuit);
         close(circuit.winding_ohm, 2.83 * (1.0 + 0.0039 * (truth.winding_c - 25.0)), 1e-12);
         close(circuit.torque_nm_per_a, 5.35e-3 * (1.0 - 0.001 * (truth.winding_c - 25.0)), 1e-12);
     }

@@ -9,7 +9,7 @@ use fingertip::state::{Fault, Mode};
 use sim::metrics::Measured;
 use sim::native;
 use sim::run::{Outcome, run};
-use sim::watch::{Step, Truth, Watch};
+use sim::watch::{Agreement, Path, Step, Truth, Watch};
 
 struct Kept {
     time_s: f64,
@@ -161,6 +161,14 @@ fn the_array_shows_what_its_defect_says() {
     assert!(frozen.clone().all(|kept| kept.codes == frozen.clone().next().unwrap().codes));
     let all = with("interference", "for_s = 0.01");
     assert!((sum(all.at(0.405)) / 1e2 - 2048.0).abs() < 500.0 && all.at(0.405).codes != all.at(0.406).codes);
+}
+
+#[test]
+fn two_boards_are_not_compared_where_codes_are_random() {
+    for (kind, unjudged) in [("interference", true), ("array_blank", false)] {
+        let scene = scene(&format!("duration_s = 1.0\n{}", event(kind, "for_s = 0.1")));
+        assert_eq!(Agreement::new(&scene, Path::default()).held(), unjudged, "{kind}: nothing was compared");
+    }
 }
 
 #[test]

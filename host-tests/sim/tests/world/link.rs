@@ -1,9 +1,9 @@
 //! Each effect of clock, bus and host against its closed form, the host that repeats its command, and virtual time.
 
-use crate::{Last, part, run, scene, world};
+use crate::{Last, parts, run, scene, world};
 use fingertip::shipped::{COLUMNS, SLOTS};
-use sim::effects::link::{self, Stages};
-use sim::effects::{Named, Part, Set as _, stream};
+use sim::effects::link::Stages;
+use sim::effects::{Named, sensor::Stages as _, stream};
 use sim::host::Host;
 use sim::mechanics::Bridge;
 use sim::native::{Begun, Clock, simulate_from};
@@ -15,21 +15,17 @@ fn long_scene(tables: &str) -> Scene {
     crate::scene(&format!("duration_s = 1000\n{tables}"))
 }
 
-fn stages(scene: &Scene, seed: u64) -> link::Named {
-    Named::of(&Scene { seed, ..scene.clone() }, 0).link
-}
-
 #[test]
 fn a_fast_clock_has_short_seconds() {
-    let mut fast = stages(&long_scene("[effects.clock_tolerance]\nfast_ppm = 10000"), 1);
+    let mut fast = parts("[effects.clock_tolerance]\nfast_ppm = 10000", 1).link;
     assert!((fast.second_s(0.0) - 1.0 / 1.01).abs() < 1e-15);
-    let mut slow = stages(&long_scene("[effects.clock_tolerance]\nfast_ppm = -50"), 1);
+    let mut slow = parts("[effects.clock_tolerance]\nfast_ppm = -50", 1).link;
     assert!((slow.second_s(0.0) - (1.0 + 50e-6)).abs() < 1e-8);
 }
 
 /// The share of many packets that arrives.
 fn arriving(tables: &str) -> f64 {
-    let mut stages = stages(&long_scene(tables), 4);
+    let mut stages = parts(tables, 4).link;
     (0..40_000).filter(|_| stages.pass(1.0).is_some()).count() as f64 / 40_000.0
 }
 
@@ -59,7 +55,7 @@ fn hosts_are_late_by_their_distribution() {
         [("uniform", 0.5, 1.0 / 3.0), ("normal", (2.0 / core::f64::consts::PI).sqrt(), 1.0)]
     {
         let tables = format!("[effects.host_jitter]\ndelay_ms = 4\ndistribution = \"{distribution}\"");
-        let mut stages = stages(&long_scene(&tables), 3);
+        let mut stages = parts(&tables, 3).link;
         let late: Vec<f64> = (0..40_000).map(|_| (stages.pass(7.0).unwrap() - 7.0) / 4e-3).collect();
         let of = |power: i32| late.iter().map(|late| late.powi(power)).sum::<f64>() / late.len() as f64;
         assert!(late.iter().all(|late| *late >= 0.0));
@@ -71,12 +67,12 @@ fn hosts_are_late_by_their_distribution() {
 #[test]
 fn bursts_come_and_last_as_asked() {
     let burst = "[effects.burst]\nrate_per_s = 50\nlength_us = 2000\namplitude_codes = 100";
-    let Part::Codes(mut burst) = part(burst, 9) else { panic!() };
+    let mut burst = parts(burst, 9).sensor;
     let (mut noisy, mut begun, mut was) = (0, 0, false);
     let steps = 2_000_000;
     for step in 0..steps {
         let mut codes = [1000.0; COLUMNS];
-        burst(step % SLOTS, step as f64 * 1e-4, &mut codes);
+        burst.codes(step % SLOTS, step as f64 * 1e-4, &mut codes);
         let is = codes != [1000.0; COLUMNS];
         assert!(codes.iter().all(|code| (code - 1000.0).abs() <= 100.0));
         noisy += usize::from(is);
@@ -114,14 +110,13 @@ fn a_lost_goal_arrives_with_the_next_repetition() {
 
 #[test]
 fn the_last_of_simultaneous_events_counts_and_late_packets_keep_their_order() {
-    let scene = long_scene(
-        "[[script]]\nat_s = 0.5\ngoal_n = 1\n[[script]]\nat_s = 0.5\ngoal_n = 2\n[effects.host_jitter]\ndelay_ms = 300",
-    );
+    let scene = long_scene("[[script]]\nat_s = 0.5\ngoal_n = 1\n[[script]]\nat_s = 0.5\ngoal_n = 2\n");
     let mut host = Host::new(&scene);
     assert_eq!(host.goal_n(0.499, &mut ()), 0.0);
     assert_eq!(host.goal_n(0.5, &mut ()), 2.0);
     for seed in 0..50 {
-        let (mut host, mut stages) = (Host::new(&scene), stages(&scene, seed));
+        let mut host = Host::new(&scene);
+        let mut stages = parts("[effects.host_jitter]\ndelay_ms = 300", seed).link;
         let mut last = 0.0;
         for ms in 0..2000 {
             let goal_n = host.goal_n(f64::from(ms) * 1e-3, &mut stages);
@@ -177,7 +172,7 @@ fn a_step_that_is_no_whole_number_of_units_counts_as_the_nearest() {
 fn a_run_is_the_same_at_any_hour() {
     let scene =
         scene("duration_s = 0.4\n[[script]]\nat_s = 0.01\ngoal_n = 1.0\n[effects.noise]\n[effects.relaxation]\n");
-    let run = |clock_s| simulate_from::<Named>(&scene, Begun { clock_s, scene_s: 0.0 }, &mut Last::default()).unwrap();
+    let run = |clock_s| simulate_from(&scene, Begun { clock_s, scene_s: 0.0 }, &mut Last::default()).unwrap();
     assert_eq!(run(0.0).digest, run(DAY_S).digest);
 }
 
@@ -205,7 +200,7 @@ fn what_a_script_asks_for_after_a_day_goes_as_at_the_start() {
              [[script]]\nat_s = {second_s:?}\ngoal_n = 2.0\n[hand]\nfingers = 2\nlift_mm = 2.0\nlift_at_s = {second_s:?}\nlift_s = 0.1\n{BY_TIME}"
         );
         let mut truths = Truths::default();
-        simulate_from::<Named>(&scene(&text), Begun { clock_s: 0.0, scene_s }, &mut truths).unwrap();
+        simulate_from(&scene(&text), Begun { clock_s: 0.0, scene_s }, &mut truths).unwrap();
         truths.0
     };
     let (early, late) = (truths(0.0), truths(DAY_S));

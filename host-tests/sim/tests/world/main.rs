@@ -11,9 +11,8 @@ mod plant;
 mod sensor;
 
 use fingertip::state::Mode;
-use sim::effects::{self, Named, Part, Set};
+use sim::effects::{self, Named, Parts, Set as _};
 use sim::mechanics::Bridge;
-use sim::native::simulate_with;
 use sim::scene::{self, Scene, read};
 use sim::watch::{Cost, Step, Summary, Truth, Watch};
 use sim::world::{Surroundings, World};
@@ -139,31 +138,25 @@ fn denormal_and_zero_steps_change_nothing_that_counts() {
 }
 
 /// Touches, changes the goal and releases, with tables of effects.
-fn run_script<E: Set>(tables: &str) -> Summary {
+fn run_script(tables: &str) -> Summary {
     let script = [(0.0, 1.0), (0.2, 2.0), (0.3, 0.0)]
         .map(|(at_s, goal_n)| format!("[[script]]\nat_s = {at_s}\ngoal_n = {goal_n}\n"));
     let text = format!("duration_s = 0.35\n[object]\ndistance_mm = 2\n{}{tables}", script.concat());
-    simulate_with::<E>(&scene(&text), &mut Last::default()).unwrap()
-}
-
-#[test]
-fn compiled_in_but_not_named_changes_no_bit_and_is_never_called() {
-    let unnamed = run_script::<Named>("");
-    assert_eq!(unnamed.digest, run_script::<()>("").digest);
-    assert_eq!(unnamed.ledger, []);
-    // The digest detects a change.
-    assert_ne!(unnamed.digest, run_script::<Named>("[effects.noise]\n").digest);
+    sim::simulate(&scene(&text), &mut Last::default()).unwrap()
 }
 
 #[test]
 fn effects_without_magnitude_change_no_bit_and_are_called_alike_alone_and_together() {
-    let plain = run_script::<()>("").digest;
-    let all = run_script::<Named>(&effects::all().map(scene::zero).collect::<String>());
+    let Summary { digest: plain, ledger, .. } = run_script("");
+    assert_eq!(ledger, [], "an effect that is not named is never called");
+    // The digest detects a change.
+    assert_ne!(plain, run_script("[effects.noise]\n").digest);
+    let all = run_script(&effects::all().map(scene::zero).collect::<String>());
     assert_eq!((all.digest.as_str(), all.ledger.len()), (plain.as_str(), effects::all().count()));
     // Calls of one do not depend on which others are named: cost is linear in their number, to the call.
     for cost in &all.ledger {
         let effect = effects::all().find(|effect| effect.name == cost.effect).unwrap();
-        let alone = run_script::<Named>(&scene::zero(effect));
+        let alone = run_script(&scene::zero(effect));
         let [Cost { evaluations, .. }] = alone.ledger[..] else { panic!("{}: {:?}", effect.name, alone.ledger) };
         assert_eq!((&alone.digest, evaluations), (&plain, cost.evaluations), "{}", effect.name);
         assert!(evaluations > 0, "{} was not called", effect.name);
@@ -174,9 +167,9 @@ fn effects_without_magnitude_change_no_bit_and_are_called_alike_alone_and_togeth
 fn a_contact_at_rest_reads_as_if_each_scan_were_computed() {
     // Of each voltage a seventh is that of the slot before, so the first slot of a motion shows what the rest left behind.
     let steady = "[effects.dry_friction]\ntorque_mnm = 0.12\n[effects.row_sag]\n[effects.settling]\nafter_us = 0.4\n";
-    let known = run_script::<Named>(steady);
+    let known = run_script(steady);
     // Noise, even without magnitude, is drawn for each scan.
-    let computed = run_script::<Named>(&format!("{steady}[effects.noise]\nrms_codes = 0\n"));
+    let computed = run_script(&format!("{steady}[effects.noise]\nrms_codes = 0\n"));
     assert_eq!(known.digest, computed.digest);
     for cost in &known.ledger {
         assert!(
@@ -189,8 +182,8 @@ fn a_contact_at_rest_reads_as_if_each_scan_were_computed() {
 fn every_effect_by_its_default_runs_to_the_end_and_alike_each_time() {
     for effect in effects::all() {
         let table = format!("[effects.{}]\n", effect.name);
-        let once = run_script::<Named>(&table);
-        assert_eq!(once.digest, run_script::<Named>(&table).digest, "{}", effect.name);
+        let once = run_script(&table);
+        assert_eq!(once.digest, run_script(&table).digest, "{}", effect.name);
     }
 }
 
@@ -199,9 +192,9 @@ fn scene(text: &str) -> Scene {
     read("test.toml", &format!("about = \"a test\"\n{text}"), &[]).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// The first effect of these tables.
-fn part(tables: &str, seed: u64) -> Part {
-    effects::build(&scene(&format!("duration_s = 1.0\n{tables}")).effects, seed, 0).next().expect("an effect").1
+/// The effects of these tables.
+fn parts(tables: &str, seed: u64) -> Parts<Named> {
+    Named::of(&Scene { seed, ..scene(&format!("duration_s = 1.0\n{tables}")) }, 0)
 }
 
 #[derive(Debug, Default)]

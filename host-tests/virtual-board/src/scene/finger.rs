@@ -68,7 +68,8 @@ pub struct Finger {
     pub clock: Clock,
     /// True if the next frames need their true pressures.
     pub wants_pressures: bool,
-    bridge: Bridge,
+    /// State of the bridge from now on.
+    pub bridge: Bridge,
     /// Scene time until which the world is frozen, s.
     from_s: f64,
     joint: Joint,
@@ -127,11 +128,6 @@ impl Finger {
         self.expected.extend(slots);
     }
 
-    /// The bridge does this from now on.
-    pub fn hold(&mut self, bridge: Bridge) {
-        self.bridge = bridge;
-    }
-
     /// Goes to an instant of the board with the bridge held.
     pub fn advance(&mut self, to_ns: u64) {
         while let Some((begun_ns, rows)) = self.expected.pop_front_if(|(begun_ns, _)| *begun_ns < to_ns) {
@@ -142,11 +138,11 @@ impl Finger {
 
     /// The world's grid: it must come to each of its instants.
     pub fn grid_ns(&self) -> u64 {
-        self.joint.grid_ns()
+        self.joint.meeting.grid_ns
     }
 
     pub fn supply_v(&self) -> f64 {
-        self.joint.supply_v()
+        self.joint.meeting.lock().world.fingers()[self.joint.finger].supply_v()
     }
 
     /// The microcontroller's temperature, a room's where the scene does not tell.
@@ -211,7 +207,9 @@ impl Finger {
 
     /// Costs of the effects on sensor, contact and drive.
     pub fn costs(&self) -> Vec<Cost> {
-        self.joint.costs(|contact, drive| Named::costs(&self.sensor, contact, drive, &link::Named::default()))
+        let world = &self.joint.meeting.lock().world;
+        let finger = &world.fingers()[self.joint.finger];
+        Named::costs(&self.sensor, &finger.contact.effects, &finger.drive, &link::Named::default())
     }
 }
 
@@ -237,6 +235,7 @@ struct Meeting {
     state: Mutex<SharedWorld>,
     moved: Condvar,
     longest_s: f64,
+    /// The world moves on at least that often.
     grid_ns: u64,
 }
 
@@ -247,7 +246,7 @@ impl Meeting {
 }
 
 /// A finger's hold on the world.
-pub struct Joint {
+struct Joint {
     finger: usize,
     meeting: Arc<Meeting>,
     shared: bool,
@@ -293,7 +292,7 @@ impl Drop for Joint {
 
 impl Joint {
     /// A hold for each finger of a world at scene time `now_s`.
-    pub fn all(scene: &Scene, world: World<Named>, now_s: f64) -> Result<Vec<Self>, SimError> {
+    fn all(scene: &Scene, world: World<Named>, now_s: f64) -> Result<Vec<Self>, SimError> {
         let longest_s = scene.table("world").number("step_us") * 1e-6;
         world.check_step(longest_s)?;
         let fingers = world.fingers().len();
@@ -317,14 +316,9 @@ impl Joint {
         Ok((0..fingers).map(joint).collect())
     }
 
-    /// The world's grid: it moves on at least that often.
-    pub fn grid_ns(&self) -> u64 {
-        self.meeting.grid_ns
-    }
-
     /// Goes on to an instant of the board with this finger's bridge held. Where fingers share the world it moves by
     /// whole steps of the grid.
-    pub fn advance(&mut self, to_ns: u64, clock: &Clock, bridge: Bridge) {
+    fn advance(&mut self, to_ns: u64, clock: &Clock, bridge: Bridge) {
         let to_s = clock.time_s(to_ns);
         if !self.shared {
             let mut state = self.meeting.lock();
@@ -362,48 +356,30 @@ impl Joint {
     }
 
     /// Present scene time of the world, s.
-    pub fn now_s(&self) -> f64 {
+    fn now_s(&self) -> f64 {
         self.meeting.lock().now_s
     }
 
-    /// Time by which the world lags behind a scene time, s; at least 0.
-    fn behind_s(state: &SharedWorld, time_s: f64) -> f64 {
-        (time_s - state.now_s).max(0.0)
-    }
-
-    pub fn supply_v(&self) -> f64 {
-        self.meeting.lock().world.fingers()[self.finger].supply_v()
-    }
-
     /// Counts of the encoder at a scene time.
-    pub fn encoder_counts(&self, time_s: f64) -> i32 {
+    fn encoder_counts(&self, time_s: f64) -> i32 {
         let mut state = self.meeting.lock();
-        let ahead_s = Self::behind_s(&state, time_s);
+        let ahead_s = (time_s - state.now_s).max(0.0);
         state.world.fingers_mut()[self.finger].count_ahead(ahead_s)
     }
 
     /// Mean pressures on a row's taxels at a time.
-    pub fn row_kpa(&self, time_s: f64, row: usize) -> [f64; COLUMNS] {
+    fn row_kpa(&self, time_s: f64, row: usize) -> [f64; COLUMNS] {
         let mut state = self.meeting.lock();
         let off_s = time_s - state.now_s;
         state.world.row_off_kpa(self.finger, off_s, row)
     }
 
     /// Encoder and supply, and the true state.
-    pub fn look(&self, pressures: bool) -> (Sense, Truth) {
+    fn look(&self, pressures: bool) -> (Sense, Truth) {
         let world = &mut self.meeting.lock().world;
         (world.sense(self.finger, 0), world.truth(self.finger, pressures))
     }
-
-    pub fn costs(&self, of: impl Fn(&ContactEffects, &DriveEffects) -> Vec<Cost>) -> Vec<Cost> {
-        let state = self.meeting.lock();
-        let finger = &state.world.fingers()[self.finger];
-        of(&finger.contact.effects, &finger.drive)
-    }
 }
-
-type ContactEffects = sim::effects::contact::Named;
-type DriveEffects = sim::effects::drive::Named;
 
 impl SharedWorld {
     fn advance(&mut self, to_s: f64, longest_s: f64) {
@@ -453,7 +429,7 @@ mod tests {
     fn boards_meet_though_one_comes_late_to_the_grid() {
         let mut joints = two();
         let clock = Clock::new(0);
-        let (grid_ns, mut late) = (joints[0].grid_ns(), joints.remove(1));
+        let (grid_ns, mut late) = (joints[0].meeting.grid_ns, joints.remove(1));
         let mut early = joints.remove(0);
         std::thread::scope(|scope| {
             scope.spawn(|| (1..=50).for_each(|step| early.advance(step * grid_ns, &clock, DRIVEN(0.5))));

@@ -20,7 +20,7 @@ use sim::effects::link::Named;
 use sim::events::Request;
 use sim::host::Reading;
 use sim::scene::Scene;
-use sim::watch::{Cost, Step};
+use sim::watch::Step;
 use std::collections::VecDeque;
 
 /// Longest time for which a read and its answer occupy the line, ns.
@@ -83,8 +83,8 @@ impl Shown {
 pub struct Host {
     finger: usize,
     host: sim::host::Host,
-    link: Named,
-    clock: Clock,
+    pub link: Named,
+    pub clock: Clock,
     start_ns: u64,
     watchdog_ns: u64,
     /// Packets in transmission or not yet taken by a step, in order.
@@ -98,14 +98,15 @@ pub struct Host {
     look_ns: u64,
     look_every_ns: u64,
     command: Command,
-    listener: Listener,
+    receiver: Receiver,
     status: Status,
     /// True once the tare before the start has ended: a scene may request another one.
     ready: bool,
     /// Offset from the converters' frame number to the board's own.
     offset: u32,
     frames: VecDeque<Seen>,
-    shown: Vec<Shown>,
+    /// Steps to show that nobody has taken yet.
+    pub shown: Vec<Shown>,
     /// Number of the frame that was shown last, and its time, ns.
     newest: u64,
     shown_ns: u64,
@@ -140,7 +141,7 @@ impl Host {
             look_ns: 0,
             look_every_ns: (((LOOK_FRAMES * frame_ns).max(least_ns) + MS / 2) / MS).max(1) * MS,
             command: Command { torque: true, tare_request: 1, ..Command::default() },
-            listener: Listener::default(),
+            receiver: Receiver::default(),
             status: Status::default(),
             ready: false,
             offset,
@@ -156,21 +157,6 @@ impl Host {
     /// Shows every frame from now on, also frames without an answer; fewer reads are then enough.
     pub fn show_every_frame(&mut self) {
         (self.every_frame, self.look_every_ns) = (true, self.look_every_ns.max(SELDOM_NS));
-    }
-
-    /// Sets the duration of a board second from a board time on.
-    pub fn run_at(&mut self, at_ns: u64, second_s: f64) {
-        self.clock.run_at(at_ns, second_s);
-    }
-
-    /// Costs of the link's effects.
-    pub fn costs(&self) -> impl Iterator<Item = Cost> {
-        self.link.costs()
-    }
-
-    /// Steps to show since the last call.
-    pub fn take_shown(&mut self) -> Vec<Shown> {
-        std::mem::take(&mut self.shown)
     }
 
     /// Why the board is not fit for the scene, if so.
@@ -194,7 +180,7 @@ impl Host {
             self.frames.pop_front();
         }
         for timed in received {
-            if let Some(status) = self.listener.push(timed.byte) {
+            if let Some(status) = heard(&mut self.receiver, timed.byte) {
                 self.answered(status, timed.at_ns);
             }
         }
@@ -369,25 +355,16 @@ fn packet(instruction: u8, params: &[u8]) -> Vec<u8> {
     bytes.to_vec()
 }
 
-/// Takes the image's bytes and finds the status registers among them.
-#[derive(Debug, Default)]
-pub struct Listener(Receiver);
-
-impl Listener {
-    /// The status, where this byte completes it.
-    pub fn push(&mut self, byte: u8) -> Option<Status> {
-        if self.0.push(byte) != Some(Event::Packet) {
-            return None;
-        }
-        let packet = self.0.packet();
-        let of_board = packet.id == ID && packet.instruction == instruction::STATUS;
-        // An error byte comes first; its top bit only says that the board has a fault.
-        packet
-            .params
-            .split_first()
-            .filter(|(error, _)| of_board && **error & 0x7f == 0)
-            .and_then(|(_, data)| status(data))
+/// Takes a byte of the image; returns the status registers if the byte completes them.
+fn heard(receiver: &mut Receiver, byte: u8) -> Option<Status> {
+    if receiver.push(byte) != Some(Event::Packet) {
+        return None;
     }
+    let packet = receiver.packet();
+    let of_board = packet.id == ID && packet.instruction == instruction::STATUS;
+    // An error byte comes first; its top bit only says that the board has a fault.
+    let (error, data) = packet.params.split_first()?;
+    if of_board && error & 0x7f == 0 { status(data) } else { None }
 }
 
 fn status(bytes: &[u8]) -> Option<Status> {

@@ -151,22 +151,20 @@ impl Comparison {
 
     /// Each function's name and digest, and how many inputs it took.
     pub fn digests(&self) -> impl Iterator<Item = (&'static str, u64, u32)> + '_ {
-        let made_from = FUNCTIONS - machines::MADE.len();
-        let frames_from = made_from - machines::FRAMES.len();
-        names().zip(&self.mixes).enumerate().map(move |(place, (name, mix))| {
-            let every = match place {
-                place if place < frames_from => 1,
-                place if place < made_from => machines::FRAME_EVERY,
-                _ => machines::MADE_EVERY,
-            };
-            (name, mix.value(), self.taken.div_ceil(every))
-        })
+        functions().zip(&self.mixes).map(|((name, every), mix)| (name, mix.value(), self.taken.div_ceil(every)))
     }
 }
 
 /// The functions in the order of their digests.
 pub fn names() -> impl Iterator<Item = &'static str> {
-    let model = model::FUNCTIONS.iter().map(|(name, _)| *name);
-    let machines = machines::STEPS.iter().chain(&machines::FRAMES).map(|(name, _)| *name);
-    model.chain(machines).chain(machines::MADE.iter().map(|(name, _)| *name))
+    functions().map(|(name, _)| name)
+}
+
+/// The same, each with the number of inputs of which it takes one.
+fn functions() -> impl Iterator<Item = (&'static str, u32)> {
+    let model = model::FUNCTIONS.iter().map(|(name, _)| (*name, 1));
+    let steps = machines::STEPS.iter().map(|(name, _)| (*name, 1));
+    let frames = machines::FRAMES.iter().map(|(name, _)| (*name, machines::FRAME_EVERY));
+    let made = machines::MADE.iter().map(|(name, _)| (*name, machines::MADE_EVERY));
+    model.chain(steps).chain(frames).chain(made)
 }

@@ -56,7 +56,7 @@ pub struct Bench {
     encoder: i32,
     encoder_ns: u64,
     resets: usize,
-    grid_ns: u64,
+    pub grid_ns: u64,
     follows_frames: bool,
     frames: u64,
 }
@@ -172,8 +172,8 @@ impl Bench {
         let board = session.board_mut();
         self.watch_bridge(board, now_ns);
         self.advance_world(now_ns);
-        self.turn_encoder(session.board_mut(), now_ns);
-        for byte in session.board_mut().wire().take_received() {
+        self.turn_encoder(board, now_ns);
+        for byte in board.wire().take_received() {
             self.trace.add(byte.at_ns, Record::Sent(byte.byte));
             self.received.push(byte);
         }
@@ -192,11 +192,6 @@ impl Bench {
         if now_ns.is_multiple_of(LOG_NS) {
             self.log.drain(now_ns, host);
         }
-    }
-
-    /// Looks ahead to the next instant of the grid.
-    pub fn go_on(&mut self) {
-        self.next_ns = (self.next_ns / self.grid_ns + 1) * self.grid_ns;
     }
 
     /// Time of the next stop: the next instant of the grid, or an earlier one at which the host begins to send. A byte

@@ -73,13 +73,13 @@ impl Board for Part {
     }
 
     fn mcu(&mut self, target: usize) -> Option<&mut dyn Mcu> {
-        self.set_laying_out(false);
+        self.laying_out = false;
         (target == 0).then_some(self)
     }
 
     /// The emulator asks for the targets when it lays out memory, and for the microcontroller from then on.
     fn targets(&mut self) -> Vec<Target<'_>> {
-        self.set_laying_out(true);
+        self.laying_out = true;
         let lines = u32::from(self.cpu().interrupt_lines);
         let core = Core {
             variant: Variant::M4,

@@ -70,7 +70,8 @@ pub struct Part {
     bridge_well: bool,
     front_end: Shared,
     layout: Bus,
-    laying_out: bool,
+    /// True while the emulator lays out memory: the bus then includes the device that programs the flash.
+    pub laying_out: bool,
     wiring: Vec<Model>,
     /// Slots of USART2, TIM1 and the registers that the converters share.
     port_slot: usize,
@@ -129,11 +130,6 @@ impl Part {
         std::array::from_fn(|nth| Converter::new(nth, front_end.clone(), RESET_HZ / 2))
     }
 
-    /// Sets whether the emulator lays out memory at present: the bus then includes the device that programs the flash.
-    pub fn set_laying_out(&mut self, laying_out: bool) {
-        self.laying_out = laying_out;
-    }
-
     /// The host's end of the bus.
     pub fn wire(&mut self) -> &mut Wire {
         self.bus_port.wire()
@@ -141,11 +137,6 @@ impl Part {
 
     pub fn pwm_timer(&self) -> (&PwmTimer, &RegisterFile) {
         (&self.pwm_timer, self.chip.bus().slots()[self.pwm_slot].registers())
-    }
-
-    /// The front end that the converters are on.
-    pub fn front_end(&self) -> &Shared {
-        &self.front_end
     }
 
     /// Moves the encoder by quarter cycles, positive forward, evenly over the time that has just passed, for the timer

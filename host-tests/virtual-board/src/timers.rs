@@ -372,6 +372,16 @@ mod tests {
     /// 25 kHz.
     const PERIOD_NS: u64 = 40_000;
 
+    /// The bridge's timer, running: period, PWM mode 1 with preload, output on; `main_output` turns it on.
+    fn running(main_output: bool) -> Single<PwmTimer> {
+        let mut part = Single::new(builder(), "TIM1", PwmTimer::new(CLOCK_HZ)).expect("the part has a TIM1");
+        let main_output = if main_output { 1 << 15 } else { 0 };
+        for (offset, value) in [(0x2c, 6_719), (0x18, 0x68), (0x20, 1), (0x44, main_output), (0x14, 1), (0x00, 0x81)] {
+            write(&mut part, 0, offset, value);
+        }
+        part
+    }
+
     fn write(part: &mut Single<PwmTimer>, at_ns: u64, offset: u64, value: u64) {
         let written = part.write(VirtualNanos(at_ns), TIM1.base + offset, Width::W32, value);
         assert_eq!(written, Ok(()));
@@ -394,12 +404,7 @@ mod tests {
 
     #[test]
     fn a_duty_is_in_use_from_the_next_period_on_and_nothing_wakes_after_it() {
-        let timer = PwmTimer::new(CLOCK_HZ);
-        let mut part = Single::new(builder(), "TIM1", timer).expect("the part has a TIM1");
-        // Period, PWM mode 1 with preload, output on, main output on; begin.
-        for (offset, value) in [(0x2c, 6_719), (0x18, 0x68), (0x20, 1), (0x44, 1 << 15), (0x14, 1), (0x00, 0x81)] {
-            write(&mut part, 0, offset, value);
-        }
+        let mut part = running(true);
         for (period, ticks) in [(3, 3_360), (10, 1_680), (11, 5_040)] {
             let before = share(&mut part);
             run(&mut part, period * PERIOD_NS + 10_000);
@@ -415,11 +420,7 @@ mod tests {
     /// The sequence with which `board::bridge` turns the outputs on.
     #[test]
     fn a_duty_written_without_preload_is_in_use_at_once_and_begins_no_period() {
-        let timer = PwmTimer::new(CLOCK_HZ);
-        let mut part = Single::new(builder(), "TIM1", timer).expect("the part has a TIM1");
-        for (offset, value) in [(0x2c, 6_719), (0x18, 0x68), (0x20, 1), (0x14, 1), (0x00, 0x81)] {
-            write(&mut part, 0, offset, value);
-        }
+        let mut part = running(false);
         for turn in 1..=10_000 {
             let at_ns = turn * 100_003;
             run(&mut part, at_ns);
@@ -436,7 +437,7 @@ mod tests {
     }
 
     #[test]
-    fn updates_are_at_the_first_whole_instant_behind_their_cycle() {
+    fn updates_are_at_the_first_whole_instant_behind_their_cycle_for_a_day() {
         let mut updates = Updates::default();
         updates.clock(168_000_000, 1_000);
         assert_eq!(updates.next_ns(3).next(), None);
@@ -445,11 +446,7 @@ mod tests {
         assert_eq!(updates.next_ns(3).collect::<Vec<_>>(), [1_137, 1_179, 1_221]);
         updates.pass(2);
         assert_eq!(updates.next_ns(1).collect::<Vec<_>>(), [1_221]);
-    }
-
-    #[test]
-    fn a_day_of_updates_loses_no_cycle() {
-        let mut updates = Updates::default();
+        // A day of updates loses no cycle.
         updates.clock(168_000_000, 0);
         updates.start(0, 1_524);
         let day: u64 = 86_400 * 168_000_000 / 1_524;

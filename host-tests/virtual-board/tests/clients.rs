@@ -8,7 +8,7 @@
 #[allow(dead_code, reason = "the link's tests take more of it")]
 mod bench;
 
-use crate::common::PING;
+use crate::common::{PING, image, named};
 use bench::Bench;
 use serial2::SerialPort;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -80,11 +80,6 @@ fn robotis_and_pollens_clients_drive_the_finger() {
 
 // The board behind a port.
 
-fn named(variable: &str) -> PathBuf {
-    let path = std::env::var_os(variable);
-    path.unwrap_or_else(|| panic!("{variable} must be set: run `cargo xtask test`, which does")).into()
-}
-
 /// A served board, stopped when dropped.
 struct Board {
     child: Child,
@@ -94,7 +89,7 @@ struct Board {
 impl Board {
     fn serve(arguments: &[&str]) -> Self {
         let mut command = Command::new(env!("CARGO_BIN_EXE_virtual-board"));
-        command.arg("serve").arg("--image").arg(named("FINGERTIP_IMAGE")).args(arguments);
+        command.arg("serve").arg("--image").arg(image()).args(arguments);
         let mut child = command.stdout(Stdio::piped()).spawn().expect("the board starts");
         let mut line = String::new();
         let stdout = child.stdout.as_mut().expect("it was asked for");

@@ -17,8 +17,13 @@ pub const WAIT_NS: u64 = 5_000_000;
 pub const PING: [u8; 10] = [0xff, 0xff, 0xfd, 0x00, 0x01, 0x03, 0x00, 0x01, 0x19, 0x4e];
 
 pub fn image() -> PathBuf {
-    let path = std::env::var_os("FINGERTIP_IMAGE");
-    path.expect("FINGERTIP_IMAGE must name the flash image: run `cargo xtask test`, which builds it and sets it").into()
+    named("FINGERTIP_IMAGE")
+}
+
+/// Path that a variable of the environment names.
+pub fn named(variable: &str) -> PathBuf {
+    let path = std::env::var_os(variable);
+    path.unwrap_or_else(|| panic!("{variable} must be set: run `cargo xtask test`, which does")).into()
 }
 
 /// Result of a client on the bus of a board that must answer.
@@ -58,6 +63,12 @@ pub fn let_go(rig: &mut Rig) {
 
 pub fn read_u8(rig: &mut Rig, register: u16) -> u8 {
     on_bus(rig, move |bus| bus.read_u8(1, register).map(|reply| reply.data))
+}
+
+/// Reads a register while frames are kept: the loop then leaves little of the core to the bus.
+pub fn read_u8_beside_a_capture(rig: &mut Rig, register: u16) -> u8 {
+    let answer = rig.client(20_000_000, move |bus| bus.read_u8(1, register).map(|reply| reply.data));
+    answer.expect("the client runs").expect("the image answers")
 }
 
 pub fn read_u16(rig: &mut Rig, register: u16) -> u16 {
@@ -180,6 +191,11 @@ pub fn force_n(rig: &mut Rig) -> f64 {
 
 pub fn travel_mm(rig: &mut Rig) -> f64 {
     rig.world(|world| world.travel_mm()).expect("it runs")
+}
+
+/// Causes of the resets after an instant.
+pub fn causes_since(rig: &mut Rig, from_ns: u64) -> Vec<String> {
+    resets_since(rig, from_ns).into_iter().map(|(cause, _)| cause).collect()
 }
 
 /// Causes and times of the resets after an instant.

@@ -1,9 +1,9 @@
 //! Defects of the microcontroller: what the rig injects is what it says, and what the image makes of it.
 
 use crate::common::{
-    Check, PING, WAIT_NS, away, force_n, frames, hold_again, holding, on_bus, poke, read_u8, read_u16, reboot, refused,
-    register, resets_since, restart, run_checks, running, tare_and_hold, travel_mm, write_and_run_ms, write_goal,
-    write_u8, write_u32,
+    Check, PING, WAIT_NS, away, causes_since, force_n, frames, hold_again, holding, on_bus, poke, read_u8, read_u16,
+    reboot, refused, register, resets_since, restart, run_checks, running, tare_and_hold, travel_mm, write_and_run_ms,
+    write_goal, write_u8, write_u32,
 };
 use fingertip::params::Params;
 use fingertip::shipped::address;
@@ -91,7 +91,7 @@ fn hangs(rig: &mut Rig) {
     rig.inject(Fault::CoreHangs).expect("it runs");
     rig.run_ms(2).expect("it runs");
     let resets = resets_since(rig, hung_ns);
-    assert_eq!(resets.iter().map(|(cause, _)| cause.as_str()).collect::<Vec<_>>(), ["WWDG"]);
+    assert_eq!(causes_since(rig, hung_ns), ["WWDG"]);
     let took_us = (resets[0].1 - hung_ns) / 1_000;
     println!("reset {took_us} us after the hang");
     assert!((100..=1_100).contains(&took_us), "{took_us} us");
@@ -138,7 +138,7 @@ fn a_clock_that_fails_cuts_the_bridge_and_the_board_comes_up_without_torque(rig:
     rig.run_ms(150).expect("it runs");
     let last = *rig.bridge_edges().expect("it runs").last().expect("the bridge was driven");
     assert!(!last.on && last.at_ns <= lost_ns + 20_000, "{last:?} after {lost_ns} ns");
-    assert_eq!(resets_since(rig, lost_ns).iter().map(|(cause, _)| cause.as_str()).collect::<Vec<_>>(), ["software"]);
+    assert_eq!(causes_since(rig, lost_ns), ["software"]);
     assert_eq!(read_u8(rig, address::CRASH_CAUSE), 4);
     // It scans at its rate, answers, and cannot be brought to drive.
     assert_eq!(read_u8(rig, address::FAULT), 17);
@@ -212,8 +212,8 @@ fn a_store_below_ram_or_to_the_image_is_a_hard_fault_there_and_then(rig: &mut Ri
         // The board crashes again at each start, by the store before until now.
         let from_ns = rig.now_ns() + 1_000_000;
         rig.run_ms(30).expect("it runs");
-        let resets = resets_since(rig, from_ns);
-        assert_eq!(resets.first().map(|(cause, _)| cause.as_str()), Some("software"), "{address:#x}");
+        let causes = causes_since(rig, from_ns);
+        assert_eq!(causes.first().map(String::as_str), Some("software"), "{address:#x}");
     }
     // The patch outlives the reset, so the board cannot come up to be asked: its record says where it was.
     let record = rig.image().item("crash", "RECORD").expect("the image has a crash record");

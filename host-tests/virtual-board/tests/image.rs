@@ -2,15 +2,14 @@
 //! The image of `cargo xtask bringup`: what the board can show passes, and all else is told.
 
 use crate::common::{
-    Check, PING, WAIT_NS, away, force_n, image, read_u8, read_u16, read_u32, register, run_checks, running, write_goal,
-    write_param, write_u8, write_u32,
+    Check, PING, WAIT_NS, away, force_n, image, named, read_u8, read_u16, read_u32, register, run_checks, running,
+    write_goal, write_param, write_u8, write_u32,
 };
 use bringup::judge::{Board, Verdict};
 use fingertip::params::Params;
 use fingertip::shipped::{Config, address};
 use sim::plant::Plant;
 use std::collections::HashMap;
-use std::path::PathBuf;
 use std::time::Duration;
 use virtual_board::report::PinEdge;
 use virtual_board::{Fault, Options, Rig, bringup as emulated};
@@ -84,12 +83,9 @@ fn the_bus_tells_how_the_board_is(rig: &mut Rig) {
     let late_ns = read_u16(rig, address::FRAME_LATE_NS);
     println!("a frame's end came {late_ns} ns late");
     assert!((1..5_000).contains(&late_ns), "{late_ns} ns");
-    for count in [address::BANK_MISSING, address::OUT_OF_STEP, address::CONVERTER_OVERRUN, address::OVERWRITTEN] {
-        assert_eq!(read_u16(rig, count), 0);
-    }
-    for count in [address::TRANSFER_BUS_ERRORS, address::TRANSFER_STREAM_ERRORS, address::LINE_FRAMING] {
-        assert_eq!(read_u16(rig, count), 0);
-    }
+    let of_scan = [address::BANK_MISSING, address::OUT_OF_STEP, address::CONVERTER_OVERRUN, address::OVERWRITTEN];
+    let of_bus = [address::TRANSFER_BUS_ERRORS, address::TRANSFER_STREAM_ERRORS, address::LINE_FRAMING];
+    assert!(of_scan.into_iter().chain(of_bus).all(|count| read_u16(rig, count) == 0));
 }
 
 /// A compare value below the counter triggers the converters once too often, if it is set before the timer restarts and
@@ -241,9 +237,7 @@ const NOT_SHOWN: [&str; 10] = [
 
 #[test]
 fn what_the_emulated_board_can_show_passes() {
-    let image: PathBuf = std::env::var_os("FINGERTIP_BRINGUP")
-        .expect("FINGERTIP_BRINGUP must name the image: run `cargo xtask test`, which builds it and sets it")
-        .into();
+    let image = named("FINGERTIP_BRINGUP");
     let told = &mut |said: &str| println!("{said}");
     let options = Options::default();
     let (judgement, mut rig) = emulated::run(&image, &options, 200, &HashMap::new(), told).expect("it reports");

@@ -2,8 +2,8 @@
 //! host's solver.
 
 use crate::common::{
-    away, let_go, on_bus, read_u8, read_u16, read_u32, reboot, refused, restart, running, write_and_run_ms, write_goal,
-    write_param, write_u8, write_u16,
+    away, let_go, on_bus, read_u8, read_u8_beside_a_capture, read_u16, read_u32, reboot, refused, restart, running,
+    write_and_run_ms, write_goal, write_param, write_u8, write_u16,
 };
 use fingertip::capture::Ended;
 use fingertip::measure::{MeasureState, Task};
@@ -87,8 +87,6 @@ const DONE: u8 = 3;
 /// Errors of a status packet.
 const RESULT: u8 = 1;
 const ACCESS: u8 = 7;
-/// Virtual time that an answer may take while frames are kept: the loop then leaves little of the core to the bus.
-const WAIT_NS: u64 = 20_000_000;
 const WINDOW: u16 = 248;
 
 #[test]
@@ -113,8 +111,7 @@ fn press(rig: &mut Rig) {
 fn until_done(rig: &mut Rig) {
     for _ in 0..100 {
         rig.run_ms(5).expect("it runs");
-        let state = rig.client(WAIT_NS, |bus| bus.read_u8(1, address::CAPTURE_STATE).map(|reply| reply.data));
-        if state.expect("the client runs").expect("the image answers") == DONE {
+        if read_u8_beside_a_capture(rig, address::CAPTURE_STATE) == DONE {
             return;
         }
     }

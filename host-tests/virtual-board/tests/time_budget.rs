@@ -1,8 +1,8 @@
 //! A calibrated finger's time: every correction of a real sensor is on, and a capture runs.
 
 use crate::common::{
-    Check, away, force_n, read_u8, read_u16, read_u32, register, run_checks, running, write_and_run_ms, write_goal,
-    write_u8, write_u32,
+    Check, away, force_n, read_u8, read_u8_beside_a_capture, read_u16, read_u32, register, run_checks, running,
+    write_and_run_ms, write_goal, write_u8, write_u32,
 };
 use fingertip::contact::FitLevel;
 use fingertip::params::Params;
@@ -21,8 +21,6 @@ const CORRECTED: Params = Params {
 };
 const RECORDING: u8 = 2;
 const DONE: u8 = 3;
-/// Virtual time that an answer may take while frames are kept.
-const WAIT_NS: u64 = 20_000_000;
 
 #[test]
 fn corrections_and_a_capture_leave_the_fit_level_its_time() {
@@ -36,15 +34,11 @@ fn corrections_and_a_capture_leave_the_fit_level_its_time() {
     write_u8(&mut rig, address::TORQUE_ENABLE, 1);
     write_goal(&mut rig, 1_000);
     rig.run_ms(40).expect("it runs");
-    let read_u8 = |rig: &mut Rig, register| {
-        let answer = rig.client(WAIT_NS, move |bus| bus.read_u8(1, register).map(|reply| reply.data));
-        answer.expect("the client runs").expect("the image answers")
-    };
-    assert_eq!(read_u8(&mut rig, address::PRESENT_MODE), Mode::Force as u8);
-    assert_eq!(read_u8(&mut rig, address::FIT_LEVEL_IN_USE), FitLevel::default() as u8);
-    assert_eq!(read_u8(&mut rig, address::CAPTURE_STATE), RECORDING);
+    let told = [address::PRESENT_MODE, address::FIT_LEVEL_IN_USE, address::CAPTURE_STATE]
+        .map(|register| read_u8_beside_a_capture(&mut rig, register));
+    assert_eq!(told, [Mode::Force as u8, FitLevel::default() as u8, RECORDING]);
     rig.run_ms(400).expect("it runs");
-    assert_eq!(read_u8(&mut rig, address::CAPTURE_STATE), DONE);
+    assert_eq!(read_u8_beside_a_capture(&mut rig, address::CAPTURE_STATE), DONE);
     assert!(!Limits(read_u16(&mut rig, address::LIMITS)).has(Limits::FIT_LEVEL));
     assert_eq!(read_u32(&mut rig, address::MISSED_FRAMES), 0);
     let longest_us = read_u16(&mut rig, address::LOOP_TIME_MAX_US);

@@ -54,7 +54,7 @@ impl Machines {
             motion: SpeedLoop::new(),
             grip: Grip::default(),
             touch: Touch::default(),
-            pictures: Pictures::new(),
+            pictures: Pictures::default(),
             fit: Fit::default(),
             budget: Budget::new(),
             frame: plausible(),
@@ -190,21 +190,12 @@ pub const STEPS: [Step; 20] = [
         let (goal, mut limits) = (Newtons::from_bits(s.words[1]), Limits::default());
         let goal = if s.share_q32 & 3 == 1 { Newtons::ZERO } else { goal };
         let travel = m.motion.observer.travel;
-        m.touch.observe(
-            &TouchInputs {
-                contact: &contact,
-                summed: Newtons::from_bits(s.words[2]),
-                travel,
-                presses: s.share_q32 & 4 == 0,
-            },
-            || Millimetres::ZERO,
-            &m.config,
-        );
+        let (summed, presses) = (Newtons::from_bits(s.words[2]), s.share_q32 & 4 == 0);
+        let inputs = TouchInputs { contact: &contact, summed, travel, presses };
+        m.touch.observe(&inputs, || Millimetres::ZERO, &m.config);
         let Machines { grip, touch, motion, config, .. } = m;
-        add_reference(
-            mix,
-            grip.reference(&Goal { force: goal, drift: s.force }, &contact, touch, motion, config, &mut limits),
-        );
+        let goal = Goal { force: goal, drift: s.force };
+        add_reference(mix, grip.reference(&goal, &contact, touch, motion, config, &mut limits));
         mix.add(m.grip.mode(&m.touch) as u8);
         mix.add(limits.0);
     }),

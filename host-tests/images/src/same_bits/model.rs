@@ -20,12 +20,14 @@ pub struct Pictures {
     used: u32,
 }
 
-impl Pictures {
+impl Default for Pictures {
     /// The first one shows nothing.
-    pub const fn new() -> Self {
+    fn default() -> Self {
         Self { picture: TactileImage::EMPTY, used: PICTURES }
     }
+}
 
+impl Pictures {
     /// Next tactile image: the last one with a small change of a taxel, and sometimes an arbitrary or bad taxel.
     pub fn next(&mut self, sample: &Sample, config: &Config) -> &TactileImage {
         self.used += 1;
@@ -53,12 +55,6 @@ impl Pictures {
         }
         sum_up(&mut self.picture);
         &self.picture
-    }
-}
-
-impl Default for Pictures {
-    fn default() -> Self {
-        Self::new()
     }
 }
 
@@ -264,7 +260,7 @@ mod tests {
     #[test]
     fn many_pictures_are_contacts_that_take_the_fit_and_many_are_not() {
         let config = Config::shipped(&Params::DEFAULT).unwrap();
-        let (mut source, mut sample, mut pictures) = (Source::new(), Sample::new(config.tip), Pictures::new());
+        let (mut source, mut sample, mut pictures) = (Source::new(), Sample::new(config.tip), Pictures::default());
         let (mut good, mut fitted, mut spoilt) = (0, 0, 0);
         for _ in 0..20_000 {
             sample.renew(&mut source);

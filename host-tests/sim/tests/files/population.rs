@@ -11,7 +11,7 @@ use std::fs;
 use std::path::PathBuf;
 
 /// Population of this text, preceded by the keys that every scene needs.
-pub fn population(lines: &str) -> Population {
+fn population(lines: &str) -> Population {
     let text = format!("about = \"a test\"\nduration_s = 0.06\n{lines}");
     population::read("test.toml", &text).unwrap_or_else(|errors| panic!("{errors}"))
 }

@@ -202,11 +202,9 @@ const SCENE: &str = "about = \"a\" # kept\nduration_s = 1.0\n[[script]]\nat_s = 
 
 #[test]
 fn what_is_set_is_read_and_comments_stay() {
+    let changes = [("seed", "9"), ("duration_s", "2"), ("effects.noise.rms_codes", "4"), ("tip.modulus_kpa", "300")];
     let text = set(SCENE, "script.1.goal_n", "3.5").unwrap();
-    let text = set(&text, "seed", "9").unwrap();
-    let text = set(&text, "duration_s", "2").unwrap();
-    let text = set(&text, "effects.noise.rms_codes", "4").unwrap();
-    let text = set(&text, "tip.modulus_kpa", "300").unwrap();
+    let text = changes.into_iter().fold(text, |text, (place, value)| set(&text, place, value).unwrap());
     assert!(text.contains("about = \"a\" # kept\n") && text.contains("at_s = 0 # kept too\n"), "{text}");
     let scene = read_it(&text).unwrap_or_else(|errors| panic!("{errors}"));
     assert_eq!((scene.seed, scene.duration_s, scene.script[1].goal_n), (9, 2.0, 3.5));

@@ -35,7 +35,7 @@ fn every_metric_has_a_name_with_a_unit_and_stands_once() {
 }
 
 #[test]
-fn the_wall_is_measured() {
+fn the_wall_is_measured_and_ablated() {
     let scene = wall();
     let outcome = run(&scene, &native::board, &mut []).unwrap();
     let value = |name: &str| outcome.measured.get(name).unwrap_or_else(|| panic!("no {name}"));
@@ -57,6 +57,15 @@ fn the_wall_is_measured() {
     assert_eq!(exact, [0.0, 0.0, 25.0]);
     assert!(outcome.measured.get("fault_ms").is_none() && outcome.measured.get("slip_noticed_ms").is_none());
     assert!(outcome.passed(), "{}", outcome.text());
+
+    // An ablation shows what an effect changes.
+    let ablated = run::ablate(&scene, &native::board).unwrap();
+    assert_eq!(ablated.iter().map(|without| without.effect).collect::<Vec<_>>(), ["row_sag"]);
+    let rows = run::differences(&outcome.measured, &ablated);
+    assert!(rows.iter().any(|(name, ..)| *name == "force_error_rms_mn"));
+    assert!(rows.iter().all(|(name, ..)| *name != "winding_max_c"));
+    let text = run::ablation_text(&outcome.measured, &ablated);
+    assert!(text.contains("row_sag") && text.contains("force_error_rms_mn"), "{text}");
 }
 
 #[test]
@@ -127,19 +136,6 @@ fn a_bound_breaks_on_either_side_and_without_a_value() {
     assert_eq!(json["bounds"][3]["value"], serde_json::Value::Null);
     assert_eq!(json["ledger"][0]["effect"], "row_sag");
     assert_eq!(json["seed"], 1);
-}
-
-#[test]
-fn an_ablation_shows_what_an_effect_changes() {
-    let scene = wall();
-    let whole = run(&scene, &native::board, &mut []).unwrap();
-    let ablated = run::ablate(&scene, &native::board).unwrap();
-    assert_eq!(ablated.iter().map(|without| without.effect).collect::<Vec<_>>(), ["row_sag"]);
-    let rows = run::differences(&whole.measured, &ablated);
-    assert!(rows.iter().any(|(name, ..)| *name == "force_error_rms_mn"));
-    assert!(rows.iter().all(|(name, ..)| *name != "winding_max_c"));
-    let text = run::ablation_text(&whole.measured, &ablated);
-    assert!(text.contains("row_sag") && text.contains("force_error_rms_mn"), "{text}");
 }
 
 #[test]
@@ -427,8 +423,9 @@ fn what_was_changed_after_the_run_is_named_and_not_the_core() {
 }
 
 #[test]
-fn every_changed_byte_is_found_before_the_replay() {
-    let bytes = fs::read(record("every_byte")).unwrap();
+fn every_changed_byte_and_what_is_no_recording_is_found_before_the_replay() {
+    let path = record("every_byte");
+    let bytes = fs::read(&path).unwrap();
     check(&bytes).unwrap();
     let told = |at: usize, bit: usize| {
         let mut damaged = bytes.clone();
@@ -453,19 +450,13 @@ fn every_changed_byte_is_found_before_the_replay() {
         contains(at, "in its messages, its metadata or the attached scene");
     }
     contains(bytes.len() - 100, "in its summary");
-}
 
-#[test]
-fn damaged_files_are_told() {
-    let path = record("damaged");
-    let bytes = fs::read(&path).unwrap();
+    let half = bytes.len() / 2;
     let mut damaged = bytes.clone();
-    damaged[bytes.len() / 2] ^= 1;
-    fs::write(&path, damaged).unwrap();
-    assert!(replay(&path).unwrap_err().to_string().contains("CRC differs"));
-    fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
-    assert!(replay(&path).is_err());
-    fs::write(&path, "no recording").unwrap();
-    assert!(replay(&path).is_err());
+    damaged[half] ^= 1;
+    for (left, why) in [(&damaged[..], "CRC differs"), (&bytes[..half], ""), (b"no recording", "")] {
+        fs::write(&path, left).unwrap();
+        assert!(replay(&path).unwrap_err().to_string().contains(why));
+    }
     assert!(replay(&path.with_extension("nowhere")).unwrap_err().to_string().contains("cannot read"));
 }

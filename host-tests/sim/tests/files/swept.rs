@@ -29,19 +29,14 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     fs::read_dir(folder).unwrap().map(|entry| file(entry.unwrap().path())).collect()
 }
 
-fn whole(name: &str) -> (PathBuf, Table) {
-    let out = folder(&format!("swept/{name}"));
-    let (table, told) = sweep(&plan(&out, Shard::WHOLE), &native::board).unwrap();
-    assert_eq!(told, out);
-    (out, table)
-}
-
 #[test]
 fn shards_merged_are_the_whole_byte_for_byte() {
-    let (whole, table) = whole("whole");
+    let whole = folder("swept/whole");
+    let (table, told) = sweep(&plan(&whole, Shard::WHOLE), &native::board).unwrap();
+    assert_eq!(told, whole);
+    runs_are_numbered_point_by_point_and_seed_by_seed(&table);
     let expected = files(&whole);
     assert_eq!(expected.keys().collect::<Vec<_>>(), ["peak_force_n.svg", "runs.csv", "summary.csv"]);
-    assert_eq!(table.rows.len(), 12);
     assert!(
         table.text().contains("tip.modulus_kpa = 240.0, tip.radius_mm = 9.5")
             || table.text().contains("tip.modulus_kpa = 240, ")
@@ -67,9 +62,7 @@ fn shards_merged_are_the_whole_byte_for_byte() {
     assert!(refused(&[whole.join("summary.csv")]).contains("is no shard"));
 }
 
-#[test]
-fn runs_are_numbered_point_by_point_and_seed_by_seed() {
-    let (_, table) = whole("order");
+fn runs_are_numbered_point_by_point_and_seed_by_seed(table: &Table) {
     let column = |name: &str| table.head.iter().position(|known| known == name).unwrap();
     let number = |row: &Vec<String>, name: &str| row[column(name)].parse::<f64>().unwrap();
     let shown = ["run", "tip.modulus_kpa", "tip.radius_mm", "seed"];
@@ -102,12 +95,6 @@ fn sweep_command(out: &Path, more: &[&str]) -> Command {
     let mut command = Command::new(SWEEP);
     command.args([WALL, "--seeds", "4", "--set", "duration_s=0.02", "--set", "object.distance_mm=0.2"]);
     command.args(["--set", "effects.noise.rms_codes=1.5", "--out"]).arg(out).args(more);
-    command
-}
-
-fn merge_command(file: &Path) -> Command {
-    let mut command = Command::new(SWEEP);
-    command.arg("merge").arg(file).arg("--out").arg(file.with_extension("merged"));
     command
 }
 
@@ -235,10 +222,12 @@ fn shards_that_are_none_are_told() {
         ("\u{0}\n".into(), "no shard of a sweep"),
     ] {
         fs::write(&file, text).unwrap();
+        let mut merge = Command::new(SWEEP);
+        merge.arg("merge").arg(&file).arg("--out").arg(file.with_extension("merged"));
         if what.is_empty() {
-            assert_eq!(told(&mut merge_command(&file)).0, Some(1));
+            assert_eq!(told(&mut merge).0, Some(1));
         } else {
-            refused(&mut merge_command(&file), what);
+            refused(&mut merge, what);
         }
     }
 }

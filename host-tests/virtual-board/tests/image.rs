@@ -85,7 +85,9 @@ fn the_bus_tells_how_the_board_is(rig: &mut Rig) {
     assert!((1..5_000).contains(&late_ns), "{late_ns} ns");
     let of_scan = [address::BANK_MISSING, address::OUT_OF_STEP, address::CONVERTER_OVERRUN, address::OVERWRITTEN];
     let of_bus = [address::TRANSFER_BUS_ERRORS, address::TRANSFER_STREAM_ERRORS, address::LINE_FRAMING];
-    assert!(of_scan.into_iter().chain(of_bus).all(|count| read_u16(rig, count) == 0));
+    for count in of_scan.into_iter().chain(of_bus) {
+        assert_eq!(read_u16(rig, count), 0, "register {count}");
+    }
 }
 
 /// A compare value below the counter triggers the converters once too often, if it is set before the timer restarts and

@@ -136,7 +136,6 @@ pub fn markdown() -> String {
             let settling_us = column(feedback_pf, input_pf, noise_gain).settling_s() * 1e6;
             format!("{settling_us:.1} us")
         });
-        // A string takes every write.
         let _ = writeln!(page, "| {input_pf} pF | {} |", times.join(" | "));
     }
     let slower = Amplifier { gain_bandwidth_hz: 80e6, ..OPA4354 };

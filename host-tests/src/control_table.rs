@@ -349,15 +349,12 @@ mod tests {
         for direct in [false, true] {
             let text = text(direct);
             let (units, table) = text.split_once("\n\n").expect("two sections");
-            let mut units = units.lines();
+            let [mut units, mut table] = [units, table].map(str::lines);
             assert_eq!(units.next(), Some("[unit info]"));
             assert!(units.all(|line| line.split('\t').count() == 5));
-            let mut table = table.lines();
-            assert_eq!(table.next(), Some("[control table]"));
-            assert_eq!(table.next(), Some("Address\tSize\tData Name"));
+            assert_eq!([table.next(), table.next()], [Some("[control table]"), Some("Address\tSize\tData Name")]);
             for line in table {
-                let fields: Vec<&str> = line.split('\t').collect();
-                let [address, bytes, name] = fields[..] else { panic!("{line}") };
+                let [address, bytes, name] = line.split('\t').collect::<Vec<_>>()[..] else { panic!("{line}") };
                 assert!(address.parse::<u16>().is_ok() && bytes.parse::<u8>().is_ok() && !name.is_empty(), "{line}");
             }
             assert!(

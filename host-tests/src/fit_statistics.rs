@@ -233,7 +233,6 @@ fn errors(page: &mut String, good: &[(&Series, Judged)]) {
             };
             let (force, centre) = (half(|outcome| outcome.force), half(|outcome| outcome.centre));
             let alarms = flagged(judged, way);
-            // Writing to a string cannot fail.
             let _ = writeln!(page, "| {} | {name} | {force} | {centre} | {alarms} |", series.name);
         }
     }

@@ -49,12 +49,10 @@ fn bench(params: &Params) -> Bench {
     board
 }
 
-/// Torque off, a linear characteristic again, the object gone for the given time, then a press.
-fn after_a_curve(touching: bool, off_s: f64, goal_mn: i32) -> f64 {
+/// Torque off while the tip touches, a linear characteristic again, the object gone for the given time, then a press.
+fn after_a_curve(off_s: f64, goal_mn: i32) -> f64 {
     let mut board = bench(&Params { curve_permille: 500, ..Params::DEFAULT });
-    if touching {
-        board.hold(1_000, 0.5);
-    }
+    board.hold(1_000, 0.5);
     board.command().torque = false;
     board.hold(0, 0.01);
     board.pipeline().configure(&config());
@@ -70,7 +68,7 @@ fn after_a_curve(touching: bool, off_s: f64, goal_mn: i32) -> f64 {
 #[test]
 fn a_characteristic_that_is_none_any_more_leaves_nothing() {
     for (off_s, goal_mn) in [(0.1, 1_000), (0.3, 1_000), (0.5, 1_000), (0.6, 7_000), (2.0, 1_000)] {
-        let largest = after_a_curve(true, off_s, goal_mn);
+        let largest = after_a_curve(off_s, goal_mn);
         assert!(largest <= 1.02e-3 * f64::from(goal_mn), "off for {off_s} s, goal {goal_mn} mN: {largest:.3} N");
     }
     // No contact, only noise of +-3 codes, which is added up frame by frame.

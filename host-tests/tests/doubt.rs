@@ -24,12 +24,10 @@ fn ramp(value: f64, from: f64, to: f64) -> f64 {
     255.0 * ((value - from) / (to - from)).clamp(0.0, 1.0)
 }
 
-/// Resolution to which the core rounds the lengths of a hidden share.
-const UNIT_MM: f64 = 1.0 / 64.0;
-
 /// The least and the largest share of a contact's force that bad taxels hide, where the pressure is a parabola over the
 /// contact's radius, and every length may be off by the core's resolution.
 fn hidden_shares(contact: &Contact, bad: &[u32; ROWS]) -> [f64; 2] {
+    const UNIT_MM: f64 = 1.0 / 64.0;
     let place = |index: usize| (index as f64 - 4.5) * PITCH_MM;
     let share = |farther_mm: f64, radius_mm: f64| {
         let square = radius_mm.powi(2);
@@ -50,12 +48,6 @@ fn hidden_shares(contact: &Contact, bad: &[u32; ROWS]) -> [f64; 2] {
 /// Uncertainty of the sums, by a fit level without the model.
 fn doubt_of_sums(picture: &TactileImage) -> u8 {
     Fit::new(FitLevel::Moments).read(picture, &config()).doubt
-}
-
-/// Hidden share of the force for an uncertainty of the sums between 1 and 254.
-fn share_of(doubt: u8) -> f64 {
-    assert!((1..255).contains(&doubt), "a doubt of {doubt} has no share");
-    (1.0 + 3.0 * f64::from(doubt) / 255.0) / 8.0
 }
 
 /// None while the sums' rim is within half a pitch beyond the edge, all from a pitch and a half on; none while bad
@@ -117,9 +109,10 @@ fn the_share_that_one_bad_taxel_hides_of_a_light_contact_is_right() {
         let doubt = doubt_of_sums(&plane(scene.d_mm, [x_mm, y_mm], 0.0, bad, &mut rng));
         match doubt {
             0 => assert!(0.75 * right < 33.0 / 256.0, "{right} by the model is not doubted: {scene:?}"),
+            255 => panic!("all is doubted: {scene:?}"),
             _ => {
                 // In steps of 1/256, rounded down.
-                let share = share_of(doubt);
+                let share = (1.0 + 3.0 * f64::from(doubt) / 255.0) / 8.0;
                 let allowed = 0.75 * right - 1.0 / 256.0..1.1 * right / (1.0 - right).sqrt();
                 assert!(allowed.contains(&share), "{share}, {right} by the model: {scene:?}");
             }

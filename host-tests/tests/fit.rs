@@ -87,25 +87,6 @@ fn what_no_contact_makes_is_flagged() {
     }
 }
 
-#[test]
-fn frames_between_the_extremes_leave_nothing_behind() {
-    let config = config();
-    let full = picture(&[[FULL; COLUMNS]; ROWS], NONE);
-    let mut fit = Fit::default();
-    for _ in 0..100 {
-        let contact = fit.read(&full, &config);
-        assert_eq!(contact.force, from_sums(&full, &config).force, "the first frame of a contact is its sum");
-        assert_eq!(fit.read(&TactileImage::EMPTY, &config), Contact { confidence: 255, ..Contact::default() });
-    }
-    // A real contact after them is read as if they had not occurred.
-    let scene = plane(1.5, 2.0, 6.0, 0.0);
-    let (picture, _) = still(&scene, NONE);
-    let mut fresh = Fit::default();
-    for _ in 0..FRAMES {
-        assert_eq!(fit.read(&picture, &config), fresh.read(&picture, &config));
-    }
-}
-
 /// Centred on a corner, half a radius beyond the edge, and over ten dead taxels in the middle.
 #[test]
 fn a_contact_of_which_much_is_hidden_is_found() {
@@ -318,11 +299,6 @@ fn image(scene: &Scene) -> TactileImage {
     still(scene, [0; ROWS]).0
 }
 
-/// Number of the frame in which a refinement first gives a result, from 1.
-fn first_refined(fit: &mut Fit, picture: &TactileImage, config: &Config) -> usize {
-    (1..100).find(|_| fit.read(picture, config).confidence < 255).expect("a refinement")
-}
-
 #[test]
 fn efforts_are_counted_without_a_gap() {
     for (number, fit_level) in FitLevel::ALL.into_iter().enumerate() {
@@ -342,7 +318,8 @@ fn a_refinement_ends_in_its_frame_and_another_effort_begins_anew() {
             read_often(&mut fit, &picture, before, &config);
             fit.set_fit_level(fit_level);
             let expected = if fit_level == FitLevel::OneRow { 11 - before } else { frames };
-            assert_eq!(first_refined(&mut fit, &picture, &config), expected, "{fit_level:?} after {before} frames");
+            let refined = (1..100).find(|_| fit.read(&picture, &config).confidence < 255);
+            assert_eq!(refined, Some(expected), "{fit_level:?} after {before} frames");
         }
     }
 }
@@ -351,6 +328,7 @@ fn a_refinement_ends_in_its_frame_and_another_effort_begins_anew() {
 fn what_was_found_is_kept_by_another_effort_and_goes_with_the_contact() {
     let (config, picture) = (config(), image(&cut_off(1.5)));
     let sums = from_sums(&picture, &config);
+    let full = self::picture(&[[FULL; COLUMNS]; ROWS], NONE);
     let mut fit = Fit::new(FitLevel::AllRows);
     let found = read_often(&mut fit, &picture, 21, &config);
     assert!(found.force > sums.force);
@@ -358,10 +336,19 @@ fn what_was_found_is_kept_by_another_effort_and_goes_with_the_contact() {
     for _ in 0..10 {
         assert_eq!(fit.read(&picture, &config).force, found.force);
     }
-    fit.read(&TactileImage::EMPTY, &config);
-    for _ in 0..10 {
-        let contact = fit.read(&picture, &config);
-        assert_eq!((contact.force, contact.confidence), (sums.force, 255));
+    // Also the largest contact, from one frame to the next: nothing of it is left either.
+    for gone in [&picture, &full, &full] {
+        assert_eq!(fit.read(&TactileImage::EMPTY, &config), Contact { confidence: 255, ..Contact::default() });
+        let mut fresh = Fit::new(FitLevel::OneRow);
+        assert_eq!(
+            fit.read(gone, &config).force,
+            from_sums(gone, &config).force,
+            "the first frame of a contact is its sum"
+        );
+        fresh.read(gone, &config);
+        for _ in 0..FRAMES {
+            assert_eq!(fit.read(gone, &config), fresh.read(gone, &config));
+        }
     }
 }
 

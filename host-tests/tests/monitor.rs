@@ -40,7 +40,8 @@ impl Shown {
 
     /// The object pushes the tip back with so much more.
     fn loaded(mut self, mn: i32) -> Self {
-        self.motion.observer.disturbance = MillimetresPerSecond2::from_bits(-load(mn));
+        let load = i64::from(config().bounds.acceleration_per_n) * i64::from(mn) / 1_000;
+        self.motion.observer.disturbance = MillimetresPerSecond2::from_bits(-load as i32);
         self
     }
 }
@@ -94,11 +95,6 @@ fn a_supply_outside_its_window_for_five_frames_stops() {
         let faults = [(); 6].map(|()| watched(&mut monitor, outside));
         assert_eq!(faults, [None, None, None, None, Some(fault), Some(fault)]);
     }
-}
-
-/// The motor's load that a force of this many thousandths of a newton is.
-fn load(mn: i32) -> i32 {
-    (i64::from(config().bounds.acceleration_per_n) * i64::from(mn) / 1_000) as i32
 }
 
 /// Moves the tip forward under a constant image and a load that grows per 0.1 mm. Returns the travel at its stop.

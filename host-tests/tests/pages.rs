@@ -133,7 +133,9 @@ impl Programs {
             if let Some(flag) = word.strip_prefix("--").filter(|flag| !flag.is_empty()) {
                 let flag = flag.split('=').next().unwrap_or_default();
                 let (all, flag) = ([flags.as_str(), help.as_str()].concat(), format!("--{flag}"));
-                let mut uses = all.split(&flag).skip(1).filter(|after| !after.starts_with(in_a_word)).peekable();
+                // Not where a letter continues the name of a longer flag.
+                let ends = |after: &&str| !after.starts_with(|letter: char| letter.is_alphanumeric() || letter == '-');
+                let mut uses = all.split(&flag).skip(1).filter(ends).peekable();
                 if uses.peek().is_none() {
                     return Some(format!("{} has no flag {flag}", path.join(" ")));
                 }
@@ -168,11 +170,6 @@ impl Programs {
         }
         None
     }
-}
-
-/// True if a letter continues the name of a flag.
-fn in_a_word(letter: char) -> bool {
-    letter.is_alphanumeric() || letter == '-'
 }
 
 fn lists(help: &str, name: &str) -> bool {
@@ -304,7 +301,7 @@ fn the_schematic_is_that_of_the_netlist() {
 // The paper's figures are those of the model.
 
 #[test]
-fn what_the_array_sees_sums_to_the_force() {
+fn what_the_array_sees_sums_to_the_force_and_its_readings_give_the_modulus_back() {
     let tip = tip();
     for d_mm in [1, 2, 3] {
         let d = Millimetres::from_bits(d_mm << 24);
@@ -316,11 +313,6 @@ fn what_the_array_sees_sums_to_the_force() {
         let peak: f64 = tip.peak_pressure(d).0.to_num();
         assert!((0.93..0.99).contains(&(seen[5][5] / peak)), "{d_mm} mm: {} kPa", seen[5][5]);
     }
-}
-
-#[test]
-fn the_readings_scatter_and_give_the_modulus_back() {
-    let tip = tip();
     let readings = readings(&tip);
     let off = |(d, force): &(Millimetres, Newtons)| force.0.to_num::<f64>() / tip.force(*d).0.to_num::<f64>() - 1.0;
     let worst = readings.iter().map(|reading| off(reading).abs()).fold(0.0, f64::max);

@@ -44,11 +44,6 @@ fn garbage_is_a_fault_with_the_defaults_and_the_next_save_ends_it() {
     }
 }
 
-/// Number of bytes of a record without the padding.
-fn whole() -> usize {
-    12 + 8 * names().len() + 4
-}
-
 #[test]
 fn the_bytes_are_the_documented_ones() {
     let bytes = encode(&record(9), 0x1234_5678);
@@ -63,7 +58,8 @@ fn every_flipped_bit_of_the_newest_is_seen_and_the_one_before_counts() {
     for sector in [Sector::A, Sector::B] {
         let mut both = [encode(&record(1), 1), encode(&record(2), 2)].concat();
         assert_eq!(start_in(sector, &both).0, Loaded { record: record(2), sound: true });
-        for place in SLOT_BYTES..SLOT_BYTES + whole() {
+        // Without the padding.
+        for place in SLOT_BYTES..SLOT_BYTES + 12 + 8 * names().len() + 4 {
             for bit in 0..8 {
                 both[place] ^= 1 << bit;
                 let (loaded, remarks) = start_in(sector, &both);

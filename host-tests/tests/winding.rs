@@ -297,26 +297,23 @@ fn the_zero_s_temperature_moves_as_the_baseline_does() {
     }
 }
 
+/// Steps with the microcontroller at a temperature. Returns the last status.
+fn run(board: &mut Bench, frames: u32, degrees: i32) -> Status {
+    (0..frames).map(|_| board.step_with(|record| record.sense.chip = celsius(degrees))).last().unwrap()
+}
+
 /// Contact lost for a frame, after the array has cooled since its tare: the baseline has learnt almost nothing.
 #[test]
 fn a_frame_without_contact_does_not_forget_the_drift() {
     let mut board: Bench = Bench::of(&Setup::default(), &config(0, 10));
     *board.command() = Command { tare_request: 1, ..Command::default() };
-    (0..TARE_FRAMES + 2).for_each(|_| _ = board.step_with(|record| record.sense.chip = celsius(45)));
+    run(&mut board, TARE_FRAMES + 2, 45);
     let quiet = *board.frame();
     (board.command().torque, board.command().goal) = (true, newtons(1_000));
-    let mut cool = |frames: u32, lost: bool| {
-        let step = |record: &mut Record| {
-            record.sense.chip = celsius(25);
-            if lost {
-                record.frame.codes = quiet.codes;
-            }
-        };
-        (0..frames).map(|_| board.step_with(step)).last().unwrap()
-    };
-    let held = cool(30_000, false);
+    let held = run(&mut board, 30_000, 25);
     assert_eq!(held.mode, Mode::Force);
-    let after = cool(40, true);
+    let lost = |record: &mut Record| (record.sense.chip, record.frame.codes) = (celsius(25), quiet.codes);
+    let after = (0..40).map(|_| board.step_with(lost)).last().unwrap();
     assert_ne!(after.mode, Mode::Force);
     let [before, after]: [f64; 2] = [held, after].map(|status| status.drift.0.to_num());
     assert!((before + 0.045).abs() < 6e-3 && (after - before).abs() < 0.02 * 0.045, "{before} {after}");
@@ -325,14 +322,10 @@ fn a_frame_without_contact_does_not_forget_the_drift() {
 #[test]
 fn the_reading_exceeds_the_goal_by_its_drift() {
     let mut board: Bench = Bench::of(&Setup::default(), &config(3_600, 10));
-    let mut run = |command: Command, frames: u32| {
-        *board.command() = command;
-        (0..frames).map(|_| board.step_with(|record| record.sense.chip = celsius(45))).last().unwrap()
-    };
-    let tare = Command { tare_request: 1, ..Command::default() };
-    run(tare, TARE_FRAMES + 2);
-    let hold = Command { torque: true, goal: newtons(3_000), ..tare };
-    let held = run(hold, 30_000);
+    *board.command() = Command { tare_request: 1, ..Command::default() };
+    run(&mut board, TARE_FRAMES + 2, 45);
+    (board.command().torque, board.command().goal) = (true, newtons(3_000));
+    let held = run(&mut board, 30_000, 45);
     assert_eq!(held.mode, Mode::Force);
     let [reading, drift]: [f64; 2] = [held.contact.force, held.drift].map(|force| force.0.to_num());
     assert!((drift - 0.216).abs() < 2e-3 && (reading - 3.216).abs() < 0.01, "{reading} {drift}");

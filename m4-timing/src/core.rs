@@ -78,13 +78,6 @@ pub struct Touched {
     pub bytes: u32,
 }
 
-impl Executed {
-    /// An instruction at an address, with its condition holding.
-    pub const fn new(instruction: Instruction, address: u32) -> Self {
-        Self { instruction, address, skipped: false, quotient_bits: 0, touched: None }
-    }
-}
-
 /// Address at which execution continued.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Next {

@@ -49,8 +49,9 @@ pub fn decode(bytes: &[u8]) -> Result<Instruction, Unknown> {
 /// `h`; `c` is a number of words.
 type Row = (&'static str, Instruction);
 
+/// An instruction that touches no register.
 const fn of(kind: Kind) -> Instruction {
-    Instruction::new(kind, false)
+    Instruction { kind, wide: false, writes: 0, address: 0, float_reads: 0, float_writes: 0 }
 }
 
 const ALU: Instruction = of(Kind::Alu);

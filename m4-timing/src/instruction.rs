@@ -98,11 +98,6 @@ pub enum Kind {
 }
 
 impl Instruction {
-    /// An instruction that touches no register.
-    pub const fn new(kind: Kind, wide: bool) -> Self {
-        Self { kind, wide, writes: 0, address: 0, float_reads: 0, float_writes: 0 }
-    }
-
     /// The same, writing these core registers.
     #[must_use]
     pub const fn writing(self, writes: CoreSet) -> Self {

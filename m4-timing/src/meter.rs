@@ -172,7 +172,9 @@ impl Pass {
     }
 
     fn start(&mut self, instruction: &Instruction, address: u32, registers: &mut impl Registers) {
-        let executed = self.last.insert(Executed::new(*instruction, address));
+        let instruction = *instruction;
+        let executed =
+            self.last.insert(Executed { instruction, address, skipped: false, quotient_bits: 0, touched: None });
         if let Some(condition) = self.block.advance() {
             executed.skipped = !holds(condition, registers.xpsr());
         }

@@ -83,7 +83,17 @@ fn report(runs: [&Path; 2], whole: &Path, check: bool, json: Option<&Path>, out:
     if let Some(folder) = out {
         return write_all(folder, &files);
     }
-    renew_all(&files, check)
+    let mut stale = Vec::new();
+    for (name, text) in &files {
+        if !renew(name, text, check)? {
+            stale.push(name.as_str());
+        }
+    }
+    if stale.is_empty() {
+        Ok(())
+    } else {
+        Err(format!("stale: {}; renew them with `cargo xtask study`", stale.join(", ")))
+    }
 }
 
 fn verdicts(studied: &[Studied]) {
@@ -124,18 +134,4 @@ fn write_all(folder: &Path, files: &[(String, String)]) -> Result<(), String> {
         println!("written  {}", file.display());
     }
     Ok(())
-}
-
-fn renew_all(files: &[(String, String)], check: bool) -> Result<(), String> {
-    let mut stale = Vec::new();
-    for (name, text) in files {
-        if !renew(name, text, check)? {
-            stale.push(name.as_str());
-        }
-    }
-    if stale.is_empty() {
-        Ok(())
-    } else {
-        Err(format!("stale: {}; renew them with `cargo xtask study`", stale.join(", ")))
-    }
 }

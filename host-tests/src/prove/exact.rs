@@ -5,7 +5,7 @@
 //! integers over 2^100. Pass and fail are decided without any rounding; only the size of the error that is printed is a
 //! float.
 
-use super::random::{at, boundary_distances, in_reach, mm, newtons};
+use super::random::{at, boundary_distances, mm, newtons};
 use super::tally::{Judged, Tally, parallel};
 use ethnum::I256;
 use fingertip::model::Tip;
@@ -114,16 +114,12 @@ pub fn indentation(tip: &Tip, force: i32, result: i32, bound: u32) -> Judged {
     }
 }
 
-/// True if the exact indentation at a force is at most the deepest.
-pub fn force_in_reach(tip: &Tip, force: i32) -> bool {
+/// True if a force is at most that of the deepest indentation, judged exactly: its rounded value may be half a unit
+/// more.
+pub fn in_reach(tip: &Tip, force: i32) -> bool {
     let depth = wide(tip.depth_max().to_bits());
-    I256::from(wide(force) * 1000) << 148 <= pi_times(modulus(tip) * depth * depth)[0]
-}
-
-/// True if the exact indentation at a contact radius is at most the deepest.
-pub fn radius_in_reach(tip: &Tip, contact_radius: i32) -> bool {
-    let depth = wide(tip.depth_max().to_bits());
-    wide(contact_radius) * wide(contact_radius) <= depth * (radius(tip) * 2 - depth)
+    force < tip.force_max().to_bits()
+        || I256::from(wide(force) * 1000) << 148 <= pi_times(modulus(tip) * depth * depth)[0]
 }
 
 /// `r_c = sqrt(d (2a - d))`.
@@ -205,8 +201,10 @@ pub fn depths(tip: &Tip, range: Range<u64>, progress: Progress<'_>) -> [Tally; 7
         Tally::new("F(d + 1 ulp) - F(d)", 1.0),
         Tally::new("d(F(d)) - d", round_trip_max),
     ];
-    // Four times half a unit of force as a squared length, in Q48, rounded up: what F(d) may have lost.
-    let four_lost = round_trip_slack(tip);
+    // Four times half a unit of force as a squared length, in Q48, rounded up: what F(d) may have lost. A unit is d^2 =
+    // 2^-16 N / (pi Y); by the exact indentation at one unit, rounded up.
+    let first = i128::from(tip.indentation(newtons(1)).to_bits()) + 1;
+    let four_lost = 2 * first * first;
     parallel(range, CHUNK, tallies, progress, |range, [force, radius, stiffness, peak, mean, step, back]| {
         let results = |d: i32| (tip.force(mm(d)), tip.stiffness(mm(d)));
         let mut next = results(range.start as i32);
@@ -258,8 +256,11 @@ pub fn forces(tip: &Tip, range: Range<u64>, progress: Progress<'_>) -> [Tally; 3
 
 /// Every contact radius up to that of the deepest indentation.
 pub fn radii(tip: &Tip, range: Range<u64>, progress: Progress<'_>) -> [Tally; 1] {
+    let depth = wide(tip.depth_max().to_bits());
+    let square = depth * (radius(tip) * 2 - depth);
     parallel(range, CHUNK, [Tally::new("d(r_c)", 0.5)], progress, |range, [indentation]| {
-        for radius in range.map(|radius| radius as i32).filter(|&radius| radius_in_reach(tip, radius)) {
+        let in_reach = |radius: &i32| wide(*radius) * wide(*radius) <= square;
+        for radius in range.map(|radius| radius as i32).filter(in_reach) {
             let d = tip.indentation_from_radius(mm(radius)).to_bits();
             indentation.add(indentation_from_radius(tip, radius, d, 1), at(tip, radius, 0));
         }
@@ -303,12 +304,6 @@ pub fn pressures(tip: &Tip, depths: u64, distances: u64, progress: Progress<'_>)
             }
         }
     })
-}
-
-fn round_trip_slack(tip: &Tip) -> i128 {
-    // 1 ulp of F is d^2 = 2^-16 N / (pi Y); by the exact indentation at one unit, rounded up.
-    let first = i128::from(tip.indentation(newtons(1)).to_bits()) + 1;
-    2 * first * first
 }
 
 /// `|d' - d|` is at most what half a unit of force is worth at `d`, and half a unit of depth.

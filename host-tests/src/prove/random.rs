@@ -1,7 +1,6 @@
 //! Boundaries and random points of the whole domain, judged in arbitrary precision and by integers.
 
-use super::exact;
-use super::exact::Progress;
+use super::exact::{self, Progress, in_reach};
 use super::reference::{Reference, error_ulp, real};
 use super::tally::{Judged, Tally, parallel};
 use fastrand::Rng;
@@ -154,12 +153,6 @@ pub fn boundary_distances(tip: &Tip, d: i32) -> Vec<i32> {
     let rim = tip.contact_radius(Millimetres::from_bits(d)).to_bits();
     let radius = tip.radius().to_bits();
     around(0, i32::MAX, &[rim - 2, rim - 1, rim, rim + 1, rim / 2, radius - 1, radius, radius + 1])
-}
-
-/// True if a force is at most that of the deepest indentation, judged exactly: its rounded value may be half a unit
-/// more.
-pub fn in_reach(tip: &Tip, force: i32) -> bool {
-    force < tip.force_max().to_bits() || super::exact::force_in_reach(tip, force)
 }
 
 /// Random point of the domain.

@@ -121,7 +121,6 @@ pub const PAGE: Page = Page { name: "docs/model.md", tables: "bounds", command: 
 pub fn markdown(sections: &[(String, Vec<Tally>)]) -> String {
     let mut text = String::from("| function | inputs | worst, ulp | claimed |\n| --- | --- | --- | --- |\n");
     for (title, tallies) in sections {
-        // A write to a string does not fail.
         let _ = writeln!(text, "| **{title}** | | | |");
         for tally in tallies {
             let rounded = if tally.nearest == tally.inputs { "*" } else { "" };

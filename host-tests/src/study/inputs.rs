@@ -148,13 +148,7 @@ impl Default for Inputs {
 impl Inputs {
     /// As the image reads them.
     pub fn to_bytes(&self) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        for section in [&self.root, &self.force, &self.indentation, &self.pressure, &self.rings] {
-            bytes.extend(pairs_to_bytes(section));
-        }
-        bytes.extend(self.frames.to_bytes());
-        self.fits.iter().for_each(|seen| bytes.extend(seen_to_bytes(seen.iter(), FRAMES)));
-        bytes.extend(pairs_to_bytes(&self.control));
+        let mut bytes = self.every([1; 4], FRAMES);
         bytes.extend((self.records.len() as u32).to_le_bytes());
         bytes.extend(self.records.iter().flat_map(Record::to_bytes));
         bytes
@@ -162,20 +156,24 @@ impl Inputs {
 
     /// Inputs that the image of `cargo xtask bringup` keeps: a few of all but the records, which it makes itself.
     pub fn few_to_bytes(&self) -> Vec<u8> {
-        // Every n-th of the numbers, frames and contacts, and so many pictures of a contact.
-        let [number, frame, contact, pictures] = [32, 16, 16, 12];
-        let few = |pairs: &[Pair], each| pairs_to_bytes(&pairs.iter().copied().step_by(each).collect::<Vec<_>>());
+        self.every([32, 8, 16, 16], 12)
+    }
+
+    /// Every n-th of the numbers, of the indentations of the rings, of the frames and of the contacts, with so many pictures
+    /// of a contact.
+    fn every(&self, [number, ring, frame, contact]: [usize; 4], pictures: usize) -> Vec<u8> {
+        let some = |pairs: &[Pair], each| pairs_to_bytes(&pairs.iter().copied().step_by(each).collect::<Vec<_>>());
         let mut bytes = Vec::new();
         for section in [&self.root, &self.force, &self.indentation, &self.pressure] {
-            bytes.extend(few(section, number));
+            bytes.extend(some(section, number));
         }
-        bytes.extend(few(&self.rings, number / 4));
+        bytes.extend(some(&self.rings, ring));
         let contacts = self.frames.contacts.iter().copied().step_by(frame).collect();
         bytes.extend(Frames { contacts, ..self.frames }.to_bytes());
         for seen in &self.fits {
             bytes.extend(seen_to_bytes(seen.iter().step_by(contact), pictures));
         }
-        bytes.extend(few(&self.control, number));
+        bytes.extend(some(&self.control, number));
         bytes
     }
 

@@ -32,7 +32,6 @@ fn section(page: &mut String, kernel: &Kernel, points: &[Point]) {
     if !kernel.has_error() {
         return costs(page, kernel, points);
     }
-    // A string takes every write.
     let _ = write!(page, "\n## {title}\n\n{text}\n\n![{title}: {error} over cycles](pictures/study-{name}.svg)\n\n");
     let (more, rule) =
         other.map_or((String::new(), ""), |other| (format!(" rms | {other}, max | rms |"), " --- | --- | --- |"));

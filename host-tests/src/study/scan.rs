@@ -62,11 +62,6 @@ impl Row {
             noise_codes: NOISE_CODES / f64::from(frames).sqrt(),
         })
     }
-
-    /// The largest error of a taxel beside a saturated one: crosstalk of a full range, and noise.
-    fn error_codes(&self) -> f64 {
-        Array::CODES * (self.row + self.column) + self.noise_codes
-    }
 }
 
 pub fn markdown() -> String {
@@ -82,14 +77,15 @@ pub fn markdown() -> String {
     );
     for row in &rows {
         let (settle_ns, sample_cycles, frames) = row.setting;
+        // Crosstalk of a full range, and noise.
+        let error_codes = Array::CODES * (row.row + row.column) + row.noise_codes;
         let bold = if row.setting == DEFAULT { "**" } else { "" };
-        // A string takes every write.
         let _ = writeln!(
             page,
             "| {bold}{}{bold} | {bold}{sample_cycles}{bold} | {frames} | {:.0} | {} | {} |",
             f64::from(settle_ns) * 1e-3,
             row.rate_hz,
-            figure(row.error_codes()),
+            figure(error_codes),
             figure(row.noise_codes * MN_PER_CODE * (TAXELS as f64).sqrt()),
         );
     }

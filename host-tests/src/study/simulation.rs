@@ -39,7 +39,6 @@ pub fn markdown() -> String {
             lines.push((format!("{name}, {step_us} us"), taken_s));
             figure(largest(&forces, &exact))
         });
-        // A string takes every write.
         let _ = writeln!(page, "| {bold}{step_us}{bold} | {} |", errors.join(" | "));
     }
     for (name, taken_s) in lines {

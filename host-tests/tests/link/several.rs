@@ -29,17 +29,20 @@ fn talk(devices: &mut [Bench], bytes: &[u8]) -> Vec<Vec<u8>> {
     said.into_iter().skip(1).map(|(_, bytes)| bytes).collect()
 }
 
+/// ID, error and data of each answer to an instruction for all.
+fn answers(devices: &mut [Bench], instruction: u8, params: &[u8]) -> Vec<(u8, u8, Vec<u8>)> {
+    let replies = talk(devices, &packet(BROADCAST, instruction, params));
+    replies.iter().map(|reply| answer(reply)).map(|answer| (answer.id, answer.error, answer.data)).collect()
+}
+
 #[test]
 fn sync_read_is_answered_in_the_order_of_the_list() {
     let mut devices = [device(1), device(2), device(3)];
-    let counter = address::FRAME_COUNTER.to_le_bytes();
-    let replies = talk(&mut devices, &packet(BROADCAST, 0x82, &[&counter[..], &[4, 0, 3, 1, 2]].concat()));
-    let answers: Vec<_> = replies.iter().map(|reply| answer(reply)).map(|a| (a.id, a.error, a.data[0])).collect();
-    assert_eq!(answers, [(3, 0, 103), (1, 0, 101), (2, 0, 102)]);
-
-    let replies = talk(&mut devices, &packet(BROADCAST, 0x82, &[0xFF, 0x7F, 1, 0, 2, 1]));
-    let answers: Vec<_> = replies.iter().map(|reply| answer(reply)).map(|a| (a.id, a.error, a.data.len())).collect();
-    assert_eq!(answers, [(2, 7, 0), (1, 7, 0)], "refused in turn too");
+    let [low, high] = address::FRAME_COUNTER.to_le_bytes();
+    let expected = [3, 1, 2].map(|id| (id, 0, vec![100 + id, 0, 0, 0]));
+    assert_eq!(answers(&mut devices, 0x82, &[low, high, 4, 0, 3, 1, 2]), expected);
+    let refused = [(2, 7, vec![]), (1, 7, vec![])];
+    assert_eq!(answers(&mut devices, 0x82, &[0xFF, 0x7F, 1, 0, 2, 1]), refused, "in turn too");
 }
 
 #[test]
@@ -94,9 +97,8 @@ fn bulk_read_and_write_have_addresses_of_their_own() {
     assert!(talk(&mut devices, &packet(BROADCAST, 0x93, &hex("01 44 00 02 00 02"))).is_empty(), "cut short");
     assert_eq!(devices[0].number(address::STATUS_RETURN_LEVEL, 1), 1);
 
-    let replies = talk(&mut devices, &packet(BROADCAST, 0x92, &hex("02 00 01 04 00  01 07 00 01 00")));
-    let answers: Vec<_> = replies.iter().map(|reply| answer(reply)).map(|a| (a.id, a.data)).collect();
-    assert_eq!(answers, [(2, vec![0xE8, 3, 0, 0]), (1, vec![1])]);
+    let read = answers(&mut devices, 0x92, &hex("02 00 01 04 00  01 07 00 01 00"));
+    assert_eq!(read, [(2, 0, vec![0xE8, 3, 0, 0]), (1, 0, vec![1])]);
     assert!(talk(&mut devices, &packet(BROADCAST, 0x92, &hex("02 00 01 04"))).is_empty());
 }
 
@@ -227,11 +229,10 @@ fn a_part_of_a_fast_read_that_is_refused_is_zeros_and_a_packet_too_long_is_none(
 #[test]
 fn bulk_read_goes_across_gaps() {
     let mut devices = [device(1), device(2)];
-    let entries = hex("01 40 00 FF 00  02 00 01 00 01");
-    let answers: Vec<_> =
-        talk(&mut devices, &packet(BROADCAST, 0x92, &entries)).iter().map(|reply| answer(reply)).collect();
-    assert_eq!(answers.iter().map(|a| (a.id, a.error, a.data.len())).collect::<Vec<_>>(), [(1, 0, 255), (2, 0, 256)]);
-    assert_eq!(answers[1].data[48..52], [102, 0, 0, 0], "the frame counter");
+    let read = answers(&mut devices, 0x92, &hex("01 40 00 FF 00  02 00 01 00 01"));
+    let [(1, 0, first), (2, 0, second)] = &read[..] else { panic!("{read:?}") };
+    assert_eq!((first.len(), second.len()), (255, 256));
+    assert_eq!(second[48..52], [102, 0, 0, 0], "the frame counter");
 }
 
 // What each instruction does, and when it is answered.
@@ -252,10 +253,7 @@ fn ping_names_model_and_firmware() {
     assert_eq!(bench.server.reply_delay_us(), 500 + 140, "one slot of 14 bytes at 1 Mbaud");
     assert_eq!(bench.ask_as(2, 0x01, &[]), None);
     assert_eq!(bench.ask(0x01, &[0]).number(), 5);
-}
-
-#[test]
-fn broadcast_ping_waits_for_lower_ids() {
+    // A ping to all waits for all lower IDs.
     let mut bench = Bench::with(Record { id: 252, baud_code: 0, return_delay_2us: 0, ..Record::DEFAULT });
     bench.ask_as(BROADCAST, 0x01, &[]).expect("an answer");
     let slot_us = 14.0 * 10.0 / 9600.0 * 1e6;

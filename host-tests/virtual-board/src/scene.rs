@@ -18,8 +18,8 @@
 pub mod finger;
 pub mod host;
 
-use crate::bench::Bench;
 use crate::board::Surroundings;
+use crate::rig::Stand;
 use crate::{Error, Options, Rig, flash};
 use finger::{Clock, Finger};
 use fingertip::contact::FitLevel;
@@ -158,22 +158,20 @@ type Made = (Vec<Shown>, Option<&'static str>);
 
 /// Starts the next millisecond of a board.
 fn set_out(rig: &mut Rig, now_ns: u64, second_s: f64, wants_pressures: bool) -> Result<Receiver<Made>, Error> {
-    rig.post(move |stand| begin(stand.bench, now_ns, second_s, wants_pressures))?;
+    rig.post(move |Stand { bench, .. }| {
+        if let Surroundings::Scene(finger) = &mut bench.front_end.lock().world {
+            finger.clock.run_at(now_ns, second_s);
+            finger.wants_pressures = wants_pressures;
+        }
+        if let Some(host) = &mut bench.host {
+            host.clock.run_at(now_ns, second_s);
+        }
+    })?;
     rig.set_out(now_ns + MS)?;
     rig.ask(move |stand| {
         let host = stand.bench.host.as_mut();
         host.map_or_else(Made::default, |host| (std::mem::take(&mut host.shown), host.trouble(now_ns)))
     })
-}
-
-fn begin(bench: &mut Bench, now_ns: u64, second_s: f64, wants_pressures: bool) {
-    if let Surroundings::Scene(finger) = &mut bench.front_end.lock().world {
-        finger.clock.run_at(now_ns, second_s);
-        finger.wants_pressures = wants_pressures;
-    }
-    if let Some(host) = &mut bench.host {
-        host.clock.run_at(now_ns, second_s);
-    }
 }
 
 /// Tares and enables torque before the scene begins.

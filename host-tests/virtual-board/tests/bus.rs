@@ -1,8 +1,7 @@
 //! What the bus of the flash image does in time: the frames' times, the line's direction, the bridge, and much traffic.
 
 use crate::common::{
-    Check, PING, WAIT_NS, hold_again, holding, let_go, on_bus, poke, read_u8, read_u32, run_checks, travel_mm,
-    write_and_run_ms,
+    PING, WAIT_NS, hold_again, holding, let_go, on_bus, poke, read_u8, read_u32, travel_mm, write_and_run_ms,
 };
 use fingertip::link::Reply;
 use fingertip::link::packet::Sender;
@@ -16,15 +15,12 @@ use virtual_board::{Options, Rig};
 
 #[test]
 fn a_host_finds_what_it_expects_on_the_bus_of_a_board_that_holds_1_n() {
-    let mut rig = holding(&Options::confirmed());
-    let checks: [Check; 5] = [
-        ("the frames' times", frames_have_true_times),
-        ("the line's direction", the_line_is_given_back_right_after_the_last_stop_bit),
-        ("silence", silence_is_told_in_virtual_time),
-        ("the phase of the PWM", turning_the_bridge_on_keeps_the_phase_of_the_pwm),
-        ("the stack", at_least_half_of_the_stack_is_never_used),
-    ];
-    run_checks(&mut rig, &checks);
+    let rig = &mut holding(&Options::confirmed());
+    frames_have_true_times(rig);
+    the_line_is_given_back_right_after_the_last_stop_bit(rig);
+    silence_is_told_in_virtual_time(rig);
+    turning_the_bridge_on_keeps_the_phase_of_the_pwm(rig);
+    at_least_half_of_the_stack_is_never_used(rig);
 }
 
 fn read(rig: &mut Rig, register: u16, bytes: u16) -> Vec<u8> {

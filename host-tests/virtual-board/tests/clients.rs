@@ -15,7 +15,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::os::fd::AsRawFd;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 
 /// A pseudo-terminal: the device's end, and the name of the client's, which is held open.
 fn terminal() -> (SerialPort, SerialPort, PathBuf) {
@@ -46,6 +46,13 @@ fn serve(mut bench: Bench, near: &SerialPort) {
     }
 }
 
+/// Standard output of a program, which must succeed.
+fn said(output: &Output) -> String {
+    let [said, complained] = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text));
+    assert!(output.status.success(), "{said}{complained}");
+    said.into_owned()
+}
+
 /// A folder with the model file and the list that names it, as ROBOTIS' packages have them.
 fn models() -> PathBuf {
     let folder = std::env::temp_dir().join(format!("fingertip-models-{}", std::process::id()));
@@ -71,8 +78,7 @@ fn robotis_and_pollens_clients_drive_the_finger() {
         output
     });
     std::fs::remove_dir_all(&folder).expect("it is there");
-    let (said, complained) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-    assert!(output.status.success(), "{said}{complained}");
+    let said = said(&output);
     for client in ["dynamixel-sdk: ", "dynamixel_easy_sdk: ", "rustypot: "] {
         assert!(said.lines().any(|line| line.starts_with(client) && line.ends_with(" operations")), "{said}");
     }
@@ -119,10 +125,7 @@ fn example(name: &str, port: &Path, arguments: &[&str]) -> String {
     let package = Path::new(env!("FINGERTIP_ROOT")).join("python");
     let mut python = Command::new(named("FINGERTIP_PYTHON"));
     python.env("PYTHONDONTWRITEBYTECODE", "1").env("PYTHONPATH", &package).arg(package.join("examples").join(name));
-    let output = python.arg("--port").arg(port).args(arguments).output().expect("Python starts");
-    let (said, complained) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-    assert!(output.status.success(), "{said}{complained}");
-    said.into_owned()
+    said(&python.arg("--port").arg(port).args(arguments).output().expect("Python starts"))
 }
 
 #[test]

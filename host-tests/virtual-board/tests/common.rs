@@ -27,24 +27,29 @@ pub fn named(variable: &str) -> PathBuf {
 }
 
 /// Result of a client on the bus of a board that must answer.
+#[track_caller]
 pub fn on_bus<T: Send, E: Debug + Send>(rig: &mut Rig, ask: impl FnOnce(&mut Client) -> Result<T, E> + Send) -> T {
     rig.client(WAIT_NS, ask).expect("the client runs").expect("the image answers and obeys")
 }
 
+#[track_caller]
 pub fn write_u8(rig: &mut Rig, register: u16, value: u8) {
     on_bus(rig, move |bus| bus.write_u8(1, register, value).map(drop));
 }
 
 /// Writes a register, then runs the board for this time.
+#[track_caller]
 pub fn write_and_run_ms(rig: &mut Rig, register: u16, value: u8, ms: u64) {
     write_u8(rig, register, value);
     rig.run_ms(ms).expect("it runs");
 }
 
+#[track_caller]
 pub fn write_u16(rig: &mut Rig, register: u16, value: u16) {
     on_bus(rig, move |bus| bus.write_u16(1, register, value).map(drop));
 }
 
+#[track_caller]
 pub fn write_u32(rig: &mut Rig, register: u16, value: u32) {
     on_bus(rig, move |bus| bus.write_u32(1, register, value).map(drop));
 }
@@ -61,6 +66,7 @@ pub fn let_go(rig: &mut Rig) {
     write_u8(rig, address::TORQUE_ENABLE, 0);
 }
 
+#[track_caller]
 pub fn read_u8(rig: &mut Rig, register: u16) -> u8 {
     on_bus(rig, move |bus| bus.read_u8(1, register).map(|reply| reply.data))
 }
@@ -71,10 +77,12 @@ pub fn read_u8_beside_a_capture(rig: &mut Rig, register: u16) -> u8 {
     answer.expect("the client runs").expect("the image answers")
 }
 
+#[track_caller]
 pub fn read_u16(rig: &mut Rig, register: u16) -> u16 {
     on_bus(rig, move |bus| bus.read_u16(1, register).map(|reply| reply.data))
 }
 
+#[track_caller]
 pub fn read_u32(rig: &mut Rig, register: u16) -> u32 {
     on_bus(rig, move |bus| bus.read_u32(1, register).map(|reply| reply.data))
 }
@@ -119,17 +127,6 @@ pub fn away(distance_mm: f64) -> Setup {
     let mut setup = Setup::default();
     setup.wall.distance_mm = distance_mm;
     setup
-}
-
-/// Name of a check, and the check.
-pub type Check = (&'static str, fn(&mut Rig));
-
-/// Runs checks one after another on one board: to start a board costs more than most of them.
-pub fn run_checks(rig: &mut Rig, checks: &[Check]) {
-    for (name, check) in checks {
-        println!("check: {name}");
-        check(rig);
-    }
 }
 
 /// A file of this test program's in the build folder.

@@ -1,9 +1,9 @@
 //! Defects of the microcontroller: what the rig injects is what it says, and what the image makes of it.
 
 use crate::common::{
-    Check, PING, WAIT_NS, away, causes_since, force_n, frames, hold_again, holding, on_bus, poke, read_u8, read_u16,
-    reboot, refused, register, resets_since, restart, run_checks, running, tare_and_hold, travel_mm, write_and_run_ms,
-    write_goal, write_u8, write_u32,
+    PING, WAIT_NS, away, causes_since, force_n, frames, hold_again, holding, on_bus, poke, read_u8, read_u16, reboot,
+    refused, register, resets_since, restart, running, tare_and_hold, travel_mm, write_and_run_ms, write_goal,
+    write_u8, write_u32,
 };
 use fingertip::params::Params;
 use fingertip::shipped::address;
@@ -17,20 +17,17 @@ use virtual_board::{Fault, Options, Rig};
 
 #[test]
 fn a_defect_of_the_microcontroller_ends_without_torque() {
-    let mut rig = running(&away(0.5), &Options::confirmed());
-    let checks: [Check; 9] = [
-        ("stored parameters", what_is_stored_survives_a_reboot),
-        ("the encoder's edges", the_timer_counts_every_edge_of_the_encoder_also_when_it_turns_impossibly_fast),
-        ("the scan's interrupt", without_the_scans_interrupt_the_image_misses_frames_that_go_on),
-        ("a hang", a_core_that_hangs_is_reset_within_two_milliseconds_and_comes_up_in_fault),
-        ("a slow scan that stops", a_slow_scan_that_stops_is_lost_frames_and_no_crash),
-        ("the clock", a_clock_that_fails_cuts_the_bridge_and_the_board_comes_up_without_torque),
-        ("a panic", |rig| crashes(rig, Fault::BusMemoryLost, 1)),
-        // TIM5 is the frame guard, which control reads in every frame.
-        ("a hard fault", |rig| crashes(rig, Fault::BusError { from: 0x4000_0c00, to: 0x4000_1000 }, 2)),
-        ("the memory's protection", a_store_below_ram_or_to_the_image_is_a_hard_fault_there_and_then),
-    ];
-    run_checks(&mut rig, &checks);
+    let rig = &mut running(&away(0.5), &Options::confirmed());
+    what_is_stored_survives_a_reboot(rig);
+    the_timer_counts_every_edge_of_the_encoder_also_when_it_turns_impossibly_fast(rig);
+    without_the_scans_interrupt_the_image_misses_frames_that_go_on(rig);
+    a_core_that_hangs_is_reset_within_two_milliseconds_and_comes_up_in_fault(rig);
+    a_slow_scan_that_stops_is_lost_frames_and_no_crash(rig);
+    a_clock_that_fails_cuts_the_bridge_and_the_board_comes_up_without_torque(rig);
+    crashes(rig, Fault::BusMemoryLost, 1);
+    // TIM5 is the frame guard, which control reads in every frame.
+    crashes(rig, Fault::BusError { from: 0x4000_0c00, to: 0x4000_1000 }, 2);
+    a_store_below_ram_or_to_the_image_is_a_hard_fault_there_and_then(rig);
 }
 
 fn the_timer_counts_every_edge_of_the_encoder_also_when_it_turns_impossibly_fast(rig: &mut Rig) {

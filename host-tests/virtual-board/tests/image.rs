@@ -2,8 +2,8 @@
 //! The image of `cargo xtask bringup`: what the board can show passes, and all else is told.
 
 use crate::common::{
-    Check, PING, WAIT_NS, away, force_n, image, named, read_u8, read_u16, read_u32, register, run_checks, running,
-    write_goal, write_param, write_u8, write_u32,
+    PING, WAIT_NS, away, force_n, image, named, read_u8, read_u16, read_u32, register, running, write_goal,
+    write_param, write_u8, write_u32,
 };
 use bringup::judge::{Board, Verdict};
 use fingertip::params::Params;
@@ -16,20 +16,17 @@ use virtual_board::{Fault, Options, Rig, bringup as emulated};
 
 #[test]
 fn the_image_boots_scans_and_tells_how_the_board_is() {
-    let mut rig = running(&away(0.5), &Options::default());
-    let checks: [Check; 10] = [
-        ("the clock", its_clock_begins_at_zero_and_never_falls_back),
-        ("the scan's rate", frames_arrive_at_the_scans_rate),
-        ("a ping", it_answers_a_ping_at_its_baud_rate),
-        ("health", the_bus_tells_how_the_board_is),
-        ("the frame pin", the_frame_pin_is_high_for_a_slot_in_each_frame),
-        ("the control pin", the_control_pin_is_high_while_control_is_busy),
-        ("the settle time", a_settle_time_that_is_lowered_leaves_the_rows_in_step),
-        ("the bridge's period", the_bridge_keeps_step_with_the_scan),
-        ("short frames", frames_shorter_than_the_three_conversions_find_the_supply_too),
-        ("the guard pin", the_guard_pin_pulses_where_the_guard_trips),
-    ];
-    run_checks(&mut rig, &checks);
+    let rig = &mut running(&away(0.5), &Options::default());
+    its_clock_begins_at_zero_and_never_falls_back(rig);
+    frames_arrive_at_the_scans_rate(rig);
+    it_answers_a_ping_at_its_baud_rate(rig);
+    the_bus_tells_how_the_board_is(rig);
+    the_frame_pin_is_high_for_a_slot_in_each_frame(rig);
+    the_control_pin_is_high_while_control_is_busy(rig);
+    a_settle_time_that_is_lowered_leaves_the_rows_in_step(rig);
+    the_bridge_keeps_step_with_the_scan(rig);
+    frames_shorter_than_the_three_conversions_find_the_supply_too(rig);
+    the_guard_pin_pulses_where_the_guard_trips(rig);
 }
 
 fn its_clock_begins_at_zero_and_never_falls_back(rig: &mut Rig) {
@@ -85,7 +82,9 @@ fn the_bus_tells_how_the_board_is(rig: &mut Rig) {
     assert!((1..5_000).contains(&late_ns), "{late_ns} ns");
     let of_scan = [address::BANK_MISSING, address::OUT_OF_STEP, address::CONVERTER_OVERRUN, address::OVERWRITTEN];
     let of_bus = [address::TRANSFER_BUS_ERRORS, address::TRANSFER_STREAM_ERRORS, address::LINE_FRAMING];
-    assert!(of_scan.into_iter().chain(of_bus).all(|count| read_u16(rig, count) == 0));
+    for count in of_scan.into_iter().chain(of_bus) {
+        assert_eq!(read_u16(rig, count), 0, "register {count}");
+    }
 }
 
 /// A compare value below the counter triggers the converters once too often, if it is set before the timer restarts and

@@ -137,10 +137,10 @@ pub fn fetch(rig: &mut Rig) -> Vec<u8> {
     bytes
 }
 
-/// Replays what was read, which must be as the image answered.
-fn same(rig: &mut Rig, bytes: &[u8]) -> (Replayed<ROWS, COLUMNS>, Vec<Mode>) {
-    let mut modes = Vec::new();
-    let replayed = replay::<ROWS, COLUMNS>(bytes, &CLOCKS, |_, status| {
+/// Reads a capture and replays it, which must be as the image answered; returns its length, too.
+fn same(rig: &mut Rig) -> (Replayed<ROWS, COLUMNS>, Vec<Mode>, usize) {
+    let (bytes, mut modes) = (fetch(rig), Vec::new());
+    let replayed = replay::<ROWS, COLUMNS>(&bytes, &CLOCKS, |_, status| {
         if modes.last() != Some(&status.mode) {
             modes.push(status.mode);
         }
@@ -149,7 +149,7 @@ fn same(rig: &mut Rig, bytes: &[u8]) -> (Replayed<ROWS, COLUMNS>, Vec<Mode>) {
     assert_eq!(replayed.difference, None);
     assert_eq!(replayed.head.frames, read_u32(rig, address::CAPTURE_FRAMES));
     assert_eq!(replayed.head.ended as u8, read_u8(rig, address::CAPTURE_ENDED));
-    (replayed, modes)
+    (replayed, modes, bytes.len())
 }
 
 fn a_press_replays_to_the_bit_also_with_calibrated_gains(rig: &mut Rig) {
@@ -171,13 +171,12 @@ fn a_press_replays_to_the_bit_also_with_calibrated_gains(rig: &mut Rig) {
     until_done(rig);
     // Keeping frames costs none.
     assert_eq!((read_u8(rig, address::FAULT), read_u32(rig, address::MISSED_FRAMES)), (0, missed));
-    let bytes = fetch(rig);
-    let (replayed, modes) = same(rig, &bytes);
+    let (replayed, modes, length) = same(rig);
     assert_eq!((replayed.head.ended, replayed.head.missed_frames), (Ended::Full, missed));
     assert_eq!(modes, [Mode::Tare, Mode::Off, Mode::Approach, Mode::Force]);
-    let per_frame = bytes.len() as f64 / f64::from(replayed.head.frames);
-    println!("{} frames in {} bytes, {per_frame:.1} a frame", replayed.head.frames, bytes.len());
-    assert!(bytes.len() <= CAPTURE_BYTES && replayed.head.frames > 600);
+    let per_frame = length as f64 / f64::from(replayed.head.frames);
+    println!("{} frames in {length} bytes, {per_frame:.1} a frame", replayed.head.frames);
+    assert!(length <= CAPTURE_BYTES && replayed.head.frames > 600);
     let longest_us = read_u16(rig, address::LOOP_TIME_MAX_US);
     println!("the longest loop time: {before_us} us before, {longest_us} us with the capture");
 
@@ -190,8 +189,7 @@ fn a_press_replays_to_the_bit_also_with_calibrated_gains(rig: &mut Rig) {
     rig.run_ms(5).expect("it runs");
     press(rig);
     until_done(rig);
-    let again = fetch(rig);
-    let (replayed, modes) = same(rig, &again);
+    let (replayed, modes, _) = same(rig);
     assert_eq!(modes.last(), Some(&Mode::Force));
     assert_eq!(taxels.map(|(taxel, _)| replayed.head.gains.get(taxel.into())), taxels.map(|(_, gain)| gain));
     assert_eq!(read_u8(rig, address::CAPTURE_COUNT), count + 2);
@@ -213,8 +211,7 @@ fn out_of_turn_and_interrupted(rig: &mut Rig) {
     assert_eq!(read_u8(rig, address::CAPTURE_STATE), RECORDING);
     assert_eq!(refused(rig, address::CAPTURE, &[1]), RESULT, "frames are being kept");
     write_and_run_ms(rig, address::CAPTURE, 0, 1);
-    let bytes = fetch(rig);
-    let (replayed, _) = same(rig, &bytes);
+    let (replayed, _, _) = same(rig);
     assert_eq!((replayed.head.ended, replayed.head.params.modulus_pa), (Ended::Asked, 260_000));
     assert!((60..160).contains(&replayed.head.frames), "{} frames", replayed.head.frames);
 
@@ -222,8 +219,7 @@ fn out_of_turn_and_interrupted(rig: &mut Rig) {
     write_and_run_ms(rig, address::CAPTURE, 1, 1);
     write_and_run_ms(rig, address::TARE, 1, 20);
     write_param(rig, "modulus_pa", 250_000);
-    let bytes = fetch(rig);
-    let (replayed, modes) = same(rig, &bytes);
+    let (replayed, modes, _) = same(rig);
     assert_eq!((replayed.head.ended, replayed.head.params.modulus_pa), (Ended::Configured, 260_000));
     assert_eq!(modes, [Mode::Tare, Mode::Off]);
 
@@ -236,6 +232,5 @@ fn out_of_turn_and_interrupted(rig: &mut Rig) {
     write_and_run_ms(rig, address::CAPTURE, 1, 1);
     write_u8(rig, address::TARE, 1);
     until_done(rig);
-    let bytes = fetch(rig);
-    same(rig, &bytes);
+    same(rig);
 }

@@ -1,8 +1,8 @@
 //! A calibrated finger's time: every correction of a real sensor is on, and a capture runs.
 
 use crate::common::{
-    Check, away, force_n, read_u8, read_u8_beside_a_capture, read_u16, read_u32, register, run_checks, running,
-    write_and_run_ms, write_goal, write_u8, write_u32,
+    away, force_n, read_u8, read_u8_beside_a_capture, read_u16, read_u32, register, running, write_and_run_ms,
+    write_goal, write_u8, write_u32,
 };
 use fingertip::contact::FitLevel;
 use fingertip::params::Params;
@@ -81,13 +81,10 @@ fn said(rig: &mut Rig) -> (u8, bool, u16) {
 
 #[test]
 fn the_fit_level_keeps_within_its_time() {
-    let mut rig = holding_over_the_edge();
-    let checks: [Check; 3] = [
-        ("time", the_highest_fit_level_is_held_back_before_a_deadline_is_missed),
-        ("changes", a_change_of_the_fit_level_does_not_stop_the_scan),
-        ("slower frames", slower_frames_leave_room_for_the_highest_fit_level),
-    ];
-    run_checks(&mut rig, &checks);
+    let rig = &mut holding_over_the_edge();
+    the_highest_fit_level_is_held_back_before_a_deadline_is_missed(rig);
+    a_change_of_the_fit_level_does_not_stop_the_scan(rig);
+    slower_frames_leave_room_for_the_highest_fit_level(rig);
 }
 
 fn the_highest_fit_level_is_held_back_before_a_deadline_is_missed(rig: &mut Rig) {

@@ -189,7 +189,7 @@ fn restarted(seed: u64) -> Case {
     let what = format!(
         "{seed}: goal {goal_n:.2} N, off {moment} at {speed:.0} mm/s for {off_s:.4} s, then {again_n:.2} N: {fault:?}"
     );
-    Case::new(what, f64::from(u8::from(stopped)), 0.0)
+    Case::never(what, stopped)
 }
 
 #[test]
@@ -246,10 +246,8 @@ fn a_residual_reading_does_not_drive_the_tip_through_the_air() {
                         fastest = fastest.max(truth.speed_mm_per_s.abs());
                     }
                 }
-                let what = format!(
-                    "{goal_n} N for {hold_s} s, goal 0 {away_s} s after the object is away, {:?}",
-                    finger.status().fault
-                );
+                let fault = finger.status().fault;
+                let what = format!("{goal_n} N for {hold_s} s, goal 0 {away_s} s after the object is away, {fault:?}");
                 cases.push(Case::new(what, fastest, 1.5 * APPROACH_MM_PER_S));
             }
         }
@@ -282,7 +280,7 @@ fn a_tare_while_something_presses_does_not_change_the_force() {
             let what = format!("{before_n:.2} N during the tare, the first one {first}, goal {goal_n} N, {state}");
             let drives = finger.status().mode != Mode::Off;
             // A first tare is not to be trusted; a later one leaves the zero that is known to be right.
-            cases.push(Case::new(format!("driven, {what}"), f64::from(u8::from(drives == first)), 0.0));
+            cases.push(Case::never(format!("driven, {what}"), drives == first));
             let most_n = if first { before_n + 0.01 } else { before_n.max(1.05 * goal_n + 0.05) };
             cases.push(Case::new(what, peak_n, most_n));
         }
@@ -293,11 +291,7 @@ fn a_tare_while_something_presses_does_not_change_the_force() {
     finger.command().tare_forced = true;
     finger.tare();
     finger.run(0.1);
-    cases.push(Case::new(
-        "not driven though forced".into(),
-        f64::from(u8::from(finger.status().mode == Mode::Off)),
-        0.0,
-    ));
+    cases.push(Case::never("not driven though forced".into(), finger.status().mode == Mode::Off));
     judge("torque after a tare while something presses: the largest force", "N", &cases);
 }
 
@@ -319,7 +313,7 @@ fn hysteresis_on_a_moving_object_is_no_frozen_array() {
         }
         let what =
             format!("{seed}: {width_percent:.1} %, {goal_n:.2} N, {way_mm:.2} mm at {mm_per_s:.0} mm/s: {stopped:?}");
-        Case::new(what, f64::from(u8::from(stopped == Some(Fault::ArrayFrozen))), 0.0)
+        Case::never(what, stopped == Some(Fault::ArrayFrozen))
     });
     judge("hysteresis on a moving object", "faults 4", &cases);
 }

@@ -329,17 +329,6 @@ fn a_release_moves_back_while_the_force_falls() {
     }
 }
 
-#[test]
-fn a_residue_from_before_torque_does_not_move_the_place_of_rest_for_ever() {
-    for residue_mn in [50.0, 200.0] {
-        let mut hand = Hand::new();
-        hand.see(&contact(residue_mn as i32), at(Millimetres::ZERO));
-        let rest_mm = released_mm(hand, 0.0, |_| residue_mn);
-        let depth_mm: f64 = CONFIG.tip.indentation(newtons(residue_mn as i32)).0.to_num();
-        assert!(rest_mm >= -depth_mm - 1.7, "a residue of {residue_mn} mN: {rest_mm} mm");
-    }
-}
-
 /// Behind half of the clearance the reading is a residue, which the baseline may learn; never while the tip presses.
 #[test]
 fn only_behind_the_surface_the_baseline_learns_a_residue() {

@@ -249,8 +249,6 @@ fn taxels_that_are_masked_are_no_fault_any_more() {
 
 // A tare on a free tip and one while something touches are told apart, over drawn arrays; torque is refused after it.
 
-const ARRAYS: u64 = 120;
-
 struct Finger {
     rng: Rng,
     pipeline: Pipeline,
@@ -342,16 +340,12 @@ impl Finger {
     }
 }
 
-const MODULI_KPA: [f64; 3] = [100.0, 250.0, 700.0];
-const FORCES_N: [f64; 7] = [0.2, 0.3, 0.5, 1.0, 2.0, 4.0, 7.0];
-
 #[test]
 fn a_tare_under_two_tenths_of_a_newton_and_more_is_flagged_and_a_clean_one_clears_it() {
-    for seed in 0..ARRAYS {
-        let modulus_kpa = MODULI_KPA[seed as usize % 3];
+    for (seed, modulus_kpa) in (0..120).zip([100.0, 250.0, 700.0].into_iter().cycle()) {
         let mut later = Finger::new(seed, modulus_kpa);
         assert!(!later.tare(0.0, [0.0; 2]));
-        for force_n in FORCES_N {
+        for force_n in [0.2, 0.3, 0.5, 1.0, 2.0, 4.0, 7.0] {
             let mut first = Finger::new(seed, modulus_kpa);
             let at = first.anywhere();
             assert!(first.tare(force_n, at), "array {seed}, first tare: {force_n} N at {at:?} mm, {modulus_kpa} kPa");

@@ -292,12 +292,13 @@ fn a_press_replays_to_the_bit_also_with_gains() {
     assert!(head.frames > TARE_FRAMES + 600, "{} frames", head.frames);
 }
 
+/// Only the warmth of the motor goes on.
 #[test]
 fn what_the_finger_did_before_does_not_matter() {
     let mut finger = Recorded::<{ 8 << 10 }>::new();
     finger.bench.tare();
-    finger.bench.command().goal = newtons(1_500);
-    finger.bench.frames(3_000);
+    finger.bench.command().goal = newtons(6_000);
+    finger.bench.frames(5_000);
     finger.bench.request(Task::Press);
     finger.bench.frames(3_000);
     finger.bench.command().goal = newtons(0);
@@ -311,8 +312,12 @@ fn what_the_finger_did_before_does_not_matter() {
         finger.frames(3_000);
         finger.bench.command().torque = false;
         finger.frames(300);
+        let before: f64 = finger.bench.status().winding.0.to_num();
+        assert!(before > 88.5, "{before} C: it is warmer than after a reset");
         finger.press();
-        agrees(&finger, |_| {});
+        let mut coldest = f64::MAX;
+        agrees(&finger, |status| coldest = coldest.min(status.winding.0.to_num()));
+        assert!(coldest > before - 0.1, "{coldest} C after {before} C");
     }
     assert_eq!(finger.capture.standing().count, 2);
 }
@@ -349,24 +354,6 @@ fn torque_that_comes_before_the_first_kept_step_is_taken() {
     finger.frames(TARE_FRAMES + 10);
     let status = finger.frame();
     assert_eq!((status.mode, status.limits.has(Limits::TORQUE_HELD)), (Mode::Approach, false));
-}
-
-#[test]
-fn the_motor_stays_as_warm_as_it_is() {
-    let mut finger = Recorded::<BYTES>::new();
-    finger.bench.tare();
-    *finger.bench.command() = Command { torque: true, goal: newtons(6_000), ..*finger.bench.command() };
-    finger.frames(5_000);
-    finger.bench.command().goal = newtons(0);
-    finger.frames(3_000);
-    finger.bench.command().torque = false;
-    finger.frames(200);
-    let before: f64 = finger.bench.status().winding.0.to_num();
-    assert!(before > 88.5, "{before} C: it is warmer than after a reset");
-    finger.press();
-    let mut coldest = f64::MAX;
-    agrees(&finger, |status| coldest = coldest.min(status.winding.0.to_num()));
-    assert!(coldest > before - 0.1, "{coldest} C after {before} C");
 }
 
 #[test]

@@ -276,10 +276,12 @@ fn each_mode_has_its_command_for_the_bridge() {
     }
 }
 
+type End = fn(&mut Bench);
+
 /// However a drive ends, the motor is shorted until the tip was at rest for 20 ms. Then the bridge opens for good.
 #[test]
 fn a_motor_that_was_driven_brakes_until_the_tip_rests() {
-    let endings: [(&str, fn(&mut Bench)); 4] = [
+    let endings: [(&str, End); 4] = [
         ("torque off", |board| board.command().torque = false),
         ("tare", |board| (board.command().torque, board.command().tare_request) = (false, 77)),
         ("parameters", |board| {

@@ -5,7 +5,6 @@ use fingertip::measure::MeasureStatus;
 use fingertip::pipeline::Bridge;
 use fingertip::pressure::TARE_BITS;
 
-const NOT_READY: MeasureStatus = MeasureStatus::over(Task::Press, Ended::NotReady, 0);
 const RUNNING: MeasureStatus = MeasureStatus::running(Task::Press);
 
 /// With the object so far away.
@@ -171,7 +170,8 @@ fn a_press_that_waits_is_refused_once_torque_is_off() {
     assert_eq!(board.step().measure, MeasureStatus::default());
     board.command().torque = false;
     let status = board.step();
-    assert_eq!((status.mode, status.measure), (Mode::Tare, NOT_READY));
+    let refused = MeasureStatus::over(Task::Press, Ended::NotReady, 0);
+    assert_eq!((status.mode, status.measure), (Mode::Tare, refused));
 }
 
 /// A request while a measurement runs is answered by its outcome, also in its last frame; the next one begins another.

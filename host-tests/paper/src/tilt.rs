@@ -23,8 +23,7 @@
 //!
 //! which goes from 8/15 for a shallow contact to 0.655 at 0.95 a (a uniform pressure has 2/3, Hertz 0.589).
 
-use crate::touching::sine_cosine;
-use crate::touching::{depth, nearest_long_quotient, quotient, radius, square};
+use crate::touching::{depth, nearest_long_quotient, quotient, radius, sine_cosine, square};
 use crate::units::{NewtonMillimetres, Radians, Ratio};
 use fingertip::model::Tip;
 use fingertip::units::{Millimetres, Newtons};

@@ -296,18 +296,13 @@ fn requests(bench: &mut Bench, tare: u8, clear: u8, save: u8) -> Result<(), u8> 
 }
 
 #[test]
-fn a_tare_in_a_fault_is_refused() {
+fn a_tare_in_a_fault_is_refused_and_with_or_after_its_clearing_taken() {
     let mut bench = faulted();
     let before = bench.server.command();
     assert_eq!(bench.write(address::TARE, &[1]), RESULT);
     assert_eq!(bench.server.command(), before);
     assert_eq!(bench.number(address::RESULT_ERRORS, 2), 1);
     assert_eq!(bench.write(address::TARE, &[0]), Ok(()), "0 asks for nothing");
-}
-
-#[test]
-fn a_tare_with_or_after_the_clearing_of_a_fault_is_taken() {
-    let mut bench = faulted();
     assert_eq!(requests(&mut bench, 1, 1, 0), Ok(()));
     let Command { tare_request, clear_request, torque, .. } = bench.server.command();
     assert_eq!((tare_request, clear_request, torque), (1, 1, false));
@@ -374,12 +369,10 @@ fn torque_and_goals_wait_until_the_fault_is_seen_to_be_cleared() {
 /// The link refuses impossible requests at once; it passes on those that a running tare may make possible.
 #[test]
 fn a_motion_is_refused_where_it_cannot_begin() {
-    const JOG: u8 = 1;
-    const STROKES: u8 = 2;
-    const PRESS: u8 = 3;
     let ask = |bench: &mut Bench, task: u8| bench.write(address::MEASURE, &[task]);
+    // A jog, strokes, a press.
     let all = |bench: &mut Bench| {
-        [JOG, STROKES, PRESS].map(|task| {
+        [1, 2, 3].map(|task| {
             bench.status.taken.measure = bench.server.command().measure_request;
             ask(bench, task).is_ok()
         })
@@ -408,7 +401,7 @@ fn a_motion_is_refused_where_it_cannot_begin() {
     assert_eq!(all(&mut bench), [true, false, false], "the capture's memory is in use");
     // The loop has not seen the jog yet: a motion would replace it, or the stop behind it.
     let mut waits = Bench::new();
-    let answers = [JOG, STROKES, 0, JOG, STROKES, 0].map(|task| ask(&mut waits, task).is_ok());
+    let answers = [1, 2, 0, 1, 2, 0].map(|task| ask(&mut waits, task).is_ok());
     assert_eq!(answers, [true, false, true, false, false, true]);
     // Stopping is never refused.
     for bench in [&mut Bench::new(), &mut faulted(), &mut bench] {

@@ -217,7 +217,7 @@ impl ScanTimer {
         self.updates_served += passed as u64;
         if let Some(scan) = &mut self.front_end.lock().scan {
             scan.due_ns.extend(self.updates.next_ns(passed));
-            if !self.updates.running.is_some() {
+            if self.updates.running.is_none() {
                 scan.due_ns.push_back(now_ns);
             }
         }

@@ -105,8 +105,8 @@ proptest! {
         }
         prop_assert_eq!(changes, 0, "it hunts");
         let last = last.expect("there were frames");
-        // A loop surely keeps the frame by the sums, the model's most, and the margin for jumps. With a contact the rest is
-        // less certain by the difference of the model's maximum and minimum.
+        // A fit level is sure to fit if the frame by the sums, the largest cost of the model and the margin for jumps fit
+        // into the usable time. With a contact, the frame by the sums is known only to the spread of the model's cost.
         let usable = Budget::usable(DEADLINE);
         let sure = |fit_level: FitLevel| {
             let blur = if contact { Budget::model_cycles(fit_level.lower()) } else { [0, 0] };

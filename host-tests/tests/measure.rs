@@ -311,7 +311,7 @@ fn a_motion_that_replaces_another_is_one_of_its_own() {
     assert_eq!((measure.task, measure.ended), (Task::Jog, Ended::NotReady));
 }
 
-/// A stop of a jog that waited reports that the jog never began, not the outcome before it; a stop of nothing reports nothing.
+/// The stop of a jog that still waits reports `Interrupted`; a stop with no motion keeps the last outcome.
 #[test]
 fn a_stop_of_a_motion_that_waits_has_an_outcome_of_its_own() {
     let mut finger = Made::begun(Task::Jog);

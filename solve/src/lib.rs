@@ -19,8 +19,8 @@
 //! use solve::scale::Held;
 //!
 //! let held = [(1.05, 1.0), (2.62, 2.5), (4.21, 4.0)].map(|(shown_n, read_n)| Held { shown_n, read_n });
-//! let scale = solve::scale(&held)?;
-//! assert!((scale.factor.value - 1.05).abs() < 0.01);
+//! let factor = solve::scale(&held)?;
+//! assert!((factor.value - 1.05).abs() < 0.01);
 //! # Ok::<(), solve::scale::NoScale>(())
 //! ```
 

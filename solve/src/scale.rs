@@ -8,8 +8,8 @@
 //! F = k R
 //! ```
 //!
-//! with R the array's sum. k divides `codes_per_kpa` and multiplies the modulus. Least squares with Huber's weights: one
-//! number that was misread does not move k.
+//! with R the array's sum. k divides `codes_per_kpa` and multiplies the modulus. Least squares with Huber's weights, so that
+//! a single misread number hardly changes k.
 
 use crate::Value;
 use crate::modulus::{NoModulus, modulus};
@@ -30,13 +30,6 @@ pub struct Held {
     pub read_n: f64,
 }
 
-/// Scale of an array.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Scale {
-    /// Force shown over force read.
-    pub factor: Value,
-}
-
 /// Reason why there is no scale, with the number behind it.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "their texts say it")]
@@ -54,7 +47,7 @@ const HELD_PART: f64 = 0.01;
 const LEAST_N: f64 = 0.1;
 
 /// Scale by forces that were held.
-pub fn scale(held: &[Held]) -> Result<Scale, NoScale> {
+pub fn scale(held: &[Held]) -> Result<Value, NoScale> {
     let largest_n = held.iter().map(|held| held.read_n).fold(0.0, f64::max);
     if largest_n < LEAST_N || held.iter().all(|held| held.shown_n < LEAST_N) {
         return Err(NoScale::TooLittle(largest_n));
@@ -68,7 +61,7 @@ pub fn scale(held: &[Held]) -> Result<Scale, NoScale> {
     if !(0.5..=2.0).contains(&factor.value) {
         return Err(NoScale::Range(factor.value));
     }
-    Ok(Scale { factor })
+    Ok(factor)
 }
 
 /// Readings under a force that does not change: a weight, or a loop that holds a scale's number.

@@ -96,7 +96,7 @@ impl LinkTask {
             GAINS.take(|_| ());
             GAINS.fill(|gains| *gains = record.gains);
         }
-        // Before the reply: the state that the host reads next is that of its own request.
+        // Before the reply, so that the host reads the state after its request.
         if let Some(arm) = actions.capture {
             capture::ask(arm);
         }

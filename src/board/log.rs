@@ -59,7 +59,7 @@ pub fn log_refusal(error: ConfigError) {
         ConfigError::Param(cause) => log_parameter(cause),
         _ => {
             let [first, second] = error.parameters();
-            error!("{=str} and {=str} contradict each other: their defaults", first, second);
+            error!("{=str} and {=str} do not go together: set back to their defaults", first, second);
         }
     }
 }

@@ -7,8 +7,8 @@
 use cortex_m::asm::{dsb, isb};
 use cortex_m::peripheral::MPU;
 
-/// Regions of the memory protection unit by base and attributes: size as a power of two, less one, access, and memory
-/// type as in the usual map. Where regions overlap, the later one counts.
+/// Regions of the memory protection unit: base and attributes. Those are the size (as a power of two, less one), the access
+/// rights, and the memory type of the default memory map.
 const REGIONS: [(u32, u32); 3] = [
     // The image, 256 KiB of flash: read only. The stored parameters lie above it.
     (0x0800_0000, 17 << 1 | 1 | 0b110 << 24 | 0b000_010 << 16),
@@ -59,7 +59,7 @@ impl Paint {
     }
 }
 
-/// Turns the protection on.
+/// Turns the memory protection on.
 pub fn protect() {
     // SAFETY: nothing else uses these registers. The image writes to flash above its region only, runs no code from RAM
     // and has nothing below RAM.

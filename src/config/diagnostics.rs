@@ -30,7 +30,7 @@ pub enum ConfigError {
 }
 
 impl ConfigError {
-    /// Names of the parameters concerned; twice the same if there is only one.
+    /// Names of the two parameters concerned; the same name twice if there is only one.
     pub fn parameters(&self) -> [&'static str; 2] {
         match *self {
             Self::Param(error) => [error.name; 2],
@@ -82,7 +82,7 @@ const SETTLE_MS: f32 = 500.0;
 const COUNT_UM: i32 = 100;
 
 impl Config {
-    /// Tells each reason for which the loop runs worse with this configuration than its user may expect, for a host to show.
+    /// Calls `tell` with each reason why the loop may perform worse with this configuration than its user expects.
     pub fn warnings(&self, mut tell: impl FnMut(core::fmt::Arguments<'_>)) {
         let p = &self.params;
         let Params { pitch_um, force_max_mn, .. } = *p;

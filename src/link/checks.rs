@@ -69,11 +69,15 @@ impl<const ROWS: usize, const COLUMNS: usize> Staged<'_, ROWS, COLUMNS> {
         self.taring() || !limits.has(Limits::NOT_TARED) && !touched
     }
 
+    /// Returns true if the loop has not taken the last request for a motion that measures, or for its end.
+    pub fn measure_waits(&self) -> bool {
+        self.settings.command.measure_request != self.snapshot.status.taken.measure
+    }
+
     /// Returns true if the motor jogs or makes strokes, or is about to.
     pub fn strokes(&self) -> bool {
-        let (status, request) = (&self.snapshot.status, self.settings.command.measure_request);
-        let waits = request != status.taken.measure;
-        status.mode == Mode::Strokes || waits && matches!(Task::of(request), Task::Jog | Task::Strokes)
+        let requested = || matches!(Task::of(self.settings.command.measure_request), Task::Jog | Task::Strokes);
+        self.snapshot.status.mode == Mode::Strokes || self.measure_waits() && requested()
     }
 
     /// Returns true if the motor is driven, or is about to be.

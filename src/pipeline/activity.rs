@@ -16,7 +16,7 @@
 //! | torque off | in every activity; a release for a silent bus stops with fault 7 | |
 //! | jog, strokes | in off, with torque off, the array tared and nothing at the tip; they wait until the tip is at rest | refused: [`Ended`] |
 //! | press | in a grip; with torque on it waits while torque is taken up or a tare is under way | refused: `NotReady` |
-//! | stop | always; of a motion that waits: [`Ended::Interrupted`] | |
+//! | stop | always; a motion that still waits ends as [`Ended::Interrupted`] | |
 
 use super::Pipeline;
 use crate::command::Command;
@@ -293,7 +293,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
                 self.activity = Activity::Grip(Grip::default());
                 return;
             }
-            // A motion that waited never began.
+            // A motion waited, and never began.
             (Task::Stop, ..) if skipped => Ended::Interrupted,
             (Task::Stop, ..) => return,
             (Task::Press, Activity::Grip(_), Some(built_in)) => {

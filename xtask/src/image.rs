@@ -23,7 +23,7 @@ const SPAN_MAX: usize = 2 << 20;
 pub struct Image {
     /// The linked image, with symbols.
     pub elf: PathBuf,
-    /// The file of the flashable bytes beside it.
+    /// File of the flashable bytes, beside the linked image.
     pub bin: PathBuf,
     /// The flashable bytes.
     pub bytes: Vec<u8>,

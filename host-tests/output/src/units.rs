@@ -3,11 +3,12 @@
 //! A name ends with its unit word by word, `per` standing for what it is divided by. So a unit that is made of others
 //! needs no entry.
 
-/// Words that a unit is made of and that are shown as they are, and others with how they are shown.
+/// Words of a unit's name that are shown as they are.
 const PLAIN: [&str; 18] = [
     "code", "codes", "counts", "cycles", "g", "mm", "mrad", "ms", "ns", "permille", "ppb", "ppm", "rad", "s", "turn",
     "ug", "um", "us",
 ];
+/// Other words of a unit's name, each with how it is shown.
 const WORDS: [(&str, &str); 23] = [
     ("a", "A"),
     ("c", "degrees Celsius"),

@@ -87,7 +87,7 @@ impl Array {
         2.0 * line / (1.0 + (1.0 + 4.0 * self.growth * line / range).sqrt())
     }
 
-    /// Conductance of a code.
+    /// Conductance of a taxel that shows one code, S.
     pub fn siemens_per_code(&self) -> f64 {
         self.reference_v / (self.feedback_ohm * self.drive_v * Self::CODES)
     }

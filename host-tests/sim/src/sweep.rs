@@ -63,13 +63,13 @@ pub fn sweep(plan: &Plan, board: Run) -> Result<(Table, PathBuf), RunError> {
     let head = head(plan, first, all);
     let out = plan.out.clone().unwrap_or_else(|| Path::new(FOLDER).join(&head.id));
     let mut rows = Rows::open(plan, &out, head)?;
-    say::aside(match rows.rows.len() {
+    say::aside(match rows.done.len() {
         0 => format!("the runs go to {}", out.display()),
         count => format!("goes on in {}, where {count} runs are done", out.display()),
     });
     let tasks: Vec<usize> =
-        (0..all).filter(|run| plan.shard.has(*run) && !rows.rows.contains_key(&(run + 1))).collect();
-    let progress = progress(tasks.len() + rows.rows.len(), "runs")?.with_position(rows.rows.len() as u64);
+        (0..all).filter(|run| plan.shard.has(*run) && !rows.done.contains_key(&(run + 1))).collect();
+    let progress = progress(tasks.len() + rows.done.len(), "runs")?.with_position(rows.done.len() as u64);
     let work = |run: usize| {
         let (values, scene) = &points[run / seeds];
         let scene = Scene { seed: scene.seed + (run % seeds) as u64, ..scene.clone() };
@@ -208,7 +208,7 @@ fn head(plan: &Plan, scene: &Scene, runs: usize) -> Head {
 struct Rows {
     head: Head,
     /// Rows by the number of their run, from 1.
-    rows: BTreeMap<usize, Vec<String>>,
+    done: BTreeMap<usize, Vec<String>>,
     part: part::Part,
 }
 
@@ -230,7 +230,7 @@ impl Rows {
                 number.ok_or_else(|| format!("{}.part has a row of another form: remove it", file.display()))?;
             rows.insert(number, row);
         }
-        Ok(Self { rows, part, head })
+        Ok(Self { done: rows, part, head })
     }
 
     fn add(&mut self, number: usize, values: Vec<String>) -> Result<(), RunError> {
@@ -239,13 +239,13 @@ impl Rows {
         let row: Vec<String> = first.into_iter().chain(values).chain(expected.iter().cloned()).collect();
         let line = summary::csv([&row])?;
         self.part.add(String::from_utf8(line)?.trim_end())?;
-        self.rows.insert(number, row);
+        self.done.insert(number, row);
         Ok(())
     }
 
     /// Writes the files and then removes the rows so far.
     fn finish(self, plan: &Plan, out: &Path) -> Result<Table, RunError> {
-        let table = Table { head: self.head.columns, rows: self.rows.into_values().collect() };
+        let table = Table { head: self.head.columns, rows: self.done.into_values().collect() };
         self.part.write(table.csv()?)?;
         if plan.shard.is_whole() {
             table.write_rest(out, self.part.lock())?;

@@ -201,8 +201,8 @@ pub fn depths(tip: &Tip, range: Range<u64>, progress: Progress<'_>) -> [Tally; 7
         Tally::new("F(d + 1 ulp) - F(d)", 1.0),
         Tally::new("d(F(d)) - d", round_trip_max),
     ];
-    // Four times half a unit of force as a squared length, in Q48, rounded up: what F(d) may have lost. A unit is d^2 =
-    // 2^-16 N / (pi Y); by the exact indentation at one unit, rounded up.
+    // F(d) is rounded by up to half a unit of force, 2^-16 N. As a change of d^2 that is half of 2^-16 N / (pi Y). Here it
+    // is four times that, in Q48 mm^2, from the indentation at one unit of force, rounded up.
     let first = i128::from(tip.indentation(newtons(1)).to_bits()) + 1;
     let four_lost = 2 * first * first;
     parallel(range, CHUNK, tallies, progress, |range, [force, radius, stiffness, peak, mean, step, back]| {

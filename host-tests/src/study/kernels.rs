@@ -34,9 +34,9 @@ impl Kernel {
 /// Method by which a kernel's errors are found.
 #[derive(Clone, Copy)]
 pub enum Measure {
-    /// One number from one or two, by the inputs and the exact result.
+    /// Absolute error of a function of one or two numbers: its inputs, and its exact result.
     Absolute(Section, Exact),
-    /// The same, where the error counts as a share of the result.
+    /// Relative error of such a function.
     Relative(Section, Exact),
     /// Sum and moments of a frame.
     Frames,

@@ -399,7 +399,7 @@ fn a_motion_is_refused_where_it_cannot_begin() {
     let mut bench = Bench::new();
     bench.capture.state = CaptureState::Recording;
     assert_eq!(all(&mut bench), [true, false, false], "the capture's memory is in use");
-    // The loop has not seen the jog yet: a motion would replace it, or the stop behind it.
+    // The loop has not taken the jog yet, nor the stop after it: another motion would replace them.
     let mut waits = Bench::new();
     let answers = [1, 2, 0, 1, 2, 0].map(|task| ask(&mut waits, task).is_ok());
     assert_eq!(answers, [true, false, true, false, false, true]);

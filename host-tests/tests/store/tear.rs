@@ -118,7 +118,7 @@ fn tear_saves(few: usize) -> usize {
     cases.sum()
 }
 
-/// The newest sector is nearly full: the start erases the older one.
+/// The sector with the newest record is nearly full, so that the next start erases the other sector.
 fn tear_erases(few: usize) -> usize {
     let mut sum = 0;
     let (older, _) = sector(SIZE, SLOTS, 1, Other::None);

@@ -56,7 +56,7 @@ pub struct Bench {
     encoder: i32,
     encoder_ns: u64,
     resets: usize,
-    pub grid_ns: u64,
+    grid_ns: u64,
     follows_frames: bool,
     frames: u64,
 }
@@ -192,6 +192,11 @@ impl Bench {
         if now_ns.is_multiple_of(LOG_NS) {
             self.log.drain(now_ns, host);
         }
+    }
+
+    /// Looks ahead to the next instant of the grid.
+    pub fn go_on(&mut self) {
+        self.next_ns = (self.next_ns / self.grid_ns + 1) * self.grid_ns;
     }
 
     /// Time of the next stop: the next instant of the grid, or an earlier one at which the host begins to send. A byte

@@ -292,7 +292,7 @@ impl Driver<Part> for Hall {
             if self.bench.next_ns >= self.until_ns && !self.halt(session, stop, host) {
                 return None;
             }
-            self.bench.next_ns = (self.bench.next_ns / self.bench.grid_ns + 1) * self.bench.grid_ns;
+            self.bench.go_on();
         }
         Some(self.bench.next_stop(session.board_mut(), stop.at))
     }

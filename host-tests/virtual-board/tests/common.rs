@@ -190,12 +190,12 @@ pub fn travel_mm(rig: &mut Rig) -> f64 {
     rig.world(|world| world.travel_mm()).expect("it runs")
 }
 
-/// Causes of the resets after an instant.
+/// Causes of all resets after a time, in their order.
 pub fn causes_since(rig: &mut Rig, from_ns: u64) -> Vec<String> {
     resets_since(rig, from_ns).into_iter().map(|(cause, _)| cause).collect()
 }
 
-/// Causes and times of the resets after an instant.
+/// Causes and times of all resets after a time, in their order.
 pub fn resets_since(rig: &mut Rig, from_ns: u64) -> Vec<(String, u64)> {
     let resets = rig.resets().expect("it runs").into_iter().filter(|reset| reset.at_ns > from_ns);
     resets.map(|reset| (reset.cause, reset.at_ns)).collect()

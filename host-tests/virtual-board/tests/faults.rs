@@ -25,7 +25,7 @@ fn a_defect_of_the_microcontroller_ends_without_torque() {
     a_slow_scan_that_stops_is_lost_frames_and_no_crash(rig);
     a_clock_that_fails_cuts_the_bridge_and_the_board_comes_up_without_torque(rig);
     crashes(rig, Fault::BusMemoryLost, 1);
-    // TIM5 is the frame guard, which control reads in every frame.
+    // TIM5 times the frame guard; the control task reads its counter in every frame.
     crashes(rig, Fault::BusError { from: 0x4000_0c00, to: 0x4000_1000 }, 2);
     a_store_below_ram_or_to_the_image_is_a_hard_fault_there_and_then(rig);
 }
@@ -202,11 +202,11 @@ fn what_is_stored_survives_a_reboot(rig: &mut Rig) {
     rig.check_gaps().expect("no unknown gap");
 }
 
-/// As a stack that runs over does, or a wild pointer.
+/// Such a store comes from a stack overflow or a wrong pointer.
 fn a_store_below_ram_or_to_the_image_is_a_hard_fault_there_and_then(rig: &mut Rig) {
     for address in [0x1fff_fffc, 0x0800_0000, 0x0803_fffc] {
         rig.inject(Fault::StoreAt(address)).expect("it runs");
-        // The board crashes again at each start, by the store before until now.
+        // Until the new address is in place, the board still crashes at each start by the one before.
         let from_ns = rig.now_ns() + 1_000_000;
         rig.run_ms(30).expect("it runs");
         let causes = causes_since(rig, from_ns);

@@ -16,9 +16,9 @@ const SMALL: f64 = 0.1;
 const HUBER: f64 = 2.0;
 /// Share of the root mean square of the residuals that their scale is at least.
 const OUTLIERS: f64 = 0.4;
-/// Share of the cost below which its fall in the last half of the rounds does not count.
+/// A cost that falls by less than this share in the second half of the rounds has reached its minimum.
 const FLAT: f64 = 0.01;
-/// Share of the scale below which a change of it does not count.
+/// The scale of the residuals is kept while it changes by less than this share.
 const STEADY: f64 = 0.05;
 /// Step of a parameter for its derivative.
 const NUDGE: f64 = 1e-5;
@@ -134,7 +134,7 @@ impl Problem<'_> {
         let (mut rounds, mut scale, mut halfway) = (0, 0.0, f64::MAX);
         loop {
             let residuals = residuals(self.paths, &at.p, self.law, &at.own);
-            // Kept once it hardly changes: a cost whose scale moves with the point has no least value.
+            // Kept once it hardly changes: costs by different scales cannot be compared.
             let now = self::scale(&residuals).max(self.least);
             if (now - scale).abs() > STEADY * scale {
                 (scale, halfway) = (now, f64::MAX);
@@ -152,7 +152,7 @@ impl Problem<'_> {
             loop {
                 rounds += 1;
                 if rounds > ROUNDS {
-                    // The bottom of a flat valley: what is left to gain says nothing about the motor.
+                    // The cost is flat around its minimum: a lower one would not change what is known of the motor.
                     return if halfway < (1.0 + FLAT) * before { Ok(at) } else { Err(NoDrive::Unsolved(ROUNDS)) };
                 }
                 let normal = Normal::new(&blocks, damping);

@@ -21,16 +21,17 @@ use std::f64::consts::TAU;
 #[test]
 fn a_scale_gives_the_factor() {
     let mut rng = fastrand::Rng::with_seed(3);
+    // The scale has a resolution of 5 mN.
     let mut held = [1.0, 2.0, 3.0, 4.0, 5.0].map(|read_n: f64| {
-        let shown_n = 1.1 * read_n * (1.0 + 0.004 * (rng.f64() - 0.5));
-        Held { shown_n: (shown_n / 0.005).round() * 0.005, read_n }
+        let true_n = 1.1 * read_n * (1.0 + 0.004 * (rng.f64() - 0.5));
+        Held { shown_n: (true_n / 0.005).round() * 0.005, read_n }
     });
     let plain = scale(&held).expect("a scale");
-    assert!((plain.factor.value - 1.1).abs() < 2.0 * plain.factor.sigma && plain.factor.sigma < 0.01, "{plain:?}");
+    assert!((plain.value - 1.1).abs() < 2.0 * plain.sigma && plain.sigma < 0.01, "{plain:?}");
     // One number misread by 1 N.
     held[2].shown_n += 1.0;
     let robust = scale(&held).expect("a scale");
-    assert!((robust.factor.value - 1.1).abs() < 0.02, "{robust:?}");
+    assert!((robust.value - 1.1).abs() < 0.02, "{robust:?}");
     assert!(scale(&[]).is_err() && scale(&[Held { shown_n: 5.0, read_n: 1.0 }]).is_err());
 }
 

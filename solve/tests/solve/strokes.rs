@@ -350,7 +350,7 @@ impl SimulatedDrive {
         }
     }
 
-    /// With these values, which the sheet has as well.
+    /// The drive with this torque constant (N m/A), resistance (Ohm) and inertia (kg m^2), which its data sheet states correctly.
     fn of_sheet(self, k: f64, winding_ohm: f64, inertia: f64) -> Self {
         let ohmmeter_ohm = winding_ohm + 0.7;
         Self { k, sheet_k: k, winding_ohm, ohmmeter_ohm, inertia, sheet_inertia: inertia, ..self }
@@ -464,7 +464,7 @@ impl Rig {
     }
 }
 
-/// Strokes on the emulated board whose fit ends in a flat valley: it went on until its rounds were over, and gave no drive.
+/// Strokes of the emulated board for which the cost of the fit is flat around its minimum. The fit once ran out of rounds.
 #[test]
 fn a_fit_with_nothing_left_to_gain_is_solved() {
     let strokes = record::strokes(include_bytes!("flat-valley.strokes"), &Params::DEFAULT).expect("strokes");

@@ -46,7 +46,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Staged<'_, ROWS, COLUMNS> {
     /// Requests a task of a measurement. A motion is refused while the request before it waits: it would replace a stop.
     pub(super) fn set_measure(&mut self, value: i64) -> Result<(), StatusError> {
         let task = Task::of(value as u8);
-        let waits = self.settings.command.measure_request != self.snapshot.status.taken.measure;
+        let waits = self.measure_waits();
         let command = &mut self.settings.command;
         command.measure_request = task.after(command.measure_request);
         // Its record needs the memory of a capture.

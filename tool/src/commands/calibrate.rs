@@ -121,7 +121,7 @@ fn scale(args: &Calibrate, modulus: &Modulus, procedure: &mut Procedure<'_>) -> 
             return procedure.without(HOLDS, why);
         }
     };
-    let (factor, part) = (scale.factor.value, scale.factor.relative());
+    let (factor, part) = (scale.value, scale.relative());
     let left = held.iter().map(|one| (factor * one.read_n / one.shown_n - 1.0).abs()).fold(0.0, f64::max);
     let parts = modulus.parts;
     let of_modulus = parts.residuals.hypot(parts.presses).hypot(parts.memory).hypot(part);
@@ -129,11 +129,11 @@ fn scale(args: &Calibrate, modulus: &Modulus, procedure: &mut Procedure<'_>) -> 
     let found = &mut procedure.found;
     found.row("modulus_pa", 1e3 * modulus.kpa * factor, Some(1e3 * modulus.kpa * factor * of_modulus));
     found.row("codes_per_kpa_milli", codes, Some(codes * part));
-    found.more.insert("scale".into(), json!({ "factor": factor, "sigma": scale.factor.sigma }));
+    found.more.insert("scale".into(), json!({ "factor": factor, "sigma": scale.sigma }));
     found.more.insert("remaining".into(), json!({ "force_percent": 100.0 * part, "worst_hold_percent": 100.0 * left }));
     found.notes.push(format!(
         "forces times {}; after that the worst held force differs from the scale by {:.1} %",
-        scale.factor,
+        scale,
         100.0 * left
     ));
     Ok(())

@@ -87,7 +87,7 @@ pub type Play = dyn FnMut(f64, f64) -> f64 + Send;
 /// Effect on a count of the encoder. It has no memory, as each read calls it.
 pub type Encoder = dyn FnMut(i32) -> i32 + Send;
 
-/// Stages as the finger calls them: of the named effects, of the plant, or of `()`, which has none.
+/// Stages as the finger calls them: of the named effects, or of the plant with its built-in defects.
 pub trait Stages {
     /// True if no stage has an effect: the finger then calls none.
     fn none(&self) -> bool {
@@ -129,8 +129,6 @@ pub trait Stages {
     /// Adds the state of the effects to the truth.
     fn tell(&self, _truth: &mut Truth) {}
 }
-
-impl Stages for () {}
 
 named! {
     inertia: Inertia,

@@ -8,7 +8,7 @@ use fingertip::link::packet::{CRC_START, HEADER, instruction, update_crc};
 /// Effect on packets from the host: time of arrival for a time of sending, s; none if the packet is lost.
 pub type Packets = dyn FnMut(f64) -> Option<f64> + Send;
 
-/// Stages as the board and the host call them: of the named effects, or of `()`, which has none.
+/// Stages as the board and the host call them: of the named effects, or none: `()`.
 pub trait Stages {
     /// Duration of a second of the controller in the world.
     fn second_s(&mut self, _time_s: f64) -> f64 {

@@ -49,7 +49,7 @@ pub type Volts = dyn FnMut(usize, f64, &mut Row) + Send;
 /// Effect on the codes of the converter before rounding: slot, time and codes as in [`Volts`].
 pub type Codes = dyn FnMut(usize, f64, &mut Row) + Send;
 
-/// Stages as the readout calls them: of the named effects, of the plant, or of `()`, which has none.
+/// Stages as the readout calls them: of the named effects, of the plant with its built-in defects, or none: `()`.
 pub trait Stages {
     /// True if no stage has an effect: the readout is then ideal and calls none.
     fn none(&self) -> bool {

@@ -141,7 +141,7 @@ pub fn calibrate(bench: &mut Bench<Named>, scene: &Scene) -> Result<Calibrated, 
     bench.rest(PAUSE_S);
     match solve::scale(&held) {
         Ok(scale) => {
-            let factor = scale.factor.value;
+            let factor = scale.value;
             params.codes_per_kpa_milli = (f64::from(params.codes_per_kpa_milli) / factor).round() as i32;
             params.modulus_pa = (f64::from(params.modulus_pa) * factor).round() as i32;
         }

@@ -58,7 +58,7 @@ fn the_wall_is_measured_and_ablated() {
     assert!(outcome.measured.get("fault_ms").is_none() && outcome.measured.get("slip_noticed_ms").is_none());
     assert!(outcome.passed(), "{}", outcome.text());
 
-    // An ablation shows what an effect changes.
+    // The run without an effect shows what that effect changes.
     let ablated = run::ablate(&scene, &native::board).unwrap();
     assert_eq!(ablated.iter().map(|without| without.effect).collect::<Vec<_>>(), ["row_sag"]);
     let rows = run::differences(&outcome.measured, &ablated);

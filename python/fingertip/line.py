@@ -177,7 +177,7 @@ class Line(PortHandler):  # type: ignore[misc]
             self.setPacketTimeout(0)
             self.packet_timeout += self._owed_ms - self.timeout_ms
             try:
-                self.packets.rxPacket(self, False)
+                self.packets.rxPacket(self, True)  # of any ID, also that of a Fast Sync Read
             except (_Babble, IndexError):
                 pass
 

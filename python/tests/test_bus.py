@@ -16,7 +16,7 @@ from fingertip import Bus
 bus = Bus(sys.argv[1], timeout_ms=60_000)
 for finger in [bus.finger(1), bus.finger(2)]:
     finger.tare()
-bus.press({1: 0.5, 2: 0.8})
+bus.press({1: 0.5, 2: 0.8}, 2.54)
 print("pressing", flush=True)
 """
 GO_ON = "while True: bus.states()"
@@ -176,6 +176,25 @@ class Group(OnServed):
                     child.send_signal(kill)
                 child.communicate()
                 self.assert_released(ids=[1, 2])
+                # By the program: no bus watchdog had to do it.
+                self.assertEqual([truth.mode for truth in self.served.truths().values()], ["Off", "Off"])
+
+    def test_after_an_interrupted_read_of_all_the_line_is_free_at_once(self) -> None:
+        bus = self.open_bus(tared=False)
+        read, is_over = bus.line.ser.read, bus.line.isPacketTimeout
+
+        def interrupted(length: int) -> bytes:
+            bus.line.ser.read = read
+            raise KeyboardInterrupt
+
+        def not_over() -> bool:
+            self.assertFalse(is_over(), "it waited for an answer that had come")
+            return False
+
+        bus.line.ser.read = interrupted
+        self.assertRaises(KeyboardInterrupt, bus.states)
+        bus.line.isPacketTimeout = not_over  # type: ignore[method-assign]
+        self.assertEqual(list(bus.states()), [1, 2])
 
     def test_killed_programs_leave_no_finger_pressing(self) -> None:
         child = self.python("-c", CHILD + GO_ON, self.served.port)

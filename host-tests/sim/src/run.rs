@@ -90,7 +90,9 @@ impl Outcome {
         let verdict = self.verdicts.iter().find(|verdict| verdict.bound.metric == name);
         verdict.map_or(String::new(), |verdict| {
             let asked = asked(verdict.bound.min, verdict.max);
-            format!("  {asked} asked: {}", if verdict.held { "held" } else { "BROKEN" })
+            // The goal that is closest to its limit may not be the one with the largest value.
+            let at_goal = verdict.bound.max_per_goal_n.map(|_| format!("{}, ", shown(verdict.value)));
+            format!("  {}{asked} asked: {}", at_goal.unwrap_or_default(), if verdict.held { "held" } else { "BROKEN" })
         })
     }
 }

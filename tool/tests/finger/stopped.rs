@@ -22,12 +22,15 @@ const MOTIONS: [(&[&str], &str); 4] = [
     (&["capture", "--press", "1", "--within-s", "3600", "--force", "--out"], "Force:"),
 ];
 
-/// Starts a command and waits until it is in the middle of its motion: a press until it presses.
+/// Starts a command and holds up its packets in the middle of its motion: those of a press while it presses.
 fn caught(finger: &Served, arguments: &[&str], mode: &str) -> Child {
     finger.done(&["tare"]);
-    let child = finger.start(&with_file(arguments, &finger.file("caught.mcap")));
-    finger.until(mode);
-    Served::wait_for(|| mode != "Press:" || finger.true_force_n() >= 0.5);
+    finger.command(&format!("stall at {mode} {}", if mode == "Press:" { 0.5 } else { -1.0 }));
+    let mut child = finger.start(&with_file(arguments, &finger.file("caught.mcap")));
+    while finger.command("stalled") != "true" {
+        assert!(child.try_wait().expect("it was started").is_none(), "{arguments:?} ended before {mode}");
+        std::thread::sleep(Served::LOOK);
+    }
     child
 }
 
@@ -46,6 +49,7 @@ fn a_signal_leaves_every_motion_at_rest_and_clear_of_the_object() {
             let parameters = finger.json(&["params", "get"]);
             let child = caught(&finger, arguments, mode);
             Served::signal(&child, signal);
+            finger.command("go on");
             let (code, said) = ended(&child.wait_with_output().expect("it ends"));
             if signal == Signal::KILL {
                 // The controller releases the object by itself once its bus is silent.

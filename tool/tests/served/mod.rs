@@ -46,6 +46,8 @@ struct Line {
     ears: Option<(u64, u64, u64)>,
     /// An instruction to all that comes as soon as the finger's state has this word.
     trap: Option<(String, u8)>,
+    /// A word of the finger's state and a force, N: the line stalls as soon as it has the word and presses so hard.
+    stall_at: Option<(String, f64)>,
     /// Packets on a line that stalls.
     stalled: Option<Vec<Vec<u8>>>,
     /// Number of packets before it restarts.
@@ -79,11 +81,13 @@ impl Told {
             ["deaf", "after", packets, "for", lost] => line.ears = Some((number(packets), number(lost), 0)),
             ["deaf", "no", "more"] => line.ears = None,
             ["stall"] => line.stalled = Some(Vec::new()),
+            ["stall", "at", word, force_n] => line.stall_at = Some((word.into(), force_n.parse().expect("a force"))),
             ["go", "on"] => line.stalled.take().into_iter().flatten().for_each(|bytes| self.native.0.hear(&bytes)),
             // These look on, and leave the finger's clock alone.
             ["look"] => return Some(self.native.command("state")),
             ["now"] => return Some(Ok(self.native.now_s().to_string())),
             ["heard"] => return Some(Ok(line.heard.to_string())),
+            ["stalled"] => return Some(Ok(line.stalled.is_some().to_string())),
             ["restarted"] => return Some(Ok(line.restart.is_none().to_string())),
             ["unheard"] => return Some(Ok(line.ears.map_or(0, |(.., unheard)| unheard).to_string())),
             _ => return None,
@@ -103,16 +107,21 @@ impl serve::Finger for Told {
         while let Ok((command, answer)) = self.commands.try_recv() {
             let done = self.told(&command).unwrap_or_else(|| self.native.command(&command));
             // What was broken or mended acts on the next frames; whoever asks then finds it so.
-            if !["look", "now", "heard"].contains(&command.as_str()) {
+            if !["look", "now", "heard", "stalled"].contains(&command.as_str()) {
                 (0..20).for_each(|_| self.native.0.frame());
             }
             answer.send(done).expect("somebody waits for it");
         }
-        let mut in_state = |word: &str| self.native.command("state").is_ok_and(|state| state.contains(word));
-        if let Some((_, number)) = self.line.trap.take_if(|(word, _)| in_state(word)) {
+        let line = &mut self.line;
+        let mut reached = |word: &str, force_n: f64| {
+            self.native.command("state").is_ok_and(|state| state.contains(word) && true_force_n(&state) >= force_n)
+        };
+        if line.stall_at.take_if(|(word, force_n)| reached(word, *force_n)).is_some() {
+            line.stalled = Some(Vec::new());
+        }
+        if let Some((_, number)) = line.trap.take_if(|(word, _)| reached(word, f64::NEG_INFINITY)) {
             self.native.0.hear(&instruction(number));
         }
-        let line = &mut self.line;
         let last_s = if line.patient { line.heard_s + PATIENT_S } else { f64::INFINITY };
         self.native.run_until(last_s.min(time_s - line.waited_s))?;
         // While it waits it keeps up, so that its server sleeps.
@@ -352,10 +361,13 @@ impl Served {
 
     /// Force at the first finger's tip, N: the truth, not what the controller senses.
     pub fn true_force_n(&self) -> f64 {
-        let state = self.command("look");
-        let force = state.split("true force ").nth(1).and_then(|rest| rest.split(' ').next());
-        force.and_then(|force| force.parse().ok()).unwrap_or_else(|| panic!("no force in {state}"))
+        true_force_n(&self.command("look"))
     }
+}
+
+fn true_force_n(state: &str) -> f64 {
+    let force = state.split("true force ").nth(1).and_then(|rest| rest.split(' ').next());
+    force.and_then(|force| force.parse().ok()).unwrap_or_else(|| panic!("no force in {state}"))
 }
 
 impl Drop for Served {

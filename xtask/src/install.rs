@@ -6,7 +6,7 @@
 use crate::console::Console;
 use crate::{host, sim};
 use anyhow::{Context, Result, bail, ensure};
-use std::fs;
+use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -14,8 +14,20 @@ use std::process::Command;
 const MIRROR: &str = "http://deb.debian.org/debian/";
 const KEYRING: &str = "/usr/share/keyrings/debian-archive-keyring.gpg";
 
+/// Waits until no other command installs; until the file is dropped, none begins.
+pub fn alone() -> Result<File> {
+    let lock = File::create(host::made("apt")?.join("lock")).context("cannot make the lock of installations")?;
+    lock.lock().context("cannot lock installations")?;
+    Ok(lock)
+}
+
 /// Makes sure of Debian packages.
 pub fn packages(names: &[&str], why: &str, console: &mut Console) -> Result<()> {
+    let _alone = alone()?;
+    add(names, why, console)
+}
+
+fn add(names: &[&str], why: &str, console: &mut Console) -> Result<()> {
     let missing: Vec<&str> = names.iter().copied().filter(|name| !installed(name)).collect();
     if missing.is_empty() {
         return Ok(());
@@ -49,6 +61,7 @@ pub fn newest(packages: &[&str], why: &str, console: &mut Console) -> Result<()>
     if !is_root() {
         bail!("{why} needs a recent `{list}`: run `sudo apt-get install -t {suite} {list}` and try again");
     }
+    let _alone = alone()?;
     console.say(&format!(
         "Installing the newest `{list}`, from {suite} where {codename} has an older one: {why} needs it. \
          Apt's sources stay as they are."
@@ -173,6 +186,7 @@ pub fn environment(environment: &Environment, console: &mut Console) -> Result<P
     let Environment { folder, packages, imports, does } = environment;
     let folder = host::target().join(folder);
     let python = folder.join("bin").join("python");
+    let _alone = alone()?;
     if has(&python, imports) {
         return Ok(python);
     }
@@ -181,7 +195,7 @@ pub fn environment(environment: &Environment, console: &mut Console) -> Result<P
     let make = || Command::new("python3").args(["-m", "venv", "--clear"]).arg(&folder).output();
     // Debian splits `venv` off Python, and may lack Python altogether.
     if !make().is_ok_and(|output| output.status.success()) {
-        self::packages(&["python3", "python3-venv"], "a Python environment", console)?;
+        add(&["python3", "python3-venv"], "a Python environment", console)?;
         let output = make().context("cannot start python3")?;
         ensure!(output.status.success(), "python3 -m venv: {}", String::from_utf8_lossy(&output.stderr));
     }

@@ -151,9 +151,15 @@ fn add_targets(targets: &[&str], why: &str, console: &mut Console) -> Result<()>
     if host::find_program("rustup").is_none() {
         bail!("there is no rustup in PATH");
     }
+    // Another command may have added them meanwhile.
+    let _alone = install::alone()?;
+    let targets: Vec<_> = targets.iter().copied().filter(|target| !has_target(target)).collect();
+    if targets.is_empty() {
+        return Ok(());
+    }
     let list = targets.join(", ");
     console.say(&format!("Adding rustup's target {list}: {why}."));
-    let added = console.prepare(Command::new("rustup").args(["target", "add"]).args(targets));
+    let added = console.prepare(Command::new("rustup").args(["target", "add"]).args(&targets));
     added.context("the Rust distribution server (static.rust-lang.org) gave no target")?;
     if !targets.iter().all(|target| has_target(target)) {
         bail!("rustup added {list} to another toolchain than the one that cargo takes");

@@ -93,7 +93,7 @@ pub fn page(choice: Choice, console: &mut Console) -> Result<String> {
     let mut list = String::new();
     for (number, core) in CORES.iter().enumerate() {
         let mut command = image::apart(toolchain, "build", LOOP, core.target, core.flags);
-        console.build(command.arg("--release"), &format!("the loop for {}", core.target), crate::console::IMAGE)?;
+        console.build(command.arg("--release"), &format!("the loop for {}", core.target))?;
         // Two boards have the same target and name.
         let elf = folder.join(format!("{number}.elf"));
         fs::copy(toolchain.images_for(core.target, core.flags).join("cores"), &elf)
@@ -114,7 +114,7 @@ pub fn example(choice: Choice, console: &mut Console) -> Result<()> {
     let toolchain = toolchain::ensure_for(choice, &[target], "the example for another board is built for it", console)?;
     let mut size = |features: &[&str]| {
         let mut command = image::apart(toolchain, "build", EXAMPLE, target, &[]);
-        console.build(command.arg("--release").args(features), EXAMPLE, crate::console::IMAGE)?;
+        console.build(command.arg("--release").args(features), EXAMPLE)?;
         Ok::<_, anyhow::Error>(Image::read(&toolchain.images_for(target, &[]).join("rp2040"))?.bytes.len())
     };
     let measures = size(&["--features", "fingertip/measure"])?;

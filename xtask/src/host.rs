@@ -1,6 +1,6 @@
 //! This machine: its paths, and programs of the workspace that run here, built with a line of progress, then started.
 
-use crate::console::{self, Console, EMULATOR, HOST};
+use crate::console::{self, Console};
 use anyhow::{Context, Result};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -59,8 +59,7 @@ impl Program {
     pub fn build(&self, console: &mut Console) -> Result<Command> {
         let mut command = cargo("build", self.package);
         command.args(["--bin", self.name]).args(self.with);
-        let slow = if self.package == BOARD.package { EMULATOR } else { HOST };
-        console.build(&mut command, self.name, slow)?;
+        console.build(&mut command, self.name)?;
         Ok(Command::new(target().join(PROGRAMS).join(self.name)))
     }
 }
@@ -81,7 +80,7 @@ pub fn cargo(subcommand: &str, package: &str) -> Command {
 /// Builds one of the examples, and returns the command that starts it.
 pub fn example(name: &str, console: &mut Console) -> Result<Command> {
     let mut build = cargo("build", "host-tests");
-    console.build(build.arg("--package=sim").args(SHARED).args(["--example", name]), name, HOST)?;
+    console.build(build.arg("--package=sim").args(SHARED).args(["--example", name]), name)?;
     Ok(Command::new(target().join(PROGRAMS).join("examples").join(name)))
 }
 
@@ -99,7 +98,7 @@ pub fn test(command: &mut Command, console: &mut Console) -> Result<()> {
     // What follows `--` is for the tests.
     build.args(command.get_args().take_while(|word| *word != "--").filter(|word| *word != "--no-fail-fast"));
     build.arg("--no-run");
-    console.build(&mut build, "the tests", EMULATOR)?;
+    console.build(&mut build, "the tests")?;
     console.run(command)
 }
 

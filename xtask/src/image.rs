@@ -1,7 +1,7 @@
 //! Images for the microcontroller: built, laid out as the bytes that the flash gets, and held against their limits of flash
 //! and static RAM.
 
-use crate::console::{Console, IMAGE};
+use crate::console::Console;
 use crate::host;
 use crate::toolchain::{self, Choice, Toolchain};
 use anyhow::{Context, Result, bail};
@@ -123,7 +123,7 @@ pub fn build(toolchain: Toolchain, name: &str, feature: &str, console: &mut Cons
 }
 
 fn built(command: &mut Command, toolchain: Toolchain, name: &str, console: &mut Console) -> Result<PathBuf> {
-    console.build(command, &format!("the image {name}"), IMAGE)?;
+    console.build(command, &format!("the image {name}"))?;
     Ok(toolchain.images().join(name))
 }
 

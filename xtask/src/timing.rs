@@ -1,7 +1,7 @@
 //! Estimated cycles on a Cortex-M4F: an image under QEMU with the timing plugin. `docs/timing.md` says what they are
 //! worth.
 
-use crate::console::{self, Console, IMAGE};
+use crate::console::{self, Console};
 use crate::host::{self, Program};
 use crate::toolchain::{self, Choice, Toolchain};
 use crate::{image, install};
@@ -150,7 +150,7 @@ fn version() -> Option<u32> {
 
 fn plugin(console: &mut Console) -> Result<PathBuf> {
     let mut command = host::cargo("build", "m4-timing");
-    console.build(command.args(["--features", "plugin"]), "the timing plugin", console::HOST)?;
+    console.build(command.args(["--features", "plugin"]), "the timing plugin")?;
     let file = host::target().join(host::PROGRAMS).join(format!("{DLL_PREFIX}m4_timing{DLL_SUFFIX}"));
     fs::canonicalize(&file).with_context(|| host::shown(&file))
 }
@@ -234,7 +234,7 @@ fn build_quick(toolchain: Toolchain, console: &mut Console) -> Result<PathBuf> {
     let flags = ["-C", "opt-level=3"].map(String::from).into_iter().chain(toolchain::short_paths());
     // Flags may hold blanks: a separator that no path has.
     command.env("CARGO_ENCODED_RUSTFLAGS", flags.collect::<Vec<_>>().join("\u{1f}"));
-    console.build(&mut command, "the study, as quick as can be", IMAGE)?;
+    console.build(&mut command, "the study, as quick as can be")?;
     Ok(toolchain.images().with_file_name(STUDY_PROFILE).join(STUDY))
 }
 

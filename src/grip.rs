@@ -234,7 +234,7 @@ fn sensed(contact: &Contact, touch: &Touch, motion: &SpeedLoop, config: &Config,
     Millimetres(sensed)
 }
 
-/// Returns the largest speed from which a shorted motor stops before the force is above 1.3 times the goal and 0.4 N:
+/// Returns the largest speed from which a shorted motor stops before the force is above 1.3 times the goal plus 0.4 N:
 /// it would roll out by v / c, and the contact shortens that by a fifth.
 #[inline(always)]
 fn stopping_speed(goal: Newtons, sensed: Millimetres, config: &Config) -> MillimetresPerSecond {

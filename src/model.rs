@@ -291,7 +291,7 @@ const fn mul_high(x: u64, y: u64) -> u64 {
     x1 * y1 + (middle >> 32) + (other >> 32)
 }
 
-/// A quotient rounded down; 0 when the denominator is, which no caller's is: so it has no panic to prove absent.
+/// Quotient, rounded down. A denominator of 0, which no caller passes, gives 0 instead of a panic.
 const fn quotient(numerator: u64, denominator: u64) -> u64 {
     match numerator.checked_div(denominator) {
         Some(quotient) => quotient,

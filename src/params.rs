@@ -129,9 +129,9 @@ params! {
     voltage_slew_mv_per_ms = 60_000 in 100..=1_000_000;
     /// Largest speed of the tip. At least approach_um_per_s.
     speed_max_um_per_s = 250_000 in 1_000..=2_000_000;
-    /// Speed of approach and release. At most speed_max_um_per_s.
+    /// Speed of approach, and of a release from an unsure contact. At most speed_max_um_per_s.
     approach_um_per_s = 30_000 in 500..=200_000;
-    /// Largest travel from where torque was first enabled.
+    /// Largest travel from where the motor was first driven.
     travel_max_um = 20_000 in 100..=100_000;
     /// Distance behind the surface to which a release goes.
     clearance_um = 1_000 in 0..=20_000;

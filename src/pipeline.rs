@@ -9,7 +9,7 @@
 //! | requests | `pipeline/activity.rs` | the command | tare, clear, another activity |
 //! | faults | `safety/monitor.rs`, `safety/guard.rs` | array, supply, bus; encoder, force, last g V | a fault, or none |
 //! | touch | `touch.rs` | force, travel | the surface, how well it is known, and a withheld force |
-//! | goal | `grip.rs`, `control.rs` | goal less force (Q16 N) | distance to go (Q24 mm), largest speed |
+//! | goal | `grip.rs`, `model.rs`, `control.rs` | goal and force (Q16 N), each as an indentation | distance to go (Q24 mm), largest speed |
 //! | law | `control.rs` | distance, speed, disturbance | requested g V (Q8 mm/s^2) |
 //! | limits | `control/drive.rs` | requested g V, supply (mV) | g V within slew, current and voltage; duty (Q15) |
 //! | last check | `safety/guard.rs` | duty | the duty, or 0 |
@@ -54,7 +54,7 @@ pub struct Pipeline<const ROWS: usize, const COLUMNS: usize> {
     tared: bool,
     /// Number of steps in a row that brought no new frame; none before the first step.
     repeated: Option<u32>,
-    /// True once the travel has its zero: the place where torque was first enabled.
+    /// True once the travel has its zero: the place where the motor was first driven.
     zeroed: bool,
     /// True once torque was off in a frame after which the array had a zero or was about to get one: torque may be
     /// enabled. Torque that has been on for longer drives nothing until it was off.
@@ -373,8 +373,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         }
     }
 
-    /// Checks a frame that is still being scanned; its later rows are older. Shorts the motor if its array
-    /// seems broken, and returns true. A taxel that fails just after it was read is seen a frame later; without this
+    /// Checks a frame that is still being scanned; its later rows are older. Returns true if its array seems broken: the
+    /// caller must then short the motor. A taxel that fails just after it was read is seen a frame later; without this
     /// check the motor would be driven until that frame's end. The step decides if it is a fault.
     pub fn check_part(&mut self, frame: &Frame<ROWS, COLUMNS>) -> bool {
         let broken = self.activity.drives()

@@ -1,4 +1,4 @@
-//! The frame budget: settle, sampling and conversion of every row, in one place.
+//! Timing of the scan: settling, sampling and conversion of every row.
 
 use crate::units::{CoreCycles, ScanTicks};
 

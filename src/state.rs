@@ -14,8 +14,8 @@
 //! Strokes are requested in off, with torque off; a press in approach, force or release. `pipeline/activity.rs` owns
 //! the state behind each mode.
 //!
-//! Torque off leads to off from every mode but fault. A requested tare leads to tare from every mode but fault, and
-//! from a fault that is cleared in the same frame. A fault (stop) is latched until it is cleared; a limit (a present
+//! Torque off ends approach, force, release and press: off follows, or fault 7 in a release for a silent bus. A tare is
+//! taken while nothing presses on the array, and with a fault that is cleared in the same frame. A fault (stop) is latched until it is cleared; a limit (a present
 //! restriction of the loop) sets and clears by itself. The numbers are stable: hosts may store them.
 
 /// Defines an enumeration with stable numbers, and the list of its values.
@@ -43,10 +43,10 @@ numbered! {
     /// Activity of the controller.
     #[derive(Default)]
     pub enum Mode {
-        /// The bridge is off.
+        /// The motor is not driven.
         #[default]
         Off = 0,
-        /// The zero of every taxel is being measured; the bridge is off.
+        /// The zero of every taxel is being measured; the motor is not driven.
         Tare = 1,
         /// Towards the object at the set speed.
         Approach = 2,
@@ -69,7 +69,7 @@ numbered! {
     pub enum Fault {
         /// No frame came within 1.75 frame times of the last one: the scan has stopped.
         LostFrames = 1,
-        /// More taxels are dead or saturated than allowed, or all together read far less than at the tare.
+        /// More taxels are dead or saturated than allowed, or their sum is far below that of the tare, or jumped up.
         ArrayBroken = 2,
         /// A column shows current with no row driven: a row is stuck on.
         RowStuck = 3,
@@ -121,11 +121,11 @@ impl Limits {
     pub const SPEED: u16 = 1 << 2;
     /// The goal is above the largest allowed force or below the smallest contact force, and was clamped to it.
     pub const GOAL: u16 = 1 << 3;
-    /// The travel's end is reached without contact.
+    /// The goal lies beyond the end of the travel: the way there is cut.
     pub const TRAVEL: u16 = 1 << 4;
     /// Some taxels are dead or saturated and are left out.
     pub const TAXELS: u16 = 1 << 5;
-    /// The array was never tared since reset.
+    /// The array has no tare.
     pub const NOT_TARED: u16 = 1 << 6;
     /// A frame was missed since the last step.
     pub const FRAME_MISSED: u16 = 1 << 7;

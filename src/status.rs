@@ -28,7 +28,7 @@ pub enum Taring {
     Running = 1,
     /// The tare is done.
     Done = 2,
-    /// The tare was refused or ended by a fault, or something was pressed: the zero before remains.
+    /// The tare was refused, and the zero before remains; or a fault ended it, and there is none.
     Refused = 3,
 }
 
@@ -57,13 +57,13 @@ pub struct Status {
     pub drift: Newtons,
     /// Temperature of the motor's winding, estimated from the current of the motor's model.
     pub winding: Celsius,
-    /// Tip travel from where torque was first enabled.
+    /// Tip travel from where the motor was first driven.
     pub travel: Millimetres,
     /// Tip speed by the observer.
     pub speed: MillimetresPerSecond,
     /// Duty that the step returned.
     pub duty: Duty,
-    /// True in off and tare while the tip still moves: the motor is shorted.
+    /// True while a motor that is not driven is shorted: in a fault, and in off and tare while the tip still moves.
     pub braking: bool,
     /// Progress of the motion that measures.
     pub measure: MeasureStatus,

@@ -35,7 +35,7 @@ const RESIDUE_ROUNDS: u32 = 256;
 /// Weights of the baseline, Q16: following drift (10,240 frames of ten rows), and the first round after a contact.
 const DRIFT_WEIGHT: u32 = 64;
 const FIRST_ROUNDS: u32 = 4;
-/// Frames that are counted: as many as the drift's weight needs, of 16 rows.
+/// Frames that are counted at most.
 const FRAMES_MAX: u32 = 1 << 16;
 
 /// Life cycle of a touch, see the table above.

@@ -111,7 +111,7 @@ impl ControlTask {
         self.save();
     }
 
-    /// Restarts the scan when its fault is to be cleared, with torque off. The next frame clears the fault.
+    /// Restarts the scan when its fault is to be cleared, with torque off. The next step clears the fault.
     fn find_frames(&mut self) {
         if !self.lost {
             return;

@@ -17,7 +17,7 @@ use fingertip::state::{Fault, Mode};
 use super::flash::SaveError;
 use super::guard::Stopwatch;
 
-/// Report of control after every step, and after every trip of the guard.
+/// Report of control: after every step, every trip of the guard, and every check of a partial frame that cut the motor off.
 #[derive(Clone, Copy, Default)]
 pub struct Report {
     /// Report of the pipeline.

@@ -80,7 +80,7 @@ pub fn now() -> u32 {
     pac::TIM5.cnt().read()
 }
 
-/// Starts the guard: it trips after `frames` frames and the time to answer them, from the instant `from`.
+/// Starts the guard: it trips `frames` times 1.75 frame times after the instant `from`.
 pub fn restart(from: u32, frames: u32, timing: ScanTiming) {
     let period = frames * Stopwatch::to_next_answer(timing).0;
     PERIOD.store(period, Ordering::Relaxed);
@@ -96,7 +96,7 @@ pub fn restart(from: u32, frames: u32, timing: ScanTiming) {
     }
 }
 
-/// Lets the guard rest until the next [`restart`], while no frames are to come and the bridge is off.
+/// Lets the guard rest until the next [`restart`], while no frames are to come and the motor is not driven.
 pub fn rest() {
     pac::TIM5.dier().write(|w| w.set_ccie(COMPARE_1, false));
 }

@@ -128,7 +128,7 @@ pub struct Step<const ROWS: usize, const COLUMNS: usize> {
     pub counts: [i32; 2],
     /// Number of frames in the sums.
     pub taken: u16,
-    /// True for a step of a way back.
+    /// True if the tip moved back.
     pub back: bool,
     /// Sum of the bridge's voltage, mV.
     pub voltage_mv: i32,
@@ -145,7 +145,7 @@ pub struct Step<const ROWS: usize, const COLUMNS: usize> {
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Step<ROWS, COLUMNS> {
-    /// Step without a frame.
+    /// Step of no frames.
     pub const NONE: Self = Self {
         frames: [0; 2],
         counts: [0; 2],
@@ -356,7 +356,7 @@ impl Press {
         Millimetres::from_bits(self.touch.to_bits().saturating_sub(BEFORE).max(rear))
     }
 
-    /// Returns true if one more taxel than in the air is bad.
+    /// Returns true once more taxels are bad than in the air for [`BAD_FRAMES`] frames.
     fn one_more_bad(&mut self, bad: u16) -> bool {
         if !matches!(self.phase, Phase::In(_) | Phase::Hold | Phase::Back(_)) {
             self.bad_before = self.bad_before.max(bad);

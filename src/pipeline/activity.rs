@@ -43,7 +43,7 @@ const REST_NS: u32 = 20_000_000;
 pub enum Activity {
     /// The motor is not driven: shorted until the tip is at rest, then open.
     Off(Halt),
-    /// The zero of every taxel is measured, with the bridge off. After a release the tip is known to be free: what
+    /// The zero of every taxel is measured; the motor is not driven. After a release the tip is known to be free: what
     /// the array reads is a residue.
     Tare {
         /// Braking of the motor.

@@ -28,8 +28,8 @@
 //!
 //! An object may lie off the array, or under an array that sees nothing. In steady motion through the air the motor
 //! works against friction alone. The force that the motor works against follows from the change of speed that the model
-//! expected and the encoder did not show. A mean of this force is kept; more than the mean by 1 N and the friction is a
-//! contact.
+//! expected and the encoder did not show. A mean of this force is kept. More than the mean by 3/8 of the goal (0.2 to
+//! 1 N) and the friction is a contact.
 
 use crate::config::Config;
 use crate::state::{Fault, Limits};

@@ -187,8 +187,8 @@ impl Monitor {
     }
 }
 
-/// Returns a fault for a broken array. The same taxels must be bad in two frames in a row, or half of them in one: a
-/// burst of interference in a frame is no fault.
+/// Returns a fault for a broken array. The same taxels must be bad in two frames in a row, or more than half of all in
+/// one: a burst of interference on a few taxels is no fault.
 pub fn array_broken<const ROWS: usize, const COLUMNS: usize>(
     picture: &TactileImage<ROWS, COLUMNS>,
     config: &Config,

@@ -11,18 +11,18 @@ use super::{Access, Kind, Register};
 pub const BLOCK: usize = 28;
 /// Number of bytes of both blocks.
 pub const COUNT: usize = 2 * BLOCK;
-/// The least address that they lead to: what lies below is stored, and identifies the device.
+/// Lowest address that they may lead to: the registers below are stored, or identify the device.
 pub(super) const TARGET_MIN: u16 = 64;
 
 /// Addresses of the blocks.
 pub(super) mod address {
-    /// Addresses of the first block.
+    /// Indirect addresses of the first block.
     pub const INDIRECT_ADDRESS_1: u16 = 168;
-    /// Bytes of the first block.
+    /// Data that the addresses of the first block lead to.
     pub const INDIRECT_DATA_1: u16 = 224;
-    /// Addresses of the second block.
+    /// Indirect addresses of the second block.
     pub const INDIRECT_ADDRESS_29: u16 = 400;
-    /// Bytes of the second block.
+    /// Data that the addresses of the second block lead to.
     pub const INDIRECT_DATA_29: u16 = 456;
 }
 

@@ -126,7 +126,7 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> TableView<'a, ROWS, COLUMNS> {
     }
 
     /// Returns the state of the tare. A request that the loop has not acknowledged counts as running: the status
-    /// still describes the tare before.
+    /// still describes the previous tare.
     pub(super) fn tare_state(&self) -> u32 {
         let waits = self.settings().command.tare_request != self.status().taken.tare;
         if waits { Taring::Running as u32 } else { self.status().tare as u32 }
@@ -149,7 +149,7 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> TableView<'a, ROWS, COLUMNS> {
     }
 }
 
-/// Makes a request: a change of the number.
+/// Makes a request by changing its number, unless 0 was written.
 pub(super) fn bump(request: &mut u8, value: i64) {
     *request = request.wrapping_add(u8::from(value != 0));
 }
@@ -175,7 +175,7 @@ pub(super) fn short(value: u32) -> u32 {
     value.cast_signed().max(i16::MIN.into()).min(i16::MAX.into()) as u32
 }
 
-/// Returns thousandths of the whole supply, rounded.
+/// Returns a duty in thousandths of the supply, rounded.
 pub(super) fn permille(duty: Duty) -> i32 {
     let full = i32::from(Duty::FULL);
     let duty = i32::from(duty.0);

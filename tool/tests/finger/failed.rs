@@ -17,7 +17,7 @@ fn the_exit_codes_are_those_of_the_documentation() {
     let table = page.split("| exit code |").nth(1).expect("the table");
     let mut codes = Vec::new();
     for row in table.lines().skip(2).take_while(|line| line.starts_with('|')) {
-        let finger = Served::begin("wall");
+        let finger = Served::patient("wall");
         finger.done(&["tare"]);
         let cells: Vec<&str> = row.trim_matches('|').split('|').collect();
         let code: i32 = cells[0].trim().parse().expect("a code");

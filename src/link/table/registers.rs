@@ -126,7 +126,7 @@ control_table! {
     293 BAD_TAXELS: U8 ReadOnly in 0..=100, |view, _| view.status().contact.bad_taxels.into();
     /// Share of the supply at the motor; positive presses.
     294 DUTY_PERMILLE: I16 ReadOnly "permille" in -1000..=1000, |view, _| permille(view.status().duty) as u32;
-    /// Tip travel from where torque was first enabled.
+    /// Tip travel from where the motor was first driven.
     296 TRAVEL_UM: I32 ReadOnly "um" in -128_000..=128_000, |view, _| micro(view.status().travel.0);
     /// Tip speed.
     300 SPEED_UM_PER_S: I32 ReadOnly "um/s" in -32_768_000..=32_768_000, |view, _| milli(view.status().speed.0);

@@ -99,7 +99,7 @@ pub(crate) fn clamp_bits(value: i32, bits: u32) -> i32 {
 
 /// Limits a number to 32 bits with one comparison, where `clamp` has two of 64 bits.
 #[inline(always)]
-fn held_wide(value: i64) -> i32 {
+pub(crate) fn held_wide(value: i64) -> i32 {
     let low = value as i32;
     if i64::from(low) == value { low } else { (value >> 63) as i32 ^ i32::MAX }
 }

@@ -111,8 +111,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         self.temperature_drift.observe(sense.chip, &self.config);
         self.monitor.watch_supply(sense, &self.config);
 
-        // The tactile image and the contact in it. A broken array shows none: the contact is then the last one's, and
-        // the motor gets no voltage by it.
+        // The tactile image and the contact in it. With a broken array a driven finger keeps the last
+        // contact, and the motor gets no voltage by it.
         self.array.read(frame, &self.config);
         let readable = monitor::array_readable(self.array.picture(), &self.config);
         let contact = self.contact(readable);

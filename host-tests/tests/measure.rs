@@ -324,6 +324,26 @@ fn a_stop_of_a_motion_that_waits_has_an_outcome_of_its_own() {
     assert_eq!(finger.frame().measure, MeasureStatus::over(Task::Stop, Ended::Interrupted, 0));
 }
 
+#[test]
+fn a_jog_waits_while_a_hand_moves_the_tip() {
+    let mut finger = Made::tared();
+    let mut moved = 0;
+    let mut modes = |frames: usize, counts: i32| -> Vec<Mode> {
+        let mode = |_| {
+            moved += counts;
+            finger.bench.step_with(|record| record.sense.encoder += moved).mode
+        };
+        let modes = (0..frames).map(mode).collect();
+        if finger.bench.command().measure_request == 0 {
+            finger.bench.request(Task::Jog);
+        }
+        modes
+    };
+    modes(100, 4);
+    assert!(modes(300, 4).iter().all(|mode| *mode == Mode::Off));
+    assert_eq!(modes(1_000, 0).last(), Some(&Mode::Strokes));
+}
+
 /// The host ends the record in the middle: the motion continues without a record, the next motion has one again.
 #[test]
 fn a_record_ended_by_the_host_is_whole() {

@@ -488,8 +488,11 @@ proptest! {
 fn any_run_keeps_to_the_rules_and_the_runs_come_everywhere() {
     let all = RefCell::new(Seen::default());
     let inputs = (any_params(), prop::bool::weighted(0.9), any_inputs(200));
-    let outcome = TestRunner::new(fixed(3 * CASES)).run(&inputs, |(params, tared, inputs)| {
+    let outcome = TestRunner::new(fixed(3 * CASES)).run(&inputs, |(params, tared, mut inputs)| {
         let mut run = Run::new(&params, tared);
+        // Jog and strokes begin with a tip at rest, so it is in some of the runs.
+        let rests = inputs.len().is_multiple_of(6);
+        inputs.iter_mut().filter(|_| rests).for_each(|input| input.turn = Turn::By(0));
         run.take(&inputs);
         for (all, seen) in all.borrow_mut().iter_mut().zip(run.seen) {
             all.extend(seen);

@@ -11,8 +11,8 @@ from typing import Any, Dict, Iterable, List, Mapping, Optional, Set, Type, Unio
 from . import registers as reg
 from .device import encoded
 from .finger import MODEL, PATIENCE_S, Finger, check_silence
-from .line import FingertipError, Line, NoAnswer, PortLost
-from .state import FIRST, Mode, Restarted, State, length
+from .line import DAMAGED, FingertipError, Line, NoAnswer, PortLost, Refused
+from .state import FIRST, Mode, State, length
 
 _RELEASE_S = 0.5  # longest wait for the release when a bus or the program ends
 _TRIES = 3  # on a noisy line
@@ -35,7 +35,7 @@ def _exit(number: int, frame: Any) -> None:
     sys.exit(128 + number)
 
 
-def _catch_signals() -> None:
+def catch_signals() -> None:
     """Makes SIGTERM and SIGHUP end the program as `sys.exit` does, unless the program handles them."""
     if threading.current_thread() is not threading.main_thread():
         return  # Python sets handlers in the main thread only
@@ -74,10 +74,11 @@ class Bus:
     def __exit__(self, kind: Optional[Type[BaseException]], why: Any, trace: Any) -> None:
         try:
             self.close()
-        except FingertipError:
+        except FingertipError as failed:
             if kind is None:
                 raise
-            # The exception that ended the block is reported instead.
+            # The exception that ended the block goes on.
+            print(f"fingertip: {failed}", file=sys.stderr)
 
     def close(self) -> None:
         """Releases the fingers, unless `leave_pressing`, and gives the port back.
@@ -86,16 +87,17 @@ class Bus:
         """
         if self._process != os.getpid():
             return  # a forked child: the fingers are its parent's
-        wrote = [device_id for device_id, finger in self.fingers.items() if finger.wrote]
-        # Any other exception, as Ctrl-C, leaves the port open: the exit of the program tries again.
-        try:
-            if wrote and not self._leave_pressing:
-                self.release(wrote, _RELEASE_S)
-            self.unwatch(self._silence_s)
-        except FingertipError:
+        with self.line.lock:  # no other thread presses again meanwhile
+            wrote = [device_id for device_id, finger in self.fingers.items() if finger.wrote]
+            # Any other exception, as Ctrl-C, leaves the port open: the exit of the program tries again.
+            try:
+                if wrote and not self._leave_pressing:
+                    self.release(wrote, _RELEASE_S)
+                self.unwatch(self._silence_s)
+            except FingertipError:
+                self._shut()
+                raise
             self._shut()
-            raise
-        self._shut()
 
     def _shut(self) -> None:
         with self.line.lock:
@@ -110,6 +112,7 @@ class Bus:
         """Notes that something is written to a finger: it may press because of this program."""
         finger.wrote = True
         _live.add(self)
+        catch_signals()
 
     def finger(self, device_id: int = 1) -> Finger:
         """The finger with this ID; raises `NoAnswer` if no device answers."""
@@ -184,7 +187,6 @@ class Bus:
     def watch(self, ids: Iterable[int], silence_s: Optional[float]) -> None:
         """Sets bus watchdogs, and feeds them from a thread until the fingers are released. None turns them off."""
         check_silence(silence_s)
-        _catch_signals()
         if silence_s is None:
             return self.unwatch(ids)
         with self.line.lock:
@@ -276,7 +278,8 @@ class Bus:
                     raise
                 except FingertipError as why:
                     failed[device_id] = why
-                    break
+                    if not isinstance(why, Refused) or why.number != DAMAGED:
+                        break
         return failed
 
     def _rest(self, ids: Iterable[int], within_s: float) -> Dict[int, FingertipError]:
@@ -288,27 +291,21 @@ class Bus:
         goals = list(missed)
         while missed and time.monotonic() < until:
             self._tell(reg.GOAL_FORCE_MN, dict.fromkeys(goals, 0))
-            goals, measuring = [], []
+            goals = []
             for device_id, state in self._look(missed).items():
-                if isinstance(state, FingertipError) and not isinstance(state, Restarted):
+                if isinstance(state, FingertipError):
                     missed[device_id] += 1
                     if missed[device_id] == _TRIES:
                         failed[device_id] = state
                         del missed[device_id]
                     continue
                 missed[device_id] = 0
-                if isinstance(state, FingertipError):
-                    del missed[device_id]  # it restarted: torque is off
-                elif state.mode == Mode.PRESS:
-                    measuring.append(device_id)  # the end of a press that measures releases, with the goal 0
-                    begun_s[device_id] = state.time_s
-                elif state.mode in _GRIPS and state.goal_n:
+                if state.mode == Mode.PRESS or state.mode in _GRIPS and state.goal_n:
                     goals.append(device_id)  # the first packet was lost: the release has not begun
                 elif state.time_s - begun_s.setdefault(device_id, state.time_s) > within_s:
                     del missed[device_id]
                 elif state.mode not in _GRIPS or _is_clear(state):
                     del missed[device_id]
-            self._tell(reg.MEASURE, dict.fromkeys(measuring, 0))
             if missed:
                 time.sleep(0.01)
         return failed

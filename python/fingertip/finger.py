@@ -44,13 +44,14 @@ class Finger(Device):
 
     def write_bytes(self, address: int, data: bytes, doing: str = "") -> None:
         """Writes whole registers side by side: all of it happens or nothing."""
-        wrote = self.wrote
-        self.bus.touch(self)
-        try:
-            super().write_bytes(address, data, doing)
-        except Refused:
-            self.wrote = wrote  # nothing was written: the finger may press for another program
-            raise
+        with self.line.lock:
+            wrote = self.wrote
+            self.bus.touch(self)
+            try:
+                super().write_bytes(address, data, doing)
+            except Refused:
+                self.wrote = wrote  # nothing was written: the finger may press for another program
+                raise
 
     def state(self, pressures: bool = True) -> State:
         """Reads state and time in one packet, with the pressures or without: that is five times as short.
@@ -99,8 +100,8 @@ class Finger(Device):
             time.sleep(max(0.0, due - time.monotonic()))
 
     def tare(self) -> None:
-        """Measures every taxel's zero, with torque off; nothing may touch the tip."""
-        self.write(reg.TORQUE_ENABLE, 0)
+        """Releases the object, turns torque off and measures every taxel's zero; nothing may touch the tip."""
+        self.stop()
         self.write(reg.TARE, 1)
         state = self.wait(reg.TARE_STATE, _TARING)
         if state != _TARED:
@@ -145,7 +146,7 @@ class Finger(Device):
         self.release(0.5)
 
     def recover(self) -> Fault:
-        """Clears the fault and returns it; torque is off then, and the goal 0."""
+        """Clears the fault and returns it; torque is off then, and the goal 0. Without a fault nothing changes."""
         fault = Fault(self.read(reg.FAULT))
         try:
             self.write(reg.RECOVER, 1)
@@ -153,8 +154,10 @@ class Finger(Device):
             hindrance = self.read(reg.RECOVER_HINDRANCE)
             words = {1: "the supply is low", 2: "the supply is high", 3: "too many taxels are bad", 4: "a save waits"}
             raise FingertipError(f"{fault.name} cannot be cleared: {words.get(hindrance, why)}") from why
+        if not fault:
+            return fault
         self.bus.unwatch([self.device_id])
-        if self.wait(reg.FAULT, int(fault)) if fault else 0:
+        if self.wait(reg.FAULT, int(fault)):
             raise FingertipError(f"{Fault(self.read(reg.FAULT)).name} is back: what causes it is still there")
         return fault
 

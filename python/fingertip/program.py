@@ -16,6 +16,7 @@ import sysconfig
 from pathlib import Path
 from typing import Any, Dict, Optional
 
+from .bus import catch_signals
 from .line import FingertipError
 
 _NAME = "fingertip.exe" if os.name == "nt" else "fingertip"
@@ -35,6 +36,7 @@ def run(*arguments: str, port: str, device_id: int = 1, within_s: Optional[float
 
     Raises `FingertipError` with the program's own words where it fails, and after `within_s`, with the finger stopped.
     """
+    catch_signals()  # with this program ends the one that it started
     command = [str(program()), "--json", "--port", port, "--id", str(device_id), *arguments]
     child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:

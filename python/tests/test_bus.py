@@ -1,6 +1,7 @@
 """Tests of several fingers on one bus."""
 
 import signal
+import threading
 import time
 from typing import Any, List
 
@@ -196,6 +197,54 @@ class Group(OnServed):
         bus.line.isPacketTimeout = not_over  # type: ignore[method-assign]
         self.assertEqual(list(bus.states()), [1, 2])
 
+    def test_a_signal_releases_what_plain_writes_began(self) -> None:
+        torque_and_goal = "finger.write(reg.TORQUE_ENABLE, 1); finger.write(reg.GOAL_FORCE_MN, 800)"
+        code = CHILD.split("bus.press")[0] + f"from fingertip import registers as reg; {torque_and_goal}\nprint(flush=True)\n"
+        child = self.python("-c", code + GO_ON, self.served.port)
+        assert child.stdout
+        child.stdout.readline()
+        while self.served.truths()[2].mode != "Force":
+            time.sleep(0.01)
+        child.terminate()
+        child.communicate()
+        self.assert_released(ids=[2])
+
+    def test_a_tare_releases_first_also_after_a_restart(self) -> None:
+        bus = self.pressing()
+        for finger in bus.fingers.values():
+            finger.tare()
+        self.assert_released(ids=[1, 2])
+        bus.line.exchange("reboot", 1, bus.line.packets.reboot)
+        bus.fingers[1].wait(reg.TARE_STATE, 2)  # tared
+        bus.fingers[1].write(reg.TARE, 1)
+        bus.fingers[1].wait(reg.TARE_STATE, 0, 1)
+        bus.press({1: 0.5}, LONG_S)
+        while self.served.truths()[1].mode != "Force":
+            time.sleep(0.01)
+        bus.release()
+        self.assert_released(ids=[1, 2])
+
+    def test_recover_without_a_fault_leaves_the_watchdog_on(self) -> None:
+        bus = self.pressing()
+        self.assertFalse(bus.fingers[1].recover())
+        self.assertGreater(bus.fingers[1].read(reg.BUS_WATCHDOG), 0)
+
+    def test_no_other_thread_presses_while_a_bus_is_closed(self) -> None:
+        bus = self.pressing()
+
+        def press() -> None:
+            try:
+                while True:
+                    bus.fingers[1].write(reg.GOAL_FORCE_MN, 800)
+            except FingertipError:
+                pass  # the bus is closed
+
+        thread = threading.Thread(target=press)
+        thread.start()
+        bus.close()
+        thread.join()
+        self.assert_released(ids=[1, 2])
+
     def test_killed_programs_leave_no_finger_pressing(self) -> None:
         child = self.python("-c", CHILD + GO_ON, self.served.port)
         assert child.stdout
@@ -209,8 +258,8 @@ class Group(OnServed):
         while any(truth.mode != "Fault" for truth in self.served.truths().values()):
             time.sleep(0.01)
         self.assert_released(ids=[1, 2])
-        with Bus(self.served.port) as bus:
-            self.assertEqual([bus.finger(one).recover() for one in bus.scan()], [Fault.BUS_SILENT] * 2)
+        with Bus(self.served.port, timeout_ms=PATIENT_MS) as bus:
+            self.assertEqual([bus.finger(one).recover() for one in [1, 2]], [Fault.BUS_SILENT] * 2)
 
 
 class Grasp(OnServed):

@@ -329,11 +329,14 @@ impl Strokes {
                 wanted.max(self.least(plan))
             }
         }
-        .min(of_supply(
-            view,
-            if matches!(self.part, Part::Go | Part::Stroke(_)) { STROKE_SUPPLY } else { PULSE_SUPPLY },
-        ));
+        .min(self.largest(view));
         self.phase = Phase::Moving;
+    }
+
+    /// Largest voltage: the direction may be wrong in a jog.
+    fn largest(&self, view: &StrokeInputs) -> i32 {
+        let strokes = self.task != Task::Jog && matches!(self.part, Part::Go | Part::Stroke(_));
+        of_supply(view, if strokes { STROKE_SUPPLY } else { PULSE_SUPPLY })
     }
 
     fn easiest(&self) -> i32 {
@@ -397,7 +400,7 @@ impl Strokes {
             self.short(view.encoder, Some((Ended::Pushed, force)));
         } else if gone < MOVED && self.frames > 3 * plan.span() {
             // In total no more than a stroke may take.
-            let most = of_supply(view, STROKE_SUPPLY).saturating_sub(self.voltage_uv).max(0);
+            let most = self.largest(view).saturating_sub(self.voltage_uv).max(0);
             self.more_uv = self.more_uv.saturating_add(plan.rise_uv);
             if self.more_uv > plan.feel_uv.min(most) {
                 self.short(view.encoder, Some((Ended::Pushed, plan.millinewtons(self.more_uv))));

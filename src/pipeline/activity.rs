@@ -272,12 +272,15 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     fn serve_measure(&mut self, command: &Command, encoder: i32, contact: &Contact) {
         let task = Task::of(command.measure_request);
         let may_drive = self.may_drive(command.tare_forced);
-        let waits = match (task, &self.activity) {
+        let waits = match (task, &mut self.activity) {
             (Task::Press, Activity::Tare { .. }) => command.torque,
             (Task::Press, Activity::Off(_) | Activity::Strokes(_)) => {
                 command.torque && self.takes_torque(command.tare_forced)
             }
-            (Task::Jog | Task::Strokes, Activity::Off(halt)) => !command.torque && may_drive && !halt.rests(),
+            (Task::Jog | Task::Strokes, Activity::Off(halt)) => {
+                let rests = halt.slow(&self.motion, &self.config) && halt.rests();
+                !command.torque && may_drive && !rests
+            }
             _ => false,
         };
         if waits {

@@ -31,6 +31,7 @@
 //! expected and the encoder did not show. A mean of this force is kept. More than the mean by 3/8 of the goal (0.2 to
 //! 1 N) and the friction is a contact.
 
+use crate::arith::held_wide;
 use crate::config::Config;
 use crate::state::{Fault, Limits};
 use crate::units::{Duty, Millimetres, Newtons};
@@ -219,16 +220,16 @@ impl Guard {
         let moved = self.travel.saturating_sub(before);
         self.force += (seen.force.to_bits().max(0) - self.force) >> FORCE_BITS;
         // Q24 mm in a frame to Q16 mm/s.
-        let speed = saturated((i64::from(moved) * i64::from(config.bounds.frames_per_s)) >> 8);
+        let speed = held_wide((i64::from(moved) * i64::from(config.bounds.frames_per_s)) >> 8);
         self.speed = towards(self.speed, speed, 4 * config.bounds.leak);
         self.slow_speed = towards(self.slow_speed, self.speed, config.bounds.leak);
 
         let pushed =
-            saturated((i64::from(seen.force.to_bits().max(0)) * i64::from(config.bounds.acceleration_per_n)) >> 16);
+            held_wide((i64::from(seen.force.to_bits().max(0)) * i64::from(config.bounds.acceleration_per_n)) >> 16);
         // Computed from the unfiltered speed: the delay of a filtered one would add up.
-        let back_emf = saturated((i64::from(speed) * i64::from(config.damping_q17_per_s)) >> 25);
+        let back_emf = held_wide((i64::from(speed) * i64::from(config.damping_q17_per_s)) >> 25);
         let acceleration = seen.given_q8_mm_per_s2.saturating_sub(back_emf).saturating_sub(pushed);
-        let gained = saturated((i64::from(acceleration) * i64::from(config.frame_s_q37)) >> 29);
+        let gained = held_wide((i64::from(acceleration) * i64::from(config.frame_s_q37)) >> 29);
         self.change = towards(self.change.saturating_add(gained), 0, config.bounds.leak);
         self.late_change = towards(self.late_change, self.change, 4 * config.bounds.leak);
     }
@@ -302,7 +303,7 @@ impl Guard {
             self.other_ns = 0;
             return None;
         }
-        let by_force = saturated((i64::from(force) * i64::from(config.bounds.change_per_n)) >> 18);
+        let by_force = held_wide((i64::from(force) * i64::from(config.bounds.change_per_n)) >> 18);
         let measured = self.speed.saturating_sub(self.slow_speed);
         let along = if self.late_change < 0 { measured.saturating_neg() } else { measured };
         if expected < config.bounds.change_least.saturating_add(by_force) || along >= expected >> NONE_BITS {
@@ -327,13 +328,6 @@ fn behind(surface: i32, config: &Config) -> i32 {
 fn towards(value: i32, goal: i32, share: i32) -> i32 {
     // At most half of 32 bits: it fits.
     value.saturating_add(((i64::from(goal.saturating_sub(value)) * i64::from(share)) >> 16) as i32)
-}
-
-/// Returns the nearest number of 32 bits.
-#[inline(always)]
-fn saturated(value: i64) -> i32 {
-    let low = value as i32;
-    if i64::from(low) == value { low } else { (value >> 63) as i32 ^ i32::MAX }
 }
 
 /// The mean follows a smaller force by 1/64 in each frame, a larger one by 1/8,192: a contact must not pass for
@@ -397,7 +391,7 @@ impl Unseen {
         // A finger without a goal measures.
         let contact = if goal > Newtons::ZERO { (goal.to_bits() / 8).saturating_mul(3) } else { MOST };
         let contact = i64::from(contact.max(LEAST).min(MOST)) * i64::from(config.bounds.change_per_n);
-        let contact = saturated(contact >> 16).saturating_add(config.bounds.change_free);
+        let contact = held_wide(contact >> 16).saturating_add(config.bounds.change_free);
         self.felt_ns = if self.more > contact { self.felt_ns.saturating_add(frame_ns) } else { 0 };
         (self.felt_ns > FELT_NS).then_some(Fault::Unseen)
     }
@@ -413,7 +407,7 @@ impl Unseen {
     pub fn depth(&self, seen: i32, speed: i32, config: &Config) -> Millimetres {
         let more = self.more.saturating_sub(config.bounds.change_unsure);
         // Q16 mm/s over Q16 mm/s per N.
-        let felt = saturated((i64::from(more) << 16) / i64::from(config.bounds.change_per_n.max(1)));
+        let felt = held_wide((i64::from(more) << 16) / i64::from(config.bounds.change_per_n.max(1)));
         if self.steady_ns < STEADY_NS || felt <= seen.max(config.contact_on.to_bits()).saturating_mul(HIDDEN) {
             return Millimetres::ZERO;
         }

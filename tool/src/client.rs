@@ -277,8 +277,11 @@ impl Client {
     /// Waits until the line is silent where an answer may come yet: the protocol does not number its packets, so a late
     /// one would be taken for the next one.
     fn settle(&mut self) -> Result<(), Error> {
-        if std::mem::take(&mut self.owed) {
-            while !self.line.read(self.timeout).map_err(|why| self.lost(why))?.is_empty() {}
+        // A line that babbles does not fall silent.
+        let until = Instant::now() + 3 * self.timeout;
+        while std::mem::take(&mut self.owed) {
+            let heard = !self.line.read(self.timeout).map_err(|why| self.lost(why))?.is_empty();
+            self.owed = heard && Instant::now() < until;
         }
         Ok(())
     }

@@ -403,12 +403,24 @@ fn a_motion_is_refused_where_it_cannot_begin() {
     let mut waits = Bench::new();
     let answers = [1, 2, 0, 1, 2, 0].map(|task| ask(&mut waits, task).is_ok());
     assert_eq!(answers, [true, false, true, false, false, true]);
-    // Stopping is never refused.
-    for bench in [&mut Bench::new(), &mut faulted(), &mut bench] {
-        let before = bench.server.command().measure_request;
+    // Stopping is never refused, and a second stop changes nothing: it would hide the end of the motion.
+    for bench in [&mut Bench::new(), &mut faulted(), &mut bench, &mut waits] {
         assert_eq!(ask(bench, 0), Ok(()));
-        let after = bench.server.command().measure_request;
-        assert!(after != before && Task::of(after) == Task::Stop);
+        let stopped = bench.server.command();
+        assert_eq!((Task::of(stopped.measure_request), ask(bench, 0)), (Task::Stop, Ok(())));
+        assert_eq!(bench.server.command(), stopped);
+    }
+    // Torque off and a goal of 0 stop as well, also where the loop does not see them: on or another goal follows at once.
+    let [on, off] = [(address::TORQUE_ENABLE, &[1][..]), (address::TORQUE_ENABLE, &[0])];
+    let [goal, none] = [(address::GOAL_FORCE_MN, &[0, 2, 0, 0][..]), (address::GOAL_FORCE_MN, &[0; 4])];
+    for writes in [&[off, on][..], &[goal, none, goal]] {
+        let mut presses = Bench::new();
+        presses.write(on.0, on.1).expect("on");
+        ask(&mut presses, 3).expect("a press");
+        presses.status.taken.measure = presses.server.command().measure_request;
+        presses.status.mode = Mode::Press;
+        writes.iter().for_each(|(register, bytes)| presses.write(*register, bytes).expect("a write"));
+        assert_eq!(Task::of(presses.server.command().measure_request), Task::Stop, "{writes:?}");
     }
     let before = bench.server.command();
     assert_eq!(ask(&mut bench, 4), Err(4));

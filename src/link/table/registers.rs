@@ -48,7 +48,7 @@ control_table! {
     11 OPERATING_MODE: U8 TorqueOff in 0..=0 = 0, |_, _| 0, |_, _| Ok(());
     /// 1 enables the bridge; refused with a result error before direction_confirmed
     /// is 1 and before a tare was requested. A fault sets 0. 0 clears the goal, so
-    /// the next 1 waits for a new goal, and stops a commissioning.
+    /// the next 1 waits for a new goal, and stops a measuring motion.
     64 TORQUE_ENABLE: U8 ReadWrite in 0..=1 = 0, |view, _| view.settings().command.torque.into(), Staged::set_torque;
     /// Answered instructions: 0 only Ping, 1 also reads, 2 all.
     68 STATUS_RETURN_LEVEL: U8 ReadWrite in 0..=2 = 2, |view, _| view.settings().status_return_level.into(),
@@ -77,7 +77,7 @@ control_table! {
         |view, _| u32::from(view.snapshot.supply_mv.saturating_add(50) / 100);
 
     // The force loop: requests, state, and the state of the board.
-    /// Force to hold; 0 releases. Above force_max_mn: limit error. Below
+    /// Force to hold; 0 releases, and stops a measuring motion. Above force_max_mn: limit error. Below
     /// contact_on_mn: held as contact_on_mn, with limit 3. A fault and torque_enable
     /// 0 set it to 0. In a fault, other goals are refused with a result error.
     256 GOAL_FORCE_MN: I32 ReadWrite "mN" in 0..=150_000 = 0, |view, _| milli(view.settings().command.goal.0),

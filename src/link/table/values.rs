@@ -23,16 +23,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Staged<'_, ROWS, COLUMNS> {
         if on && (self.settings.watchdog_tripped || self.snapshot.faulted() || unconfirmed || !self.zeroed()) {
             return Err(StatusError::Result);
         }
-        let strokes = self.strokes();
-        let command = &mut self.settings.command;
-        command.torque = on;
-        if !on {
-            command.goal = Newtons::ZERO;
-            if strokes {
-                command.measure_request = Task::Stop.after(command.measure_request);
-            }
-        }
-        Ok(())
+        self.settings.command.torque = on;
+        if on { Ok(()) } else { self.set_newtons(Newtons::ZERO) }
     }
 
     /// Requests a tare: 2 forces torque to be allowed after it.
@@ -46,12 +38,26 @@ impl<const ROWS: usize, const COLUMNS: usize> Staged<'_, ROWS, COLUMNS> {
     /// Requests a task of a measurement. A motion is refused while the request before it waits: it would replace a stop.
     pub(super) fn set_measure(&mut self, value: i64) -> Result<(), StatusError> {
         let task = Task::of(value as u8);
-        let waits = self.measure_waits();
+        if task == Task::Stop {
+            self.stop_measure();
+            return Ok(());
+        }
+        // Its record needs the memory of a capture.
+        let kept = task != Task::Jog && self.snapshot.records();
+        if self.measure_waits() || kept {
+            return Err(StatusError::Result);
+        }
         let command = &mut self.settings.command;
         command.measure_request = task.after(command.measure_request);
-        // Its record needs the memory of a capture.
-        let kept = matches!(task, Task::Strokes | Task::Press) && self.snapshot.records();
-        if task != Task::Stop && waits || kept { Err(StatusError::Result) } else { Ok(()) }
+        Ok(())
+    }
+
+    /// Requests the end of a motion that measures, unless that was the last request anyway.
+    fn stop_measure(&mut self) {
+        let request = &mut self.settings.command.measure_request;
+        if Task::of(*request) != Task::Stop {
+            *request = Task::Stop.after(*request);
+        }
     }
 
     /// Sets the goal force: refused until a tripped watchdog is reset.
@@ -59,7 +65,15 @@ impl<const ROWS: usize, const COLUMNS: usize> Staged<'_, ROWS, COLUMNS> {
         if self.settings.watchdog_tripped {
             return Err(StatusError::Range);
         }
-        self.settings.command.goal = newtons(value as i32);
+        self.set_newtons(newtons(value as i32))
+    }
+
+    /// A goal of 0 also ends a motion that measures. The loop may not see torque off, if on follows at once.
+    fn set_newtons(&mut self, goal: Newtons) -> Result<(), StatusError> {
+        self.settings.command.goal = goal;
+        if goal == Newtons::ZERO {
+            self.stop_measure();
+        }
         Ok(())
     }
 

@@ -136,15 +136,22 @@ fn keep(args: &Args, client: &mut Client, interrupt: &Interrupt, json: bool) -> 
     report("armed; taring, nothing may touch the tip", json);
     client.set(address::TARE, 1)?;
     let until = Instant::now() + within;
-    // After a refused tare no capture begins, and a press would still use the old zero.
-    while client.again(|client| client.number(address::CAPTURE_STATE))? == ARMED && Instant::now() < until {
+    let begun = loop {
+        if client.again(|client| client.number(address::CAPTURE_STATE))? != ARMED {
+            break true;
+        }
+        if Instant::now() >= until || interrupt.came() {
+            break false;
+        }
+        // After a refused tare no capture begins.
         let state = client.again(|client| client.number(address::TARE_STATE))?;
         if state == Taring::Refused as i64 {
             client.again(|client| client.set(address::CAPTURE, 0))?;
             return Err(no_tare(state));
         }
-    }
-    if let Some(goal_mn) = args.press {
+    };
+    // Without a new tare a press would use the old zero.
+    if let Some(goal_mn) = args.press.filter(|_| begun) {
         // During the tare, so that the approach begins right after it.
         press::begin(goal_mn, client)?;
     }

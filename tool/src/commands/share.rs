@@ -2,7 +2,7 @@
 //!
 //! A thread for each client passes its instruction packets on, one at a time, and returns the answers to that client
 //! alone. The first client that writes commands until it leaves. Others read; where one of them writes goal 0 or torque
-//! off, it stops the finger and takes the command from that client. Packets of the commander, and writes, go before reads
+//! off, it stops the finger and takes the command from that client, whose other fingers are stopped once it leaves. Packets of the commander, and writes, go before reads
 //! of others: they wait for one exchange at most.
 
 use super::{Interrupt, aside, say, stop};
@@ -11,7 +11,7 @@ use crate::{Client, Error};
 use fingertip::link::Reply;
 use fingertip::link::packet::{BROADCAST, Event, HEADER, Packet, Receiver, Sender, StatusError, instruction};
 use fingertip::shipped::address;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -56,18 +56,19 @@ pub struct Args {
 /// The bus, and the client that commands on it.
 struct Bus {
     client: Client,
-    commander: Option<Commander>,
-    /// Clients whose finger another one stopped: they command no more.
-    stopped: BTreeSet<SocketAddr>,
+    commanders: BTreeMap<SocketAddr, Commander>,
 }
 
-/// The client that may write.
+/// A client that wrote.
 struct Commander {
-    from: SocketAddr,
+    /// Fingers that it wrote to, and nobody else after it: they are stopped once it leaves or is silent.
     ids: BTreeSet<u8>,
-    /// Shortest bus watchdog that it set, and its last packet.
-    watchdog: Option<Duration>,
+    /// Bus watchdogs that it set, by ID.
+    watchdogs: BTreeMap<u8, Duration>,
+    /// Instant of its last packet.
     heard: Instant,
+    /// True once another client stopped one of its fingers: it writes no more.
+    stopped: bool,
 }
 
 /// Serves until Ctrl-C, then stops what is still commanded.
@@ -81,7 +82,7 @@ pub fn run(args: &Args, reach: &Reach) -> Result<(), Error> {
     let address = listener.local_addr().map_err(cannot)?;
     say(format_args!("shares {} at tcp:{address}; Ctrl-C ends it", client.port));
     say(format_args!("next, in other terminals: fingertip --port tcp:{address} view"));
-    let bus = Arc::new(Mutex::new(Bus { client, commander: None, stopped: BTreeSet::new() }));
+    let bus = Arc::new(Mutex::new(Bus { client, commanders: BTreeMap::new() }));
     let (lost, losses) = channel();
     let shared = Arc::clone(&bus);
     std::thread::spawn(move || {
@@ -101,7 +102,10 @@ pub fn run(args: &Args, reach: &Reach) -> Result<(), Error> {
             ended = Err(why);
         }
     }
-    lock(&bus).end_command("`fingertip share` ends");
+    let mut bus = lock(&bus);
+    for from in bus.commanders.keys().copied().collect::<Vec<_>>() {
+        bus.end_command(from, "`fingertip share` ends");
+    }
     ended
 }
 
@@ -144,7 +148,7 @@ fn converse(mut stream: TcpStream, bus: &Mutex<Bus>, lost: &Outbox<Error>) {
             let packet = receiver.packet();
             let mut free = turn(bus, commands || !READS.contains(&packet.instruction));
             let answer = free.pass(from, &packet, &raw[begin..]);
-            commands = free.commander.as_ref().is_some_and(|commander| commander.from == from);
+            commands = free.commander() == Some(from);
             drop(free);
             raw.clear();
             match answer {
@@ -158,10 +162,8 @@ fn converse(mut stream: TcpStream, bus: &Mutex<Bus>, lost: &Outbox<Error>) {
         }
     }
     let mut bus = turn(bus, commands);
-    bus.stopped.remove(&from);
-    if bus.commander.as_ref().is_some_and(|commander| commander.from == from) {
-        bus.end_command("its client left");
-    }
+    bus.end_command(from, "its client left");
+    bus.commanders.remove(&from);
 }
 
 impl Bus {
@@ -170,44 +172,65 @@ impl Bus {
         if packet.instruction == instruction::STATUS {
             return Ok(Vec::new());
         }
+        // Reads of others would feed the watchdogs of a silent client.
         let slack = self.client.timeout;
-        let silent = |commander: &Commander| {
-            commander.from != from && commander.watchdog.is_some_and(|most| commander.heard.elapsed() > most + slack)
+        let silent = |(other, commander): (&SocketAddr, &Commander)| {
+            let most = commander.watchdogs.values().min();
+            (*other != from && most.is_some_and(|most| commander.heard.elapsed() > *most + slack)).then_some(*other)
         };
-        if self.commander.as_ref().is_some_and(silent) {
-            // Reads of others would feed its watchdog.
-            self.end_command("its client is silent");
+        for other in self.commanders.iter().filter_map(silent).collect::<Vec<_>>() {
+            self.end_command(other, "its client is silent");
         }
-        if self.commander.as_ref().is_none_or(|commander| commander.from != from) && is_stop(packet) {
-            let stopped = self.commander.take().map(|commander| commander.from);
-            self.stopped.extend(stopped);
+        let commander = self.commander();
+        if commander != Some(from) && is_stop(packet) {
+            if let Some(stopped) = commander.and_then(|other| self.commanders.get_mut(&other)) {
+                stopped.stopped = true;
+            }
         } else if !READS.contains(&packet.instruction) {
-            let new = || Commander { from, ids: BTreeSet::new(), watchdog: None, heard: Instant::now() };
-            let may = !self.stopped.contains(&from) && !covers(packet, address::BAUD_RATE);
-            let commander = if may { Some(self.commander.get_or_insert_with(new)) } else { None };
-            let Some(commander) = commander.filter(|commander| commander.from == from) else {
+            let stopped = self.commanders.get(&from).is_some_and(|commander| commander.stopped);
+            if stopped || commander.is_some_and(|other| other != from) || covers(packet, address::BAUD_RATE) {
                 return Ok(if packet.id == BROADCAST { Vec::new() } else { refusal(packet.id) });
+            }
+            let ids = targets(packet);
+            self.commanders.values_mut().for_each(|other| other.ids.retain(|id| !ids.contains(id)));
+            let new = || Commander {
+                ids: BTreeSet::new(),
+                watchdogs: BTreeMap::new(),
+                heard: Instant::now(),
+                stopped: false,
             };
-            commander.ids.extend(targets(packet));
+            let commander = self.commanders.entry(from).or_insert_with(new);
+            commander.ids.extend(ids);
             if covers(packet, address::BUS_WATCHDOG) {
+                commander.watchdogs.remove(&packet.id);
                 let set = packet.params.get(2).filter(|steps| **steps > 0);
-                let set = set.map(|steps| Duration::from_millis(20 * u64::from(*steps)));
-                commander.watchdog = set.map(|set| commander.watchdog.map_or(set, |shortest| shortest.min(set)));
+                let set = set.map(|steps| (packet.id, Duration::from_millis(20 * u64::from(*steps))));
+                commander.watchdogs.extend(set);
             }
         }
-        if let Some(commander) = self.commander.as_mut().filter(|commander| commander.from == from) {
+        if let Some(commander) = self.commanders.get_mut(&from) {
             commander.heard = Instant::now();
         }
         self.client.pass(raw, Some(packet.id).filter(|id| *id != BROADCAST), answers(packet))
     }
 
+    /// The client that may write.
+    fn commander(&self) -> Option<SocketAddr> {
+        self.commanders.iter().find(|(_, commander)| !commander.stopped).map(|(from, _)| *from)
+    }
+
     /// Ends the command of a client: what it left with torque on is released and stopped.
-    fn end_command(&mut self, why: &str) {
-        let Some(commander) = self.commander.take() else { return };
+    fn end_command(&mut self, from: SocketAddr, why: &str) {
+        let Some(commander) = self.commanders.get_mut(&from) else { return };
+        let ids = std::mem::take(&mut commander.ids);
+        commander.watchdogs.clear();
+        if !commander.stopped {
+            self.commanders.remove(&from);
+        }
         let own = self.client.id;
-        let all = commander.ids.contains(&BROADCAST);
+        let all = ids.contains(&BROADCAST);
         let found = if all { self.client.ping_all().unwrap_or_default() } else { Vec::new() };
-        for id in found.iter().map(|pong| pong.id).chain(commander.ids).filter(|id| *id != BROADCAST) {
+        for id in found.iter().map(|pong| pong.id).chain(ids).filter(|id| *id != BROADCAST) {
             self.client.id = id;
             match stop(&mut self.client) {
                 Ok(true) => aside(format_args!("ID {id} was stopped: {why}")),
@@ -236,11 +259,20 @@ fn stop(client: &mut Client) -> Result<bool, Error> {
     Ok(drives)
 }
 
-/// True if a packet only stops a finger.
+/// True if a packet only stops fingers.
 fn is_stop(packet: &Packet<'_>) -> bool {
-    STOPS.into_iter().any(|register| covers(packet, register))
-        && packet.params.len() > 2
-        && packet.params.iter().skip(2).all(|byte| *byte == 0)
+    let zero = |data: &[u8]| !data.is_empty() && data.iter().all(|byte| *byte == 0);
+    let stops = STOPS.iter().any(|register| packet.params.starts_with(&register.to_le_bytes()));
+    stops
+        && match (packet.instruction, packet.params) {
+            (instruction::WRITE, [_, _, data @ ..]) => zero(data),
+            // An ID and its data for each finger.
+            (instruction::SYNC_WRITE, [_, _, low, high, all @ ..]) => {
+                let length = usize::from(u16::from_le_bytes([*low, *high]));
+                !all.is_empty() && all.chunks(1 + length).all(|one| zero(&one[1..]))
+            }
+            _ => false,
+        }
 }
 
 /// True if a packet writes a register from its first byte on.

@@ -206,6 +206,37 @@ fn a_finger_of_a_group_is_stopped_once_its_commander_has_left() {
     assert_eq!(client.number(address::TORQUE_ENABLE).expect("it answers"), 1, "nobody commanded it");
 }
 
+/// Another client stops one of two, and reads the other one, which feeds its watchdog.
+#[test]
+fn the_other_fingers_of_a_stopped_commander_are_stopped_once_it_has_left() {
+    let finger = Served::patient("grasp");
+    let mut own = finger.client();
+    for id in [1, 2] {
+        own.id = id;
+        own.set(address::TARE, 1).expect("it obeys");
+        while own.number(address::TARE_STATE).expect("it answers") != 2 {}
+    }
+    drop(own);
+    let (broker, address) = broker(&finger, "127.0.0.1:0");
+    let shared = Shared { finger, broker, address };
+    let (mut first, mut second) = (shared.client(), shared.client());
+    for id in [1, 2] {
+        first.id = id;
+        first.set(address::TORQUE_ENABLE, 1).expect("it obeys");
+    }
+    let [low, high] = address::GOAL_FORCE_MN.to_le_bytes();
+    let none = packet(BROADCAST, instruction::SYNC_WRITE, &[low, high, 4, 0, 1, 0, 0, 0, 0]);
+    second.pass(&none, None, 0).expect("anyone stops");
+    second.id = 2;
+    assert_eq!(second.number(address::TORQUE_ENABLE).expect("it answers"), 1);
+    first.set(address::GOAL_FORCE_MN, 500).expect_err("it was stopped");
+    drop(first);
+    let begun = std::time::Instant::now();
+    while second.number(address::TORQUE_ENABLE).expect("it answers") != 0 {
+        assert!(begun.elapsed().as_secs() < 60, "{}", shared.finger.command("look"));
+    }
+}
+
 /// Each of their packets waits for nothing, for 4 s.
 #[test]
 fn clients_that_ask_an_absent_id_do_not_starve_a_press() {

@@ -1,6 +1,7 @@
 //! Parameters, turned once into the numbers that the loop works with.
 //!
-//! This module computes in single precision, only by + - * /, so the host and the target agree to the bit. `docs/control.md` gives the formulas and their reasons.
+//! This module computes in single precision, only by + - * /, so the host and the target agree to the bit.
+//! `docs/control.md` gives the formulas and their reasons.
 
 pub(crate) mod array;
 mod bounds;

@@ -106,7 +106,7 @@ proptest! {
         prop_assert_eq!(changes, 0, "it hunts");
         let last = last.expect("there were frames");
         // A fit level is sure to fit if the frame by the sums, the largest cost of the model and the margin for jumps fit
-        // into the usable time. With a contact, the frame by the sums is known only to the spread of the model's cost.
+        // into the usable time. With a contact, the frame by the sums is uncertain by the spread of the model's cost.
         let usable = Budget::usable(DEADLINE);
         let sure = |fit_level: FitLevel| {
             let blur = if contact { Budget::model_cycles(fit_level.lower()) } else { [0, 0] };

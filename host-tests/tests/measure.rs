@@ -324,6 +324,29 @@ fn a_stop_of_a_motion_that_waits_has_an_outcome_of_its_own() {
     assert_eq!(finger.frame().measure, MeasureStatus::over(Task::Stop, Ended::Interrupted, 0));
 }
 
+/// Nobody has confirmed the direction yet: no part of a jog has more than 8 % of the supply, its way back included.
+#[test]
+fn a_jog_keeps_to_its_share_of_the_supply() {
+    let mut completed = 0;
+    // Up to a friction from which the tip does not move.
+    for percent_of_friction in (100..=600).step_by(100) {
+        let mut setup = Setup::default();
+        setup.motor.friction_nm *= f64::from(percent_of_friction) / 100.0;
+        let mut finger = Made::of(&setup, &config());
+        finger.bench.command().tare_request += 1;
+        finger.frames(TARE_FRAMES + 2);
+        finger.begin(Task::Jog);
+        let mut most = 0;
+        while finger.frame().measure.state == MeasureState::Running {
+            most = finger.bench.status().duty.0.unsigned_abs().max(most);
+        }
+        completed += u32::from(finger.bench.status().measure.ended == Ended::Complete);
+        let percent = 100.0 * f64::from(most) / f64::from(Duty::FULL);
+        assert!((2.0..=8.0).contains(&percent), "friction of {percent_of_friction} %: {percent} % of the supply");
+    }
+    assert!((4..6).contains(&completed), "{completed} jogs");
+}
+
 #[test]
 fn a_jog_waits_while_a_hand_moves_the_tip() {
     let mut finger = Made::tared();

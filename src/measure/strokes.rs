@@ -333,7 +333,7 @@ impl Strokes {
         self.phase = Phase::Moving;
     }
 
-    /// Largest voltage: the direction may be wrong in a jog.
+    /// Largest voltage, uV. That of a jog is small, as its direction may be wrong.
     fn largest(&self, view: &StrokeInputs) -> i32 {
         let strokes = self.task != Task::Jog && matches!(self.part, Part::Go | Part::Stroke(_));
         of_supply(view, if strokes { STROKE_SUPPLY } else { PULSE_SUPPLY })

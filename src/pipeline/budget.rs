@@ -9,7 +9,7 @@ use crate::contact::FitLevel;
 use crate::units::CoreCycles;
 
 /// Number of frames over which the time is observed before the fit level rises. A refinement at the least fit level takes
-/// up to 17 of them.
+/// up to 17 frames.
 pub const WINDOW: u32 = 32;
 /// Largest number of windows to wait after a fall: 0.8 s at 10 kHz.
 pub const WAIT_MAX: u32 = 256;

@@ -8,7 +8,7 @@ const PLAIN: [&str; 18] = [
     "code", "codes", "counts", "cycles", "g", "mm", "mrad", "ms", "ns", "permille", "ppb", "ppm", "rad", "s", "turn",
     "ug", "um", "us",
 ];
-/// Other words of a unit's name, each with how it is shown.
+/// Other words of a unit's name, each with its printed form.
 const WORDS: [(&str, &str); 23] = [
     ("a", "A"),
     ("c", "degrees Celsius"),

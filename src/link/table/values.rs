@@ -24,7 +24,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Staged<'_, ROWS, COLUMNS> {
             return Err(StatusError::Result);
         }
         self.settings.command.torque = on;
-        if on { Ok(()) } else { self.set_newtons(Newtons::ZERO) }
+        if on { Ok(()) } else { self.take_goal(Newtons::ZERO) }
     }
 
     /// Requests a tare: 2 forces torque to be allowed after it.
@@ -65,11 +65,11 @@ impl<const ROWS: usize, const COLUMNS: usize> Staged<'_, ROWS, COLUMNS> {
         if self.settings.watchdog_tripped {
             return Err(StatusError::Range);
         }
-        self.set_newtons(newtons(value as i32))
+        self.take_goal(newtons(value as i32))
     }
 
     /// A goal of 0 also ends a motion that measures. The loop may not see torque off, if on follows at once.
-    fn set_newtons(&mut self, goal: Newtons) -> Result<(), StatusError> {
+    fn take_goal(&mut self, goal: Newtons) -> Result<(), StatusError> {
         self.settings.command.goal = goal;
         if goal == Newtons::ZERO {
             self.stop_measure();

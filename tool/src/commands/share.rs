@@ -2,8 +2,8 @@
 //!
 //! A thread for each client passes its instruction packets on, one at a time, and returns the answers to that client
 //! alone. The first client that writes commands until it leaves. Others read; where one of them writes goal 0 or torque
-//! off, it stops the finger and takes the command from that client, whose other fingers are stopped once it leaves. Packets of the commander, and writes, go before reads
-//! of others: they wait for one exchange at most.
+//! off, it stops the finger and takes the command from that client, whose other fingers are stopped once it leaves.
+//! Packets of the commander, and writes, go before reads of others: they wait for one exchange at most.
 
 use super::{Interrupt, aside, say, stop};
 use crate::client::Reach;

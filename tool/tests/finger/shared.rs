@@ -30,7 +30,10 @@ fn broker(finger: &Served, listen: &str) -> (Child, String) {
 
 impl Shared {
     fn begin(scene: &str) -> Self {
-        let finger = Served::patient(scene);
+        Self::of(Served::patient(scene))
+    }
+
+    fn of(finger: Served) -> Self {
         let (broker, address) = broker(&finger, "127.0.0.1:0");
         Self { finger, broker, address }
     }
@@ -184,16 +187,9 @@ fn who_was_stopped_does_not_take_the_command_from_who_stopped_it() {
 #[test]
 fn a_finger_of_a_group_is_stopped_once_its_commander_has_left() {
     let finger = Served::patient("grasp");
-    let mut own = finger.client();
-    for id in [1, 2] {
-        own.id = id;
-        own.set(address::TARE, 1).expect("it obeys");
-        while own.number(address::TARE_STATE).expect("it answers") != 2 {}
-    }
-    own.set(address::TORQUE_ENABLE, 1).expect("it obeys");
-    drop(own);
-    let (broker, address) = broker(&finger, "127.0.0.1:0");
-    let shared = Shared { finger, broker, address };
+    drop(finger.tared(1));
+    finger.tared(2).set(address::TORQUE_ENABLE, 1).expect("it obeys");
+    let shared = Shared::of(finger);
     let mut commander = shared.client();
     let [low, high] = address::TORQUE_ENABLE.to_le_bytes();
     let torque = packet(BROADCAST, instruction::SYNC_WRITE, &[low, high, 1, 0, 1, 1]);
@@ -210,15 +206,10 @@ fn a_finger_of_a_group_is_stopped_once_its_commander_has_left() {
 #[test]
 fn the_other_fingers_of_a_stopped_commander_are_stopped_once_it_has_left() {
     let finger = Served::patient("grasp");
-    let mut own = finger.client();
     for id in [1, 2] {
-        own.id = id;
-        own.set(address::TARE, 1).expect("it obeys");
-        while own.number(address::TARE_STATE).expect("it answers") != 2 {}
+        drop(finger.tared(id));
     }
-    drop(own);
-    let (broker, address) = broker(&finger, "127.0.0.1:0");
-    let shared = Shared { finger, broker, address };
+    let shared = Shared::of(finger);
     let (mut first, mut second) = (shared.client(), shared.client());
     for id in [1, 2] {
         first.id = id;

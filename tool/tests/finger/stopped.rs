@@ -225,11 +225,7 @@ fn one_packet_stops_all_fingers() {
     let both = |word: &str| finger.command("state").matches(word).count() == 2;
     let press = || {
         for id in [1, 2] {
-            let mut bus = finger.client();
-            bus.id = id;
-            bus.set(address::TARE, 1).expect("it obeys");
-            while bus.number(address::TARE_STATE).expect("it answers") != 2 {}
-            bus.set(address::TORQUE_ENABLE, 1).expect("it obeys");
+            finger.tared(id).set(address::TORQUE_ENABLE, 1).expect("it obeys");
         }
         while !both("Release:") {}
     };

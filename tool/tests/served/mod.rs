@@ -3,6 +3,7 @@
 
 use fingertip::link::packet::BROADCAST;
 use fingertip::link::packet::instruction::REBOOT;
+use fingertip::shipped::address;
 use fingertip_cli::Client;
 use fingertip_cli::client::{Reach, packet};
 use rustix::process::{Pid, Signal};
@@ -203,6 +204,15 @@ impl Served {
     /// A client of its own.
     pub fn client(&self) -> Client {
         client(&self.port)
+    }
+
+    /// A client of one finger of several, which is tared.
+    pub fn tared(&self, id: u8) -> Client {
+        let mut client = self.client();
+        client.id = id;
+        client.set(address::TARE, 1).expect("it obeys");
+        while client.number(address::TARE_STATE).expect("it answers") != 2 {}
+        client
     }
 
     /// Writes registers of one number.

@@ -174,14 +174,14 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     }
 
     /// Computes the contact in the tactile image. Before a tare the array's offsets look like a contact, so none is
-    /// reported.
+    /// reported, and none in a broken array.
     fn contact(&mut self, readable: bool) -> Contact {
         let fits = readable && self.activity.fits();
-        let contact = if !self.tared {
+        let contact = if !self.tared || !readable && !self.activity.drives() {
             Contact { bad_taxels: self.array.picture().bad_count.min(255) as u8, ..Contact::default() }
         } else if fits {
             self.fit.read(self.array.picture(), &self.config)
-        } else if readable || !self.activity.drives() {
+        } else if readable {
             contact::from_sums(self.array.picture(), &self.config)
         } else {
             self.status.contact
@@ -307,7 +307,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
                 run.observe(&view, &mut status.measure, config);
                 let voltage = config.push(run.voltage_mv());
                 if !run.running() {
-                    *activity = Activity::Off(Halt::BRAKES);
+                    (*activity, status.braking) = (Activity::Off(Halt::BRAKES), true);
                 }
                 return motion.apply_voltage(voltage, supply_mv, config, limits);
             }

@@ -19,7 +19,7 @@ pub fn markdown() -> String {
         Generated from `src/link/table/registers.rs` and `src/params.rs` by `{COMMAND}`: do not edit.\n\n\
         DYNAMIXEL Protocol 2.0; numbers are little-endian, signed ones two's complement. One read of {state_bytes} \
         bytes from {state} gets the whole state of the loop, all from one frame. A read takes 1 to {READ_MAX} bytes; \
-        gaps read 0. A write covers whole registers, and is done or refused as a whole.\n\n\
+        gaps read 0. A write covers whole registers, and is done or refused as a whole: write a stop alone.\n\n\
         **Access**: R read only; RW; RW-off writable with torque off; S writable with torque off, and kept in flash \
         after `save_parameters`; S-any the same, but writable at any time. A number is in the unit at the end of its \
         name, unless its row names a step.\n\n"
@@ -57,7 +57,10 @@ fn errors(page: &mut String) {
         (StatusError::Result, "understood, but not possible now"),
         (StatusError::Instruction, "no such instruction, or not under this ID"),
         (StatusError::Crc, "the packet arrived damaged"),
-        (StatusError::Range, "a value outside its register's range, or a goal after the bus watchdog has tripped"),
+        (
+            StatusError::Range,
+            "a value outside its register's range, or a goal above 0 after the bus watchdog has tripped",
+        ),
         (StatusError::Length, "wrong number of parameters, a part of a register written, a read too long"),
         (
             StatusError::Limit,

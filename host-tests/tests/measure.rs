@@ -7,6 +7,7 @@ use crate::common::*;
 use fingertip::capture::Ended as CaptureEnded;
 use fingertip::measure::press::{HOLDS_MS, PARTS, Press, PressInputs, ROWS_MAX, Step};
 use fingertip::measure::{BuiltIn, MeasureStatus};
+use fingertip::pipeline::Bridge;
 
 impl<const BYTES: usize> Recorded<BYTES> {
     /// 5 mm from the wall, not tared.
@@ -14,11 +15,11 @@ impl<const BYTES: usize> Recorded<BYTES> {
         Self::of(&Setup::default(), &config())
     }
 
-    /// Tared, torque off.
+    /// Tared, torque off, the tip at rest.
     fn tared() -> Self {
         let mut finger = Self::untared();
         finger.bench.command().tare_request += 1;
-        finger.frames(TARE_FRAMES + 2);
+        finger.frames(TARE_FRAMES + 200);
         finger
     }
 
@@ -338,8 +339,10 @@ fn a_jog_keeps_to_its_share_of_the_supply() {
         finger.begin(Task::Jog);
         let mut most = 0;
         while finger.frame().measure.state == MeasureState::Running {
+            assert_ne!(finger.bench.status().bridge(), Bridge::Open, "a moving tip is driven or braked");
             most = finger.bench.status().duty.0.unsigned_abs().max(most);
         }
+        assert_eq!(finger.bench.status().bridge(), Bridge::Brakes);
         completed += u32::from(finger.bench.status().measure.ended == Ended::Complete);
         let percent = 100.0 * f64::from(most) / f64::from(Duty::FULL);
         assert!((2.0..=8.0).contains(&percent), "friction of {percent_of_friction} %: {percent} % of the supply");
@@ -347,8 +350,13 @@ fn a_jog_keeps_to_its_share_of_the_supply() {
     assert!((4..6).contains(&completed), "{completed} jogs");
 }
 
+/// Fast, and as slowly as torque could be enabled.
 #[test]
 fn a_jog_waits_while_a_hand_moves_the_tip() {
+    [4, 1].into_iter().for_each(jog_on_a_tip_that_moves);
+}
+
+fn jog_on_a_tip_that_moves(counts: i32) {
     let mut finger = Made::tared();
     let mut moved = 0;
     let mut modes = |frames: usize, counts: i32| -> Vec<Mode> {
@@ -362,8 +370,8 @@ fn a_jog_waits_while_a_hand_moves_the_tip() {
         }
         modes
     };
-    modes(100, 4);
-    assert!(modes(300, 4).iter().all(|mode| *mode == Mode::Off));
+    modes(100, counts);
+    assert!(modes(300, counts).iter().all(|mode| *mode == Mode::Off));
     assert_eq!(modes(1_000, 0).last(), Some(&Mode::Strokes));
 }
 
@@ -415,6 +423,7 @@ fn unconfirmed() -> Made {
     let mut finger = Made::of(&Setup::default(), &allowed(Params::DEFAULT));
     finger.bench.tare();
     finger.bench.command().torque = false;
+    finger.frames(200);
     finger
 }
 

@@ -297,6 +297,8 @@ struct Run {
     clear_seen: u8,
     /// A force of at least a contact's was read since the last tare began.
     touched: bool,
+    /// Number of steps since the tip moved.
+    still: u32,
     seen: Seen,
 }
 
@@ -313,11 +315,13 @@ impl Run {
             before: Status::default(),
             clear_seen: 0,
             touched: false,
+            still: 0,
             seen: Seen::default(),
         };
         if tared {
             run.arguments.command.tare_request += 1;
-            for _ in 0..TARE_FRAMES + 2 {
+            // And at rest for longer than a jog needs.
+            for _ in 0..TARE_FRAMES + 25_000_000 / run.pipeline.config().timing.frame_ns {
                 run.arguments.frame.sequence += 1;
                 run.step();
             }
@@ -378,6 +382,7 @@ impl Run {
                 assert_eq!(status.tare, Taring::Refused, "a contact was held");
             }
         }
+        self.still = if status.travel == self.before.travel { self.still + 1 } else { 0 };
         let least = self.pipeline.config().contact_on;
         self.touched = status.mode != Mode::Tare && (self.touched || status.contact.force >= least);
         assert_eq!(status.tare == Taring::Running, status.mode == Mode::Tare);
@@ -387,7 +392,8 @@ impl Run {
             // For torque, for rest, or for the frame after the one in which a motion was interrupted.
             let torque = task == Task::Press && command.torque;
             let interrupted = was_running && status.measure.ended == Ended::Interrupted;
-            let rest = matches!(task, Task::Jog | Task::Strokes) && (self.before.braking || status.braking);
+            let rests = self.still > 20_000_000 / self.pipeline.config().timing.frame_ns + 2 && !self.before.braking;
+            let rest = matches!(task, Task::Jog | Task::Strokes) && !rests;
             assert!(torque || rest || interrupted, "{task:?} waits in {:?}", status.mode);
         } else if measures && task != Task::Stop && !was_running {
             assert_eq!(status.measure.task, task);
@@ -491,7 +497,7 @@ fn any_run_keeps_to_the_rules_and_the_runs_come_everywhere() {
     let outcome = TestRunner::new(fixed(3 * CASES)).run(&inputs, |(params, tared, mut inputs)| {
         let mut run = Run::new(&params, tared);
         // Jog and strokes begin with a tip at rest, so it is in some of the runs.
-        let rests = inputs.len().is_multiple_of(6);
+        let rests = inputs.len().is_multiple_of(5);
         inputs.iter_mut().filter(|_| rests).for_each(|input| input.turn = Turn::By(0));
         run.take(&inputs);
         for (all, seen) in all.borrow_mut().iter_mut().zip(run.seen) {

@@ -130,6 +130,18 @@ fn new_parameters_during_a_tare_begin_it_anew() {
 }
 
 #[test]
+fn new_parameters_do_not_hide_what_is_pressed() {
+    let mut board = Bench::default();
+    board.tare();
+    board.command().torque = false;
+    board.place_object(-0.8);
+    board.frames(100);
+    board.pipeline().configure(&config());
+    board.command().tare_request += 1;
+    assert_eq!(board.step().tare, Taring::Refused);
+}
+
+#[test]
 fn a_press_in_the_frame_of_a_fault_leaves_no_old_outcome() {
     for (spoil, fault) in EARLY_AND_LATE {
         let mut board = ready();

@@ -10,7 +10,7 @@ use super::snapshot::Snapshot;
 use super::table::{Staged, milli};
 use crate::capture::CaptureState;
 use crate::config::{ConfigError, Shaped};
-use crate::measure::Task;
+use crate::measure::{MeasureState, Task};
 use crate::params::Params;
 use crate::state::{Limits, Mode};
 use crate::units::Newtons;
@@ -35,6 +35,11 @@ impl<const ROWS: usize, const COLUMNS: usize> Snapshot<'_, ROWS, COLUMNS> {
     /// Returns true while frames are being kept for a capture.
     pub(super) fn records(&self) -> bool {
         self.capture.standing.state == CaptureState::Recording
+    }
+
+    /// Returns true while frames are being kept for a capture, or it waits for a tare.
+    pub(super) fn captures(&self) -> bool {
+        self.records() || self.capture.standing.state == CaptureState::Armed
     }
 
     /// Returns the obstacle to a recovery from a fault.
@@ -72,6 +77,11 @@ impl<const ROWS: usize, const COLUMNS: usize> Staged<'_, ROWS, COLUMNS> {
     /// Returns true if the loop has not taken the last request for a motion that measures, or for its end.
     pub fn measure_waits(&self) -> bool {
         self.settings.command.measure_request != self.snapshot.status.taken.measure
+    }
+
+    /// Returns true if a motion that measures runs, is about to, or is about to end.
+    pub fn measures(&self) -> bool {
+        self.measure_waits() || self.snapshot.status.measure.state == MeasureState::Running
     }
 
     /// Returns true if the motor jogs or makes strokes, or is about to.

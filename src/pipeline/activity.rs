@@ -104,45 +104,44 @@ impl Activity {
 
 /// Braking of a motor that is no longer driven: shorted until the tip is at rest, then open. An open bridge would let
 /// a pressed tip fly back, and a moving one run into the object.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct Halt {
     /// Travel at which the tip last moved.
     at: Millimetres,
-    /// Time since then while the motor is shorted, ns; none once the bridge is open.
-    still_ns: Option<u32>,
+    /// Time since then, ns.
+    still_ns: u32,
+    /// True once the bridge is open.
+    open: bool,
 }
 
 impl Halt {
     /// State of a motor at rest, with the bridge open.
-    pub const OPEN: Self = Self { at: Millimetres::ZERO, still_ns: None };
+    pub const OPEN: Self = Self { at: Millimetres::ZERO, still_ns: 0, open: true };
     /// A motor that was driven just now.
-    pub const BRAKES: Self = Self { at: Millimetres::ZERO, still_ns: Some(0) };
+    pub const BRAKES: Self = Self { at: Millimetres::ZERO, still_ns: 0, open: false };
 
-    /// Returns true if the tip is at rest and the bridge open.
+    /// Returns true if the tip is at rest.
     pub fn rests(&self) -> bool {
-        self.still_ns.is_none()
+        self.still_ns > REST_NS
     }
 
     /// Takes a frame. Returns true while the motor is shorted.
     pub fn brakes(&mut self, motion: &SpeedLoop, config: &Config) -> bool {
-        let Some(still_ns) = &mut self.still_ns else { return false };
         let travel = motion.observer.travel;
         let moved = travel.0.saturating_sub(self.at.0).saturating_abs().to_bits();
         if moved > REST.saturating_add(config.count.to_bits()) {
-            (self.at, *still_ns) = (travel, 0);
+            (self.at, self.still_ns) = (travel, 0);
         }
-        *still_ns = still_ns.saturating_add(config.timing.frame_ns);
-        if *still_ns > REST_NS {
-            self.still_ns = None;
-        }
-        self.still_ns.is_some()
+        self.still_ns = self.still_ns.saturating_add(config.timing.frame_ns);
+        self.open |= self.rests();
+        !self.open
     }
 
     /// Returns true if the tip is slow enough for the motor to be driven from here. A faster one is braked first.
     pub fn slow(&mut self, motion: &SpeedLoop, config: &Config) -> bool {
         let MillimetresPerSecond(speed) = motion.observer.speed;
         let slow = speed.saturating_abs() <= config.approach.0 / 2;
-        if !slow && self.still_ns.is_none() {
+        if !slow {
             *self = Self::BRAKES;
         }
         slow
@@ -232,7 +231,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
 
     /// Returns true if a tare that is requested now is measured.
     pub(crate) fn takes_tare(&self, forced: bool) -> bool {
-        let pressed = self.tared && self.touch.held() && !forced;
+        // New parameters begin the touch again: until the next frame the last contact shows what is pressed.
+        let unseen = self.touch.stage() == Stage::None && self.status.contact.force >= self.config.contact_on;
+        let pressed = self.tared && (self.touch.held() || unseen) && !forced;
         !pressed && !matches!(self.activity, Activity::LastRelease { .. } | Activity::Fault(_))
     }
 

@@ -85,6 +85,11 @@ fn sync_write_reaches_each_with_its_own() {
     assert_eq!(goals, [2000, 1, 0]);
     assert_eq!(devices[0].number(address::RANGE_ERRORS, 2), 1);
     assert_eq!(devices[0].number(address::LENGTH_ERRORS, 2), 1);
+    // One device twice: the later entry is written after the earlier one, also where that was refused.
+    for entries in ["00 01 04 00  01 D0 07 00 00  01 02 00 00 00", "00 01 04 00  01 00 00 00 40  01 03 00 00 00"] {
+        assert!(talk(&mut devices, &packet(BROADCAST, 0x83, &hex(entries))).is_empty());
+    }
+    assert_eq!(devices[0].number(address::GOAL_FORCE_MN, 4), 3);
 }
 
 #[test]

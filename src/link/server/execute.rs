@@ -150,9 +150,10 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> Exchange<'a, ROWS, COLUMNS> {
         self.commit(staged)
     }
 
-    /// Writes this device's entry of a Sync Write, whose entries have one address and length, or of a Bulk Write.
+    /// Writes this device's entries of a Sync Write, whose entries have one address and length, or of a Bulk Write. One
+    /// that is refused does not keep the next one, which may be a stop, from being written.
     fn write_listed(&mut self, instruction: u8, params: &[u8]) -> Result<(), StatusError> {
-        let (mut common, mut list) = (None, params);
+        let (mut common, mut list, mut written) = (None, params, Ok(()));
         if instruction == instruction::SYNC_WRITE {
             let (wanted, entries) = request(params)?;
             if !entries.len().is_multiple_of(usize::from(wanted.length) + 1) {
@@ -167,11 +168,11 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> Exchange<'a, ROWS, COLUMNS> {
             };
             let (data, rest) = rest.split_at_checked(usize::from(length)).ok_or(StatusError::Length)?;
             if id == self.state.settings.record.id {
-                return self.write(address, data);
+                written = written.and(self.write(address, data));
             }
             list = rest;
         }
-        Ok(())
+        written
     }
 
     /// Answers a read of several devices: now, after the device before this one in the list, or with its part of the

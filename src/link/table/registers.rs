@@ -60,7 +60,7 @@ control_table! {
     70 HARDWARE_ERROR_STATUS: U8 ReadOnly, |view, _| u32::from(hardware_error(view.status().fault));
     /// If the bus is silent for longer, the finger releases the object (0.5 s at most; torque off ends that
     /// at once) and stops with fault 7, whatever arrives then; 0 is off. Reads -1 after a trip until 0 is written; until then goals
-    /// are refused with a range error, as by X-series servos, and torque enable with a result error.
+    /// above 0 are refused with a range error, as by X-series servos, torque enable and motions with a result error.
     98 BUS_WATCHDOG: I8 ReadWrite "ms" * 20 in 0..=127 = 0, |view, _| view.watchdog(),
         Staged::set_watchdog;
     /// goal_force_mn at the address of an X-series servo's
@@ -229,8 +229,8 @@ control_table! {
     /// torque off and the tip in the air: at most 8 % of duty, 0.8 mm towards the
     /// object and back. 2 strokes of 0.7 mm to both sides, as 1 and with the direction
     /// confirmed. 3 two presses into a hard flat plate, with torque on. 0 stops.
-    /// Result error if these conditions are not met, while the request before waits, or
-    /// for a record (2, 3) during a capture. Reads 0.
+    /// Result error if these conditions are not met, while another motion runs or waits, or
+    /// for a record (2, 3) while a capture is armed or runs. Reads 0.
     4224 MEASURE: U8 ReadWrite in 0..=3 = 0, |_, _| 0, Staged::set_measure;
     /// Last requested motion: 0 none since reset, 1 running, 2 complete, 3 ended early.
     4225 MEASURE_STATE: U8 ReadOnly in 0..=3, |view, _| view.measure_state();

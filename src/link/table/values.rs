@@ -35,7 +35,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Staged<'_, ROWS, COLUMNS> {
         Ok(())
     }
 
-    /// Requests a task of a measurement. A motion is refused while the request before it waits: it would replace a stop.
+    /// Requests a task of a measurement. A motion is refused while another one runs or waits, or its end waits.
     pub(super) fn set_measure(&mut self, value: i64) -> Result<(), StatusError> {
         let task = Task::of(value as u8);
         if task == Task::Stop {
@@ -43,8 +43,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Staged<'_, ROWS, COLUMNS> {
             return Ok(());
         }
         // Its record needs the memory of a capture.
-        let kept = task != Task::Jog && self.snapshot.records();
-        if self.measure_waits() || kept {
+        let kept = task != Task::Jog && (self.snapshot.captures() || self.actions.capture == Some(true));
+        if self.settings.watchdog_tripped || self.measures() || kept {
             return Err(StatusError::Result);
         }
         let command = &mut self.settings.command;
@@ -52,17 +52,18 @@ impl<const ROWS: usize, const COLUMNS: usize> Staged<'_, ROWS, COLUMNS> {
         Ok(())
     }
 
-    /// Requests the end of a motion that measures, unless that was the last request anyway.
+    /// Requests the end of a motion that measures, unless there is none or that was the last request anyway.
     fn stop_measure(&mut self) {
+        let measures = self.measures();
         let request = &mut self.settings.command.measure_request;
-        if Task::of(*request) != Task::Stop {
+        if measures && Task::of(*request) != Task::Stop {
             *request = Task::Stop.after(*request);
         }
     }
 
-    /// Sets the goal force: refused until a tripped watchdog is reset.
+    /// Sets the goal force: above 0 it is refused until a tripped watchdog is reset.
     pub(super) fn set_goal(&mut self, value: i64) -> Result<(), StatusError> {
-        if self.settings.watchdog_tripped {
+        if self.settings.watchdog_tripped && value != 0 {
             return Err(StatusError::Range);
         }
         self.take_goal(newtons(value as i32))

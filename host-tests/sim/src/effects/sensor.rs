@@ -6,7 +6,7 @@
 
 mod floating;
 
-use crate::effects::{Description, Metered, NamedEffect, family_of, normal, normal_within_3};
+use crate::effects::{Description, Metered, NamedEffect, family_of, normal_within_3, normals};
 use crate::events::ArrayEvents;
 use crate::mechanics::decay;
 use crate::scene::Scene;
@@ -449,7 +449,8 @@ pub const EFFECTS: &[Description] = &[
             let rms_codes = build.number("rms_codes");
             let mut rng = build.rng();
             parts.sensor.codes.push(build.part(Box::new(move |_, _, codes| {
-                codes.iter_mut().for_each(|code| *code += rms_codes * normal(&mut rng));
+                let noise: Row = normals(&mut rng);
+                codes.iter_mut().zip(noise).for_each(|(code, noise)| *code += rms_codes * noise);
             })))
         },
     },

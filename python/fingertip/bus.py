@@ -3,9 +3,11 @@
 import atexit
 import os
 import signal
+import subprocess
 import sys
 import threading
 import time
+from multiprocessing.util import Finalize
 from typing import Any, Dict, Iterable, List, Mapping, Optional, Set, Type, Union
 
 from . import registers as reg
@@ -20,28 +22,43 @@ _CHUNK = 1000  # bytes of data in one Fast Sync Read, at most
 _GRIPS = [Mode.APPROACH, Mode.FORCE, Mode.RELEASE]
 _DRIVEN = [*_GRIPS, Mode.PRESS, Mode.STROKES]
 _live: "Set[Bus]" = set()  # those that wrote something
+children: "Set[subprocess.Popen[str]]" = set()  # programs that `run` waits for
 
 
 @atexit.register
 def _close_all() -> None:
+    # A second Ctrl-C must not interrupt the release.
+    handlers = {number: signal.signal(number, signal.SIG_IGN) for number in _signals("SIGINT", "SIGTERM", "SIGHUP")}
+    _end_children()
     for bus in list(_live):
         try:
             bus.close()
-        except FingertipError as why:
+        except BaseException as why:
             print(f"fingertip: {why}", file=sys.stderr)
+    for number, handler in handlers.items():
+        signal.signal(number, handler or signal.SIG_DFL)
+
+
+def _end_children() -> None:
+    for child in list(children):
+        child.terminate()  # it stops the finger
 
 
 def _exit(number: int, frame: Any) -> None:
+    _end_children()  # before `_close_all`, Python joins the threads that wait for them
     sys.exit(128 + number)
+
+
+def _signals(*names: str) -> List[signal.Signals]:
+    """Returns the signals that can be handled here: none outside of the main thread, and no SIGHUP on Windows."""
+    main = threading.current_thread() is threading.main_thread()
+    return [getattr(signal, name) for name in names if main and hasattr(signal, name)]
 
 
 def catch_signals() -> None:
     """Makes SIGTERM and SIGHUP end the program as `sys.exit` does, unless the program handles them."""
-    if threading.current_thread() is not threading.main_thread():
-        return  # Python sets handlers in the main thread only
-    for name in ["SIGTERM", "SIGHUP"]:
-        number = getattr(signal, name, None)
-        if number is not None and signal.getsignal(number) == signal.SIG_DFL:
+    for number in _signals("SIGTERM", "SIGHUP"):
+        if signal.getsignal(number) == signal.SIG_DFL:
             signal.signal(number, _exit)
 
 
@@ -67,6 +84,7 @@ class Bus:
         self._feeder: Optional[threading.Thread] = None
         self._absent: Set[int] = set()  # those that gave no answer last time
         self._process = os.getpid()
+        Finalize(None, _close_all, exitpriority=0)  # `multiprocessing` ends its processes without `atexit`
 
     def __enter__(self) -> "Bus":
         return self
@@ -150,13 +168,14 @@ class Bus:
         for goal_mn in goals.values():
             encoded(reg.GOAL_FORCE_MN, goal_mn)
         rest = [device_id for device_id, goal_mn in goals.items() if not self.finger(device_id).ready(goal_mn)]
+        self.watch(goals, silence_s)  # if refused, another client commands: to release would stop its fingers
         try:
-            self.watch(goals, silence_s)
             _check(self._set(reg.TORQUE_ENABLE, dict.fromkeys(goals, 1)))
+            self._tell(reg.GOAL_FORCE_MN, goals)
             _check(self._set(reg.GOAL_FORCE_MN, goals))
         except FingertipError:
             try:
-                self.release(rest, _RELEASE_S)
+                self.release([device_id for device_id in rest if self.fingers[device_id].wrote], _RELEASE_S)
             except FingertipError:
                 pass  # the first failure is more informative
             raise
@@ -263,8 +282,7 @@ class Bus:
             self.line.sync_write(register.address, register.width, data)
 
     def _set(self, register: reg.Register, values: Mapping[int, int]) -> Dict[int, FingertipError]:
-        """Writes a register of several fingers at once, then of each one with an answer. Returns the failures."""
-        self._tell(register, values if len(values) > 1 else {})
+        """Writes a register of each finger, with an answer. Returns the failures."""
         failed: Dict[int, FingertipError] = {}
         for device_id, value in values.items():
             for _ in range(1 if device_id in self._absent else _TRIES):

@@ -25,7 +25,6 @@ _BROADCAST = 254
 _TCP, _BUSY = "tcp:", b"busy: "
 _POLL_S = 0.01  # longest wait for bytes before the time-out is looked at
 _WRITE_S = 5.0  # longest wait until the port takes a packet
-_LATE_MS = 100.0  # longest wait for an answer that is later than the time-out
 _PACKET_MAX = 1024  # bytes of the longest packet that the SDK takes
 # A Sync Write for no device. It is a broadcast: it feeds the watchdog of every controller, and none answers.
 _KEEP_ALIVE = bytes([0xFF, 0xFF, 0xFD, 0, _BROADCAST, 7, 0, 0x83, 0, 0, 0, 0])
@@ -79,7 +78,7 @@ class Line(PortHandler):  # type: ignore[misc]
         self.timeout_ms = timeout_ms  # beyond the SDK's: a controller behind USB or on a busy machine may be late
         self.feed_s: Optional[float] = None  # time between two keep-alive packets; None: no watchdog is on
         self._fed_s = 0.0
-        self._owed_ms: Optional[float] = None  # longest time until a late answer; None: none is due
+        self._owed = False  # an answer may still come
         self._heard, self._again = b"", b""  # bytes of this exchange, and those to be read a second time
         self._looked, self._beyond = False, 0  # after the time-out: looked at the port once more, bytes since then
         crc = self.packets.updateCRC(0, _KEEP_ALIVE, len(_KEEP_ALIVE))
@@ -153,9 +152,9 @@ class Line(PortHandler):  # type: ignore[misc]
                 self.keep_alive()
                 self.is_using = False  # Ctrl-C may have ended the exchange before
                 came, result = action()
-                self._owed_ms = None if result == COMM_SUCCESS else min(_LATE_MS, self.timeout_ms)
+                self._owed = result != COMM_SUCCESS
             except (_Babble, IndexError, serial.SerialTimeoutException):
-                self._owed_ms = min(_LATE_MS, self.timeout_ms)  # too short a packet in junk, or bytes not sent
+                pass  # too short a packet in junk, or bytes not sent
             except PortLost:
                 self.closePort()
                 raise
@@ -168,15 +167,14 @@ class Line(PortHandler):  # type: ignore[misc]
         return came
 
     def _settle(self) -> None:
-        """Waits for an answer that is still owed: the protocol does not number its packets.
+        """Waits once more for an answer that is still owed, as long as before: the protocol does not number its packets.
 
         Without this, the late answer would be taken for the next one. Ctrl-C may have ended the exchange before with a
         part of the answer read.
         """
-        if self._owed_ms is not None:
+        if self._owed:
             self._again = self._heard
             self.setPacketTimeout(0)
-            self.packet_timeout += self._owed_ms - self.timeout_ms
             try:
                 self.packets.rxPacket(self, True)  # of any ID, also that of a Fast Sync Read
             except (_Babble, IndexError):
@@ -184,7 +182,7 @@ class Line(PortHandler):  # type: ignore[misc]
 
     def expect_another(self) -> None:
         """The answer that came was another one's: the right one is still owed."""
-        self._owed_ms, self._heard = self.timeout_ms, b""
+        self._owed, self._heard = True, b""
 
     # The SDK calls the following methods.
 
@@ -236,7 +234,7 @@ class Line(PortHandler):  # type: ignore[misc]
         return data
 
     def writePort(self, packet: Any) -> int:
-        self._owed_ms, self._heard, self._again = self.timeout_ms, b"", b""
+        self._owed, self._heard, self._again = True, b"", b""
         return int(self.ser.write(packet))
 
     def getCurrentTime(self) -> float:

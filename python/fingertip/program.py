@@ -16,7 +16,7 @@ import sysconfig
 from pathlib import Path
 from typing import Any, Dict, Optional
 
-from .bus import catch_signals
+from .bus import catch_signals, children
 from .line import FingertipError
 
 _NAME = "fingertip.exe" if os.name == "nt" else "fingertip"
@@ -35,10 +35,13 @@ def run(*arguments: str, port: str, device_id: int = 1, within_s: Optional[float
     """Runs a command of the program to its end and returns its JSON; `docs/host.md` lists the commands.
 
     Raises `FingertipError` with the program's own words where it fails, and after `within_s`, with the finger stopped.
+    The end of this program ends the one that it started. For SIGTERM and SIGHUP, this needs a call in the main thread, or
+    a write to a finger there before: Python sets handlers in the main thread only.
     """
-    catch_signals()  # with this program ends the one that it started
+    catch_signals()
     command = [str(program()), "--json", "--port", port, "--id", str(device_id), *arguments]
     child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    children.add(child)
     try:
         said, complained = child.communicate(timeout=within_s)
     except BaseException as why:
@@ -48,6 +51,8 @@ def run(*arguments: str, port: str, device_id: int = 1, within_s: Optional[float
         if isinstance(why, subprocess.TimeoutExpired):
             raise FingertipError(f"`fingertip {' '.join(arguments)}` did not end within {within_s} s: stopped") from why
         raise
+    finally:
+        children.discard(child)
     if child.returncode:
         raise FingertipError(_error(complained))
     try:

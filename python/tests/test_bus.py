@@ -4,9 +4,11 @@ import signal
 import threading
 import time
 from typing import Any, List
+from unittest import mock
 
 from fingertip import Bus, Fault, FingertipError, Mode, NoAnswer, Refused
 from fingertip import registers as reg
+from fingertip.device import Device
 
 from served import LONG_S, PATIENT_MS, SOON_MS, OnServed
 
@@ -21,6 +23,8 @@ bus.press({1: 0.5, 2: 0.8}, 2.54)
 print("pressing", flush=True)
 """
 GO_ON = "while True: bus.states()"
+# Ctrl-C while the end of the program releases the fingers.
+SECOND = "import signal; rest = bus._rest; bus._rest = lambda *given: signal.raise_signal(signal.SIGINT) or rest(*given)"
 
 
 class Group(OnServed):
@@ -143,6 +147,18 @@ class Group(OnServed):
         self.assert_released(ids=[1, 2])
         self.assertEqual([finger.read(reg.TORQUE_ENABLE) for finger in bus.fingers.values()], [0, 0])
 
+    def test_a_press_while_another_program_commands_writes_nothing_more(self) -> None:
+        self.open_bus().close()
+        bus = self.open_bus(tared=False)
+        refused = mock.patch.object(Device, "write_bytes", side_effect=Refused("write", 7))
+        for wrote, silence_s in [(False, None), (False, LONG_S), (True, LONG_S)]:
+            for finger in bus.fingers.values():
+                finger.wrote = wrote
+            with refused, mock.patch.object(bus.line, "sync_write") as told, self.assertRaises(Refused):
+                bus.press(0.5, silence_s)
+            told.assert_not_called()
+            self.assertEqual([finger.wrote for finger in bus.fingers.values()], [wrote] * 2)
+
     def test_one_that_does_not_answer_does_not_keep_the_others(self) -> None:
         bus = self.pressing(SOON_MS)
         # Another ID is for this bus the same as an unplugged finger.
@@ -167,7 +183,8 @@ class Group(OnServed):
             time.sleep(0.01)
 
     def test_the_end_of_a_program_releases_all(self) -> None:
-        ends = [("", 0), ("raise ValueError", 0), (GO_ON, signal.SIGINT), (GO_ON, signal.SIGTERM), (GO_ON, signal.SIGHUP)]
+        kills = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
+        ends = [("", 0), (SECOND, 0), ("raise ValueError", 0), *((GO_ON, kill) for kill in kills)]
         for then, kill in ends:
             with self.subTest(then=then, kill=kill):
                 child = self.python("-c", CHILD + then, self.served.port)

@@ -20,6 +20,17 @@ finger.press(0.5, 2.54)
 print("pressing", flush=True)
 """
 GO_ON = "while True: finger.state()"
+# Presses from a process of `multiprocessing`.
+FORK = """
+finger.close()
+def press():
+    Fingertip(sys.argv[1], timeout_ms=60_000).press(0.5, 2.54)
+    {}
+import multiprocessing, signal
+child = multiprocessing.get_context("fork").Process(target=press)
+child.start()
+child.join()
+"""
 
 
 def restart(finger: Finger) -> None:
@@ -58,6 +69,8 @@ class Ends(OnServed):
             ("with finger: pass", 0, 0),
             ("with finger: raise ValueError", 0, 1),
             ("raise ValueError", 0, 1),
+            (FORK.format(""), 0, 0),
+            (FORK.format("signal.raise_signal(signal.SIGTERM)"), 0, 0),
             (GO_ON, signal.SIGTERM, 128 + signal.SIGTERM),
             (GO_ON, signal.SIGHUP, 128 + signal.SIGHUP),
             ("with finger:\n    " + GO_ON, signal.SIGTERM, 128 + signal.SIGTERM),

@@ -3,11 +3,15 @@
 All tests of the package: python -m unittest discover python/tests. Others need served fingers; see `served.py`.
 """
 
+import contextlib
 import dataclasses
 import fcntl
 import os
 import random
+import signal
 import socket
+import subprocess
+import sys
 import threading
 import time
 import unittest
@@ -16,7 +20,7 @@ from unittest import mock
 
 from dynamixel_sdk import PacketHandler  # type: ignore[import-untyped]
 
-from fingertip import Fault, Fingertip, FingertipError, Limits, Mode, NoAnswer, PortLost, State
+from fingertip import Fault, Fingertip, FingertipError, Limits, Mode, NoAnswer, PortLost, State, bus, run
 from fingertip.device import Device
 from fingertip.line import Line
 
@@ -86,6 +90,10 @@ def arrive(data: bytes) -> Callable[[FakeSerial], None]:
         fake.buffer += data
 
     return action
+
+
+def stall(fake: FakeSerial) -> None:
+    fake.now_ms += 300.0
 
 
 def interrupt(fake: Optional[FakeSerial] = None) -> None:
@@ -164,7 +172,8 @@ class OnPseudoTerminal(unittest.TestCase):
 
     def test_a_late_answer_is_not_taken_for_the_next_one(self) -> None:
         nothing = [late(b"")] * 2  # ends the first exchange
-        device = self.fake(FakeSerial(*nothing, arrive(answer(1)), arrive(answer(2))))
+        device = self.fake(FakeSerial(*nothing, stall, stall, arrive(answer(1)), arrive(answer(2))))
+        device.line.timeout_ms = 1000.0
         with self.assertRaises(NoAnswer):
             device.read_bytes(64, 1)
         self.assertEqual(device.read_bytes(64, 1), b"\x02")
@@ -282,6 +291,28 @@ class OnTcp(unittest.TestCase):
         for name in [f"tcp:127.0.0.1:{number}", "tcp:127.0.0.1", "tcp:", "/nowhere", os.devnull]:
             with self.assertRaisesRegex(FingertipError, f"cannot open {name}: "):
                 Fingertip(name)
+
+
+class Program(unittest.TestCase):
+    def test_the_end_of_this_program_ends_the_one_that_run_waits_for(self) -> None:
+        def end_and_wait(**given: Any) -> Any:
+            with contextlib.suppress(SystemExit):
+                end()
+            os.close(far)  # ends `cat` if nothing else did
+            return communicate(**given)
+
+        ends: List[Callable[[], None]] = [bus._close_all, lambda: bus._exit(signal.SIGTERM, None)]
+        for end in ends:
+            near, far = os.pipe()
+            child = subprocess.Popen(["cat"], stdin=near, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+            os.close(near)
+            communicate = child.communicate
+            program = mock.patch.object(sys.modules[run.__module__], "program")
+            start = mock.patch("subprocess.Popen", return_value=child)
+            waits = mock.patch.object(child, "communicate", end_and_wait)
+            with program, start, waits, self.assertRaises(FingertipError):
+                run(port="")
+            self.assertEqual(child.returncode, -signal.SIGTERM)
 
 
 class Values(unittest.TestCase):

@@ -20,6 +20,8 @@ const PING_BITS: u32 = 14 * 10;
 /// No bus is slower: all IDs would take minutes to answer.
 pub const BAUD_MIN: i64 = 1_200;
 const ID_MAX: u8 = 252;
+/// Time between two keep-alive packets.
+const FEED: Duration = Duration::from_millis(100);
 
 /// Port, speed and ID of a controller.
 #[derive(Clone, Debug, clap::Args)]
@@ -55,6 +57,8 @@ pub struct Client {
     pub id: u8,
     /// Longest wait for an answer.
     pub timeout: Duration,
+    /// Instant of the last keep-alive packet; `None` sends none.
+    pub fed: Option<Instant>,
     /// An answer was not waited for: it may come yet.
     owed: bool,
 }
@@ -78,7 +82,7 @@ impl Client {
         let port = reach.port.clone().ok_or(Error::NoPort)?;
         let line = Line::open(&port, reach.baud).map_err(|why| Error::Open(port.clone(), why))?;
         let timeout = Duration::from_millis(reach.timeout_ms);
-        Ok(Self { line, port, baud: reach.baud, id: reach.ids[0], timeout, owed: false })
+        Ok(Self { line, port, baud: reach.baud, id: reach.ids[0], timeout, fed: None, owed: false })
     }
 
     /// Opens a port again that was lost.
@@ -201,20 +205,22 @@ impl Client {
         self.transmit(packet)?;
         let all = answers == usize::MAX;
         let until = Instant::now() + self.timeout + if all { self.ping_slots() } else { Duration::ZERO };
-        let (mut receiver, mut heard) = (Receiver::new(), Vec::new());
+        let (mut receiver, mut heard, mut damaged) = (Receiver::new(), Vec::new(), false);
         while answers > 0
             && let Some(left) = until.checked_duration_since(Instant::now())
         {
             let bytes = self.line.read(left).map_err(|why| self.lost(why))?;
             for byte in &bytes {
-                let whole = matches!(receiver.push(*byte), Some(Event::Packet | Event::BadCrc));
+                let event = receiver.push(*byte);
                 let packet = receiver.packet();
                 let awaited = packet.instruction == instruction::STATUS && from.is_none_or(|id| id == packet.id);
+                damaged |= event == Some(Event::BadCrc) && awaited;
+                let whole = matches!(event, Some(Event::Packet | Event::BadCrc));
                 answers = answers.saturating_sub(usize::from(whole && awaited));
             }
             heard.extend(bytes);
         }
-        self.owed = answers > 0 && !all;
+        self.owed = (answers > 0 || damaged) && !all;
         Ok(heard)
     }
 
@@ -236,15 +242,15 @@ impl Client {
         while let Some(left) = until.checked_duration_since(Instant::now()) {
             let bytes = self.line.read(left).map_err(|why| self.lost(why))?;
             for byte in bytes {
-                match receiver.push(byte) {
-                    Some(Event::Packet) => {}
-                    Some(Event::BadCrc) => return damaged("its check sum is wrong"),
-                    _ => continue,
-                }
+                let event = receiver.push(byte);
                 let packet = receiver.packet();
                 // On a line that echoes, the instruction comes back too.
-                if packet.id != id || packet.instruction != instruction::STATUS {
-                    continue;
+                let own = packet.id == id && packet.instruction == instruction::STATUS;
+                self.owed = own && event == Some(Event::BadCrc);
+                match event {
+                    Some(Event::Packet) if own => {}
+                    Some(Event::BadCrc) if own => return damaged("its check sum is wrong"),
+                    _ => continue,
                 }
                 let Some((&error, data)) = packet.params.split_first() else { return damaged("it is empty") };
                 let number = error & !ALERT;
@@ -271,6 +277,12 @@ impl Client {
     fn transmit(&mut self, packet: &[u8]) -> Result<(), Error> {
         self.settle()?;
         self.line.discard().map_err(|why| self.lost(why))?;
+        if self.fed.is_some_and(|fed| fed.elapsed() >= FEED) {
+            self.fed = Some(Instant::now());
+            // A Sync Write to no device is a broadcast: it feeds all bus watchdogs.
+            let keep_alive = self::packet(BROADCAST, instruction::SYNC_WRITE, &[0; 4]);
+            self.line.write(&keep_alive).map_err(|why| self.lost(why))?;
+        }
         self.line.write(packet).map_err(|why| self.lost(why))
     }
 

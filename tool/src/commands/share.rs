@@ -1,22 +1,22 @@
 //! `fingertip share`: owns the bus for any number of clients, one of which commands.
 //!
 //! A thread for each client passes its instruction packets on, one at a time, and returns the answers to that client
-//! alone. The first client that writes commands until it leaves. Others read; where one of them writes goal 0 or torque
-//! off, it stops the finger and takes the command from that client, whose other fingers are stopped once it leaves.
+//! alone. The first client that writes commands until it leaves. Others read; once one of them writes goal 0 or torque
+//! off to a finger of the commander, the commander writes no more, and its other fingers are stopped when it leaves.
 //! Packets of the commander, and writes, go before reads of others: they wait for one exchange at most.
 
 use super::{Interrupt, aside, say, stop};
-use crate::client::Reach;
-use crate::{Client, Error};
+use crate::client::{self, Reach};
+use crate::{Client, Error, table};
 use fingertip::link::Reply;
 use fingertip::link::packet::{BROADCAST, Event, HEADER, Packet, Receiver, Sender, StatusError, instruction};
 use fingertip::shipped::address;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{Read as _, Write as _};
-use std::net::{SocketAddr, TcpListener, TcpStream};
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::mpsc::{Sender as Outbox, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::ThreadId;
 use std::time::{Duration, Instant};
 
 /// Instructions that change nothing.
@@ -29,17 +29,23 @@ const READS: [u8; 6] = [
     instruction::FAST_BULK_READ,
 ];
 /// Registers to which every client may write 0, to stop a finger.
-const STOPS: [u16; 2] = [address::TORQUE_ENABLE, address::GOAL_FORCE_MN];
+const STOPS: [u16; 5] =
+    [address::TORQUE_ENABLE, address::MEASURE, address::GOAL_FORCE_MN, address::SHORT_GOAL_MN, address::MIRROR_GOAL_MN];
+/// Reason for a stop during which the bus watchdogs are not fed.
+const SILENT: &str = "its client is silent";
 /// Longest release of a finger whose client left, s of the controller's clock. Other clients wait that long.
 const RELEASE_S: f64 = 0.5;
 /// Longest wait for a client that does not take its answers.
 const SLOW: Duration = Duration::from_secs(1);
 /// More bytes than any packet has: without a packet in them they are dropped.
 const JUNK: usize = 4096;
-/// Time between two looks of a read at whether it may go.
-const YIELD: Duration = Duration::from_millis(1);
-/// Packets that wait and go before reads.
-static URGENT: AtomicUsize = AtomicUsize::new(0);
+/// Time after which a waiting packet checks again if it may go.
+const YIELD: Duration = Duration::from_micros(200);
+/// Time-outs of the bus (ten times `--timeout-ms`) after which a waiting read is dropped: its client has given up, and
+/// would take the answer for that to its next packet.
+const STALE: u32 = 30;
+/// Packets that wait for the bus, oldest first: instant of arrival, thread, and true for an urgent packet.
+static WAITING: Mutex<Vec<(Instant, ThreadId, bool)>> = Mutex::new(Vec::new());
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
@@ -57,11 +63,13 @@ pub struct Args {
 struct Bus {
     client: Client,
     commanders: BTreeMap<SocketAddr, Commander>,
+    /// True if the last packet was urgent.
+    urgent: bool,
 }
 
 /// A client that wrote.
 struct Commander {
-    /// Fingers that it wrote to, and nobody else after it: they are stopped once it leaves or is silent.
+    /// Fingers that it wrote to: they are stopped once it leaves or is silent, except those of the next commander.
     ids: BTreeSet<u8>,
     /// Bus watchdogs that it set, by ID.
     watchdogs: BTreeMap<u8, Duration>,
@@ -69,6 +77,12 @@ struct Commander {
     heard: Instant,
     /// True once another client stopped one of its fingers: it writes no more.
     stopped: bool,
+}
+
+impl Commander {
+    fn has(&self, id: u8) -> bool {
+        self.ids.contains(&id) || self.ids.contains(&BROADCAST)
+    }
 }
 
 /// Serves until Ctrl-C, then stops what is still commanded.
@@ -82,7 +96,7 @@ pub fn run(args: &Args, reach: &Reach) -> Result<(), Error> {
     let address = listener.local_addr().map_err(cannot)?;
     say(format_args!("shares {} at tcp:{address}; Ctrl-C ends it", client.port));
     say(format_args!("next, in other terminals: fingertip --port tcp:{address} view"));
-    let bus = Arc::new(Mutex::new(Bus { client, commanders: BTreeMap::new() }));
+    let bus = Arc::new(Mutex::new(Bus { client, commanders: BTreeMap::new(), urgent: false }));
     let (lost, losses) = channel();
     let shared = Arc::clone(&bus);
     std::thread::spawn(move || {
@@ -102,27 +116,38 @@ pub fn run(args: &Args, reach: &Reach) -> Result<(), Error> {
             ended = Err(why);
         }
     }
-    let mut bus = lock(&bus);
+    let mut bus = turn(&bus, true);
     for from in bus.commanders.keys().copied().collect::<Vec<_>>() {
         bus.end_command(from, "`fingertip share` ends");
     }
+    // Until the process exits, no client may move what was stopped.
+    std::mem::forget(bus);
     ended
 }
 
-fn lock(bus: &Mutex<Bus>) -> MutexGuard<'_, Bus> {
-    bus.lock().unwrap_or_else(PoisonError::into_inner)
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Waits for the bus; a read of a client that does not command waits for all that is urgent.
+/// Waits for the bus. Urgent packets go before reads of clients that do not command; but once a read has waited for a
+/// time-out, it goes after the next urgent packet. Otherwise the oldest packet goes first.
 fn turn(bus: &Mutex<Bus>, urgent: bool) -> MutexGuard<'_, Bus> {
-    URGENT.fetch_add(usize::from(urgent), Ordering::SeqCst);
+    let own = (Instant::now(), std::thread::current().id(), urgent);
+    lock(&WAITING).push(own);
     loop {
-        let free = lock(bus);
-        if urgent || URGENT.load(Ordering::SeqCst) == 0 {
-            URGENT.fetch_sub(usize::from(urgent), Ordering::SeqCst);
+        let mut free = lock(bus);
+        let rank = |(since, _, urgent): &(Instant, ThreadId, bool)| match urgent {
+            false if free.urgent && since.elapsed() > free.client.timeout => 0,
+            true => 1,
+            false => 2,
+        };
+        let mut waiting = lock(&WAITING);
+        if waiting.iter().min_by_key(|one| rank(one)) == Some(&own) {
+            waiting.retain(|one| *one != own);
+            free.urgent = urgent;
             return free;
         }
-        drop(free);
+        drop((waiting, free));
         std::thread::sleep(YIELD);
     }
 }
@@ -132,7 +157,8 @@ fn converse(mut stream: TcpStream, bus: &Mutex<Bus>, lost: &Outbox<Error>) {
     let Ok(from) = stream.peer_addr() else { return };
     let _ = stream.set_nodelay(true).and_then(|()| stream.set_write_timeout(Some(SLOW)));
     let (mut receiver, mut raw, mut buffer) = (Receiver::new(), Vec::new(), [0; JUNK]);
-    let mut commands = false;
+    // `gone` is true once an answer could not be delivered. Of what was received by then, only stops are passed.
+    let (mut commands, mut gone) = (false, false);
     'client: while let Ok(count @ 1..) = stream.read(&mut buffer) {
         for byte in &buffer[..count] {
             raw.push(*byte);
@@ -145,15 +171,26 @@ fn converse(mut stream: TcpStream, bus: &Mutex<Bus>, lost: &Outbox<Error>) {
             // Stuffing keeps the header out of a packet's inside, but not out of its last bytes, the check sum.
             let inside = &raw[..raw.len() - 2];
             let begin = inside.windows(HEADER.len()).rposition(|window| window == HEADER).unwrap_or_default();
+            let bytes = std::mem::take(&mut raw).split_off(begin);
             let packet = receiver.packet();
-            let mut free = turn(bus, commands || !READS.contains(&packet.instruction));
-            let answer = free.pass(from, &packet, &raw[begin..]);
+            if gone && !is_stop(&packet) {
+                continue;
+            }
+            let (reads, came) = (READS.contains(&packet.instruction), Instant::now());
+            let mut free = turn(bus, commands || !reads);
+            if reads && came.elapsed() > STALE * free.client.timeout {
+                continue;
+            }
+            let answer = free.pass(from, &packet, &bytes);
             commands = free.commander() == Some(from);
             drop(free);
-            raw.clear();
             match answer {
                 Ok(answer) if stream.write_all(&answer).is_ok() => {}
-                Ok(_) => break 'client,
+                Ok(_) => {
+                    gone = true;
+                    // What was received by now can still be read, nothing later.
+                    let _ = stream.shutdown(Shutdown::Both);
+                }
                 Err(why) => {
                     let _ = lost.send(why);
                     break 'client;
@@ -179,20 +216,28 @@ impl Bus {
             (*other != from && most.is_some_and(|most| commander.heard.elapsed() > *most + slack)).then_some(*other)
         };
         for other in self.commanders.iter().filter_map(silent).collect::<Vec<_>>() {
-            self.end_command(other, "its client is silent");
+            self.end_command(other, SILENT);
         }
-        let commander = self.commander();
+        if let Some(commander) = self.commanders.get_mut(&from) {
+            commander.heard = Instant::now();
+        }
+        let (commander, parts) = (self.commander(), parts(packet));
         if commander != Some(from) && is_stop(packet) {
-            if let Some(stopped) = commander.and_then(|other| self.commanders.get_mut(&other)) {
-                stopped.stopped = true;
+            // A stopped client stops its own fingers at its end. That does not concern who commands now.
+            let cleans = self.commanders.get(&from).is_some_and(|own| parts.iter().all(|part| own.has(part.id)));
+            if let Some(other) = commander.and_then(|other| self.commanders.get_mut(&other)) {
+                let meets = parts.iter().any(|part| part.id == BROADCAST || other.has(part.id));
+                other.stopped = meets && !cleans;
             }
         } else if !READS.contains(&packet.instruction) {
-            let stopped = self.commanders.get(&from).is_some_and(|commander| commander.stopped);
-            if stopped || commander.is_some_and(|other| other != from) || covers(packet, address::BAUD_RATE) {
+            let known = self.commanders.get(&from);
+            let stopped = known.is_some_and(|own| own.stopped) || commander.is_some_and(|other| other != from);
+            let baud = parts.iter().any(|part| part.byte(address::BAUD_RATE).is_some());
+            // A write to no device feeds the watchdogs. A stopped client keeps its other fingers alive by it.
+            let refused = if parts.is_empty() { known.is_none() } else { stopped || baud };
+            if refused {
                 return Ok(if packet.id == BROADCAST { Vec::new() } else { refusal(packet.id) });
             }
-            let ids = targets(packet);
-            self.commanders.values_mut().for_each(|other| other.ids.retain(|id| !ids.contains(id)));
             let new = || Commander {
                 ids: BTreeSet::new(),
                 watchdogs: BTreeMap::new(),
@@ -200,16 +245,15 @@ impl Bus {
                 stopped: false,
             };
             let commander = self.commanders.entry(from).or_insert_with(new);
-            commander.ids.extend(ids);
-            if covers(packet, address::BUS_WATCHDOG) {
-                commander.watchdogs.remove(&packet.id);
-                let set = packet.params.get(2).filter(|steps| **steps > 0);
-                let set = set.map(|steps| (packet.id, Duration::from_millis(20 * u64::from(*steps))));
-                commander.watchdogs.extend(set);
+            commander.ids.extend(parts.iter().map(|part| part.id));
+            let reset = (packet.instruction == instruction::REBOOT).then_some(0);
+            for part in &parts {
+                let Some(steps) = reset.or(part.byte(address::BUS_WATCHDOG)) else { continue };
+                commander.watchdogs.retain(|id, _| ![*id, BROADCAST].contains(&part.id));
+                if steps > 0 {
+                    commander.watchdogs.insert(part.id, Duration::from_millis(20 * u64::from(steps)));
+                }
             }
-        }
-        if let Some(commander) = self.commanders.get_mut(&from) {
-            commander.heard = Instant::now();
         }
         self.client.pass(raw, Some(packet.id).filter(|id| *id != BROADCAST), answers(packet))
     }
@@ -222,15 +266,24 @@ impl Bus {
     /// Ends the command of a client: what it left with torque on is released and stopped.
     fn end_command(&mut self, from: SocketAddr, why: &str) {
         let Some(commander) = self.commanders.get_mut(&from) else { return };
-        let ids = std::mem::take(&mut commander.ids);
+        let mut ids = std::mem::take(&mut commander.ids);
         commander.watchdogs.clear();
         if !commander.stopped {
             self.commanders.remove(&from);
         }
+        if ids.remove(&BROADCAST) {
+            ids.extend(self.client.ping_all().unwrap_or_default().iter().map(|pong| pong.id));
+        }
+        let next = self.commander().and_then(|next| self.commanders.get(&next));
+        ids.retain(|id| next.is_none_or(|next| !next.has(*id)));
         let own = self.client.id;
-        let all = ids.contains(&BROADCAST);
-        let found = if all { self.client.ping_all().unwrap_or_default() } else { Vec::new() };
-        for id in found.iter().map(|pong| pong.id).chain(ids).filter(|id| *id != BROADCAST) {
+        self.client.fed = (why != SILENT).then(Instant::now);
+        // All fingers release at the same time. Then torque goes off one by one.
+        let [low, high] = address::GOAL_FORCE_MN.to_le_bytes();
+        let goals = ids.iter().flat_map(|id| [*id, 0, 0, 0, 0]);
+        let params: Vec<u8> = [low, high, 4, 0].into_iter().chain(goals).collect();
+        let _ = self.client.pass(&client::packet(BROADCAST, instruction::SYNC_WRITE, &params), None, 0);
+        for id in ids {
             self.client.id = id;
             match stop(&mut self.client) {
                 Ok(true) => aside(format_args!("ID {id} was stopped: {why}")),
@@ -238,7 +291,7 @@ impl Bus {
                 Err(error) => aside(format_args!("stopping ID {id} failed ({why}): {error}")),
             }
         }
-        self.client.id = own;
+        (self.client.id, self.client.fed) = (own, None);
     }
 }
 
@@ -261,36 +314,50 @@ fn stop(client: &mut Client) -> Result<bool, Error> {
 
 /// True if a packet only stops fingers.
 fn is_stop(packet: &Packet<'_>) -> bool {
-    let zero = |data: &[u8]| !data.is_empty() && data.iter().all(|byte| *byte == 0);
-    let stops = STOPS.iter().any(|register| packet.params.starts_with(&register.to_le_bytes()));
-    stops
-        && match (packet.instruction, packet.params) {
-            (instruction::WRITE, [_, _, data @ ..]) => zero(data),
-            // An ID and its data for each finger.
-            (instruction::SYNC_WRITE, [_, _, low, high, all @ ..]) => {
-                let length = usize::from(u16::from_le_bytes([*low, *high]));
-                !all.is_empty() && all.chunks(1 + length).all(|one| zero(&one[1..]))
-            }
-            _ => false,
-        }
+    let stops = |part: &Part<'_>| {
+        let register = table::register_at(part.address).filter(|register| STOPS.contains(&register.address));
+        register.is_some_and(|register| table::encode(register, 0) == part.data)
+    };
+    let parts = parts(packet);
+    packet.instruction != instruction::REG_WRITE && !parts.is_empty() && parts.iter().all(stops)
 }
 
-/// True if a packet writes a register from its first byte on.
-fn covers(packet: &Packet<'_>, register: u16) -> bool {
-    packet.instruction == instruction::WRITE && packet.params.starts_with(&register.to_le_bytes())
+/// Part of a packet for one device, or for all.
+struct Part<'a> {
+    id: u8,
+    /// First register that it writes, and data; no data where it is no write.
+    address: u16,
+    data: &'a [u8],
 }
 
-fn targets(packet: &Packet<'_>) -> Vec<u8> {
+impl Part<'_> {
+    /// The byte that it writes at this address.
+    fn byte(&self, address: u16) -> Option<u8> {
+        self.data.get(usize::from(address.checked_sub(self.address)?)).copied()
+    }
+}
+
+fn parts<'a>(packet: &Packet<'a>) -> Vec<Part<'a>> {
     let Packet { id, instruction, params, .. } = *packet;
-    let entry =
-        |at: usize| params.get(at..at + 2).map_or(0, |length| usize::from(u16::from_le_bytes([length[0], length[1]])));
-    match instruction {
-        instruction::SYNC_WRITE => params.iter().skip(4).step_by(1 + entry(2)).copied().collect(),
-        instruction::BULK_WRITE => {
-            let places = std::iter::successors(Some(0), |at| Some(at + 5 + entry(at + 3)));
-            places.map_while(|at| params.get(at).copied()).collect()
+    let word = |low: &u8, high: &u8| u16::from_le_bytes([*low, *high]);
+    match (instruction, params) {
+        (instruction::WRITE | instruction::REG_WRITE, [low, high, data @ ..]) => {
+            vec![Part { id, address: word(low, high), data }]
         }
-        _ => vec![id],
+        (instruction::SYNC_WRITE, [low, high, short, long, all @ ..]) => {
+            let each = all.chunks(1 + usize::from(word(short, long)));
+            each.map(|one| Part { id: one[0], address: word(low, high), data: &one[1..] }).collect()
+        }
+        (instruction::BULK_WRITE, mut rest) => {
+            let mut parts = Vec::new();
+            while let [id, low, high, short, long, all @ ..] = rest {
+                let (data, behind) = all.split_at(all.len().min(usize::from(word(short, long))));
+                parts.push(Part { id: *id, address: word(low, high), data });
+                rest = behind;
+            }
+            parts
+        }
+        _ => vec![Part { id, address: 0, data: &[] }],
     }
 }
 

@@ -5,7 +5,7 @@ use super::{Interrupt, TOUCHED, aside, no_fault_nor_motion, say, say_json, wait_
 use crate::client::Reach;
 use crate::state::{Clock, State};
 use crate::{Client, Error, numbers, table};
-use fingertip::measure::Task;
+use fingertip::link::packet::StatusError;
 use fingertip::pipeline::Taring;
 use fingertip::shipped::address;
 use fingertip::state::{Limits, Mode};
@@ -65,8 +65,12 @@ impl<'a> Moving<'a> {
         halt(self.client)?;
         // Only with torque off: until then nothing else stops the motor once this program has ended. A watchdog that
         // has tripped stays so, for `fingertip recover`.
-        if self.client.again(|client| client.number(address::BUS_WATCHDOG))? >= 0 {
-            self.client.again(|client| client.set(address::BUS_WATCHDOG, watchdog))?;
+        if self.client.again(|client| client.number(address::BUS_WATCHDOG))? >= 0
+            && let Err(why) = self.client.again(|client| client.set(address::BUS_WATCHDOG, watchdog))
+            // Another client of `fingertip share` stopped this finger: it is at rest, and the watchdog is that client's.
+            && !why.refused_with(StatusError::Access as u8)
+        {
+            return Err(why);
         }
         released
     }
@@ -80,8 +84,8 @@ impl Drop for Moving<'_> {
     }
 }
 
-/// Ends a motion that measures by `MEASURE` 0 and a grip by the goal 0, then waits until the tip is clear of the object, at
-/// most for this time. Returns the last state, which in other modes is the first. A press that was ended is a grip.
+/// Ends a motion that measures or a grip by the goal 0, then waits until the tip is clear of the object, at most for this
+/// time. Returns the last state, which in other modes is the first. A press that was ended is a grip.
 pub(super) fn release(within_s: f64, client: &mut Client) -> Result<State, Error> {
     let (begun, mut clock) = (Instant::now(), Clock::default());
     loop {
@@ -94,10 +98,7 @@ pub(super) fn release(within_s: f64, client: &mut Client) -> Result<State, Error
         if !grips || late || is(Mode::Release) && rests {
             return Ok(state);
         }
-        if measures {
-            client.again(|client| client.set(address::MEASURE, Task::Stop as i64))?;
-        }
-        if state.goal_mn != 0 {
+        if measures || state.goal_mn != 0 {
             client.again(|client| client.set(address::GOAL_FORCE_MN, 0))?;
         }
         std::thread::sleep(LOOK);

@@ -1,9 +1,10 @@
 //! `fingertip share`: one client commands, all read, anyone stops.
 
-use crate::served::{Served, client, line_with};
+use crate::served::{Served, client, ended, line_with};
 use crate::stopped::RESIDUAL_N;
 use fingertip::link::packet::{BROADCAST, instruction};
 use fingertip::shipped::address;
+use fingertip::state::Mode;
 use fingertip_cli::Client;
 use fingertip_cli::client::packet;
 use std::io::{Read as _, Write as _};
@@ -21,8 +22,8 @@ struct Shared {
 }
 
 /// Starts a broker; it and its address, once it listens.
-fn broker(finger: &Served, listen: &str) -> (Child, String) {
-    let mut broker = finger.start(&["share", "--listen", listen, "--timeout-ms", TIMEOUT]);
+fn broker(finger: &Served, listen: &str, timeout: &str) -> (Child, String) {
+    let mut broker = finger.start(&["share", "--listen", listen, "--timeout-ms", timeout]);
     let line = line_with("tcp:", broker.stdout.take().expect("a pipe"));
     let address = line.split("tcp:").nth(1).and_then(|rest| rest.split(';').next()).expect("an address");
     (broker, address.to_owned())
@@ -34,7 +35,11 @@ impl Shared {
     }
 
     fn of(finger: Served) -> Self {
-        let (broker, address) = broker(&finger, "127.0.0.1:0");
+        Self::within(TIMEOUT, finger)
+    }
+
+    fn within(timeout: &str, finger: Served) -> Self {
+        let (broker, address) = broker(&finger, "127.0.0.1:0", timeout);
         Self { finger, broker, address }
     }
 
@@ -105,7 +110,50 @@ fn a_press_is_watched_and_no_answer_reaches_another_client() {
     let stop = shared.output(&["stop"]);
     assert!(stop.status.success(), "{stop:?}");
     shared.until_released();
-    assert_eq!(press.wait().expect("it ends").code(), Some(1));
+    let (code, said) = ended(&press.wait_with_output().expect("it ends"));
+    assert_eq!(code, Some(1));
+    assert!(!said.contains("stopping the finger failed"), "{said}");
+}
+
+/// Two clients keep the bus busy: each of their stops waits for an absent ID.
+#[test]
+fn a_stop_behind_reads_is_passed_though_its_client_has_left() {
+    let finger = Served::patient("wall");
+    finger.tared(1).set(address::TORQUE_ENABLE, 1).expect("it obeys");
+    let shared = Shared::within("600", finger);
+    let [low, high] = address::TORQUE_ENABLE.to_le_bytes();
+    let stop = |id| packet(id, instruction::WRITE, &[low, high, 0]);
+    let send = |bytes: &[u8]| {
+        let mut stream = TcpStream::connect(&shared.address).expect("it listens");
+        stream.write_all(bytes).expect("it listens");
+        stream
+    };
+    let _busy = [send(&stop(9).repeat(300)), send(&stop(9).repeat(300))];
+    drop(send(&[&packet(1, instruction::PING, &[]).repeat(20)[..], &stop(1)].concat()));
+    shared.until_released();
+}
+
+#[test]
+fn a_press_that_measures_is_stopped_by_every_stop() {
+    let finger = Served::patient("wall");
+    finger.tared(1).set(address::TORQUE_ENABLE, 1).expect("it obeys");
+    let shared = Shared::of(finger);
+    let (mut first, mut second) = (shared.client(), shared.client());
+    let [low, high] = address::TORQUE_ENABLE.to_le_bytes();
+    let bulk = packet(BROADCAST, instruction::BULK_WRITE, &[1, low, high, 1, 0, 0, 9, low, high, 1, 0, 0]);
+    first.set(address::BUS_WATCHDOG, 0).expect("it obeys");
+    second.pass(&bulk, None, 0).expect("anyone stops");
+    assert_eq!(second.number(address::TORQUE_ENABLE).expect("it answers"), 0);
+    second.set(address::TORQUE_ENABLE, 1).expect("it commands now");
+    second.set(address::MEASURE, 3).expect("it obeys");
+    while second.number(address::PRESENT_MODE).expect("it answers") != Mode::Press as i64 {}
+    let mut third = shared.client();
+    for register in [address::SHORT_GOAL_MN, address::MIRROR_GOAL_MN, address::MEASURE] {
+        third.set(register, 0).expect("anyone stops");
+    }
+    let stop = shared.output(&["stop"]);
+    assert!(stop.status.success(), "{stop:?}");
+    shared.until_released();
 }
 
 #[test]
@@ -178,10 +226,24 @@ fn who_was_stopped_does_not_take_the_command_from_who_stopped_it() {
     for _ in 0..2 {
         second.set(address::TORQUE_ENABLE, 0).expect("anyone stops");
     }
+    second.set(address::BUS_WATCHDOG, 0).expect("it commands now");
     first.set(address::TORQUE_ENABLE, 0).expect("anyone stops");
     first.set(address::BUS_WATCHDOG, 25).expect_err("it was stopped");
-    second.set(address::BUS_WATCHDOG, 0).expect("it obeys");
+    second.set(address::BUS_WATCHDOG, 0).expect("it still commands");
     second.set(address::BAUD_RATE, 4).expect_err("the broker would not follow");
+    second.write(address::ID, &[1, 4]).expect_err("the broker would not follow");
+}
+
+#[test]
+fn a_stop_of_another_finger_leaves_a_commander_its_command() {
+    let shared = Shared::begin("wall");
+    let (mut first, mut second) = (shared.client(), shared.client());
+    first.set(address::BUS_WATCHDOG, 0).expect("it obeys");
+    let [low, high] = address::TORQUE_ENABLE.to_le_bytes();
+    let other = packet(BROADCAST, instruction::SYNC_WRITE, &[low, high, 1, 0, 9, 0]);
+    second.pass(&other, None, 0).expect("anyone stops");
+    second.ping().expect("it answers");
+    first.set(address::BUS_WATCHDOG, 0).expect("it still commands");
 }
 
 #[test]
@@ -202,7 +264,7 @@ fn a_finger_of_a_group_is_stopped_once_its_commander_has_left() {
     assert_eq!(client.number(address::TORQUE_ENABLE).expect("it answers"), 1, "nobody commanded it");
 }
 
-/// Another client stops one of two, and reads the other one, which feeds its watchdog.
+/// Another client stops one of two. The commander lives, and feeds the other one, until it leaves.
 #[test]
 fn the_other_fingers_of_a_stopped_commander_are_stopped_once_it_has_left() {
     let finger = Served::patient("grasp");
@@ -215,12 +277,20 @@ fn the_other_fingers_of_a_stopped_commander_are_stopped_once_it_has_left() {
         first.id = id;
         first.set(address::TORQUE_ENABLE, 1).expect("it obeys");
     }
+    first.set(address::BUS_WATCHDOG, 50).expect("it obeys");
     let [low, high] = address::GOAL_FORCE_MN.to_le_bytes();
     let none = packet(BROADCAST, instruction::SYNC_WRITE, &[low, high, 4, 0, 1, 0, 0, 0, 0]);
     second.pass(&none, None, 0).expect("anyone stops");
-    second.id = 2;
-    assert_eq!(second.number(address::TORQUE_ENABLE).expect("it answers"), 1);
+    second.number(address::TORQUE_ENABLE).expect("it answers");
     first.set(address::GOAL_FORCE_MN, 500).expect_err("it was stopped");
+    first.id = 1;
+    let begun_s = shared.finger.now_s();
+    while shared.finger.now_s() < begun_s + 3.0 {
+        first.pass(&packet(BROADCAST, instruction::SYNC_WRITE, &[0; 4]), None, 0).expect("it listens");
+        first.ping().expect("it answers");
+    }
+    second.id = 2;
+    assert_eq!(second.number(address::TORQUE_ENABLE).expect("it answers"), 1, "{}", shared.finger.command("look"));
     drop(first);
     let begun = std::time::Instant::now();
     while second.number(address::TORQUE_ENABLE).expect("it answers") != 0 {
@@ -269,7 +339,7 @@ fn a_lost_port_is_opened_again_once_it_is_back() {
     shared.broker.wait().expect("it ends");
     assert!(matches!(client.ping(), Err(fingertip_cli::Error::Port(..))));
     assert!(client.reopen().is_err(), "it is not back");
-    (shared.broker, _) = broker(&shared.finger, &shared.address);
+    (shared.broker, _) = broker(&shared.finger, &shared.address, TIMEOUT);
     client.reopen().expect("it is back");
     client.ping().expect("it answers");
 }

@@ -174,14 +174,14 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     }
 
     /// Computes the contact in the tactile image. Before a tare the array's offsets look like a contact, so none is
-    /// reported, and none in a broken array.
+    /// reported.
     fn contact(&mut self, readable: bool) -> Contact {
         let fits = readable && self.activity.fits();
-        let contact = if !self.tared || !readable && !self.activity.drives() {
+        let contact = if !self.tared {
             Contact { bad_taxels: self.array.picture().bad_count.min(255) as u8, ..Contact::default() }
         } else if fits {
             self.fit.read(self.array.picture(), &self.config)
-        } else if readable {
+        } else if readable || !self.activity.drives() {
             contact::from_sums(self.array.picture(), &self.config)
         } else {
             self.status.contact

@@ -27,6 +27,7 @@ use crate::frame::Sense;
 use crate::grip::Grip;
 use crate::measure::{BuiltIn, Ended, MeasureState, MeasureStatus, Press, Strokes, Task};
 use crate::safety::guard::Guard;
+use crate::safety::monitor;
 use crate::state::{Fault, Mode};
 use crate::status::{AcknowledgedRequests, Taring};
 use crate::touch::{Stage, Touch};
@@ -232,7 +233,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     /// Returns true if a tare that is requested now is measured.
     pub(crate) fn takes_tare(&self, forced: bool) -> bool {
         // New parameters begin the touch again: until the next frame the last contact shows what is pressed.
-        let unseen = self.touch.stage() == Stage::None && self.status.contact.force >= self.config.contact_on;
+        let readable = monitor::array_readable(self.array.picture(), &self.config);
+        let touches = readable && self.status.contact.force >= self.config.contact_on;
+        let unseen = self.touch.stage() == Stage::None && touches;
         let pressed = self.tared && (self.touch.held() || unseen) && !forced;
         !pressed && !matches!(self.activity, Activity::LastRelease { .. } | Activity::Fault(_))
     }

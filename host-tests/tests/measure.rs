@@ -325,7 +325,7 @@ fn a_stop_of_a_motion_that_waits_has_an_outcome_of_its_own() {
     assert_eq!(finger.frame().measure, MeasureStatus::over(Task::Stop, Ended::Interrupted, 0));
 }
 
-/// Nobody has confirmed the direction yet: no part of a jog has more than 8 % of the supply, its way back included.
+/// A jog runs before the direction is confirmed, so no part of it, the way back included, has more than 8 % of the supply.
 #[test]
 fn a_jog_keeps_to_its_share_of_the_supply() {
     let mut completed = 0;
@@ -333,9 +333,7 @@ fn a_jog_keeps_to_its_share_of_the_supply() {
     for percent_of_friction in (100..=600).step_by(100) {
         let mut setup = Setup::default();
         setup.motor.friction_nm *= f64::from(percent_of_friction) / 100.0;
-        let mut finger = Made::of(&setup, &config());
-        finger.bench.command().tare_request += 1;
-        finger.frames(TARE_FRAMES + 2);
+        let mut finger = taring(Made::of(&setup, &config()), TARE_FRAMES + 2);
         finger.begin(Task::Jog);
         let mut most = 0;
         while finger.frame().measure.state == MeasureState::Running {

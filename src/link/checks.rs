@@ -37,7 +37,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Snapshot<'_, ROWS, COLUMNS> {
         self.capture.standing.state == CaptureState::Recording
     }
 
-    /// Returns true while frames are being kept for a capture, or it waits for a tare.
+    /// Returns true while a capture waits for its tare, or keeps frames.
     pub(super) fn captures(&self) -> bool {
         self.records() || self.capture.standing.state == CaptureState::Armed
     }
@@ -79,7 +79,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Staged<'_, ROWS, COLUMNS> {
         self.settings.command.measure_request != self.snapshot.status.taken.measure
     }
 
-    /// Returns true if a motion that measures runs, is about to, or is about to end.
+    /// Returns true while a motion that measures runs, or a request for one or for its end waits.
     pub fn measures(&self) -> bool {
         self.measure_waits() || self.snapshot.status.measure.state == MeasureState::Running
     }

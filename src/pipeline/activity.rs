@@ -232,7 +232,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
 
     /// Returns true if a tare that is requested now is measured.
     pub(crate) fn takes_tare(&self, forced: bool) -> bool {
-        // New parameters begin the touch again: until the next frame the last contact shows what is pressed.
+        // New parameters reset the record of the touch. Until the next frame renews it, the last contact decides.
         let readable = monitor::array_readable(self.array.picture(), &self.config);
         let touches = readable && self.status.contact.force >= self.config.contact_on;
         let unseen = self.touch.stage() == Stage::None && touches;

@@ -232,6 +232,8 @@ impl Client {
     /// Sends an instruction and waits for its answer: `length` bytes behind the error.
     fn ask(&mut self, doing: &str, instruction: u8, params: &[u8], length: usize) -> Result<Vec<u8>, Error> {
         self.transmit(&packet(self.id, instruction, params))?;
+        // Until the whole answer is here.
+        self.owed = true;
         let until = Instant::now() + self.timeout;
         let mut receiver = Receiver::new();
         let id = self.id;
@@ -245,28 +247,29 @@ impl Client {
                 let event = receiver.push(byte);
                 let packet = receiver.packet();
                 // On a line that echoes, the instruction comes back too.
-                let own = packet.id == id && packet.instruction == instruction::STATUS;
-                self.owed = own && event == Some(Event::BadCrc);
+                if packet.id != id || packet.instruction != instruction::STATUS {
+                    continue;
+                }
                 match event {
-                    Some(Event::Packet) if own => {}
-                    Some(Event::BadCrc) if own => return damaged("its check sum is wrong"),
+                    Some(Event::Packet) => {}
+                    Some(Event::BadCrc) => return damaged("its check sum is wrong"),
                     _ => continue,
                 }
                 let Some((&error, data)) = packet.params.split_first() else { return damaged("it is empty") };
                 let number = error & !ALERT;
                 if number != 0 {
+                    self.owed = false;
                     let meaning = table::meaning_of_error(number);
                     let text = format!("{doing}: refused by ID {id} with error {number}: {meaning}");
                     return Err(Error::Refused(text, number));
                 }
                 if data.len() != length {
-                    self.owed = true;
                     return damaged("it has another length than what was asked for");
                 }
+                self.owed = false;
                 return Ok(data.to_vec());
             }
         }
-        self.owed = true;
         let (port, baud, waited_ms) = (&self.port, self.baud, self.timeout.as_millis());
         Err(Error::Silent(format!(
             "{doing}: no answer of ID {id} on {port} at {baud} baud within {waited_ms} ms; `fingertip scan` looks for it, \

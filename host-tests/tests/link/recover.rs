@@ -410,7 +410,7 @@ fn a_motion_is_refused_where_it_cannot_begin() {
     let mut waits = Bench::new();
     let answers = [1, 2, 0, 1, 2, 0].map(|task| ask(&mut waits, task).is_ok());
     assert_eq!(answers, [true, false, true, false, false, true]);
-    // Stopping is never refused. It changes nothing where no motion is left: it would hide how the last one ended.
+    // A stop is never refused. Without a motion to end it changes nothing: it would hide how the last one ended.
     for bench in [&mut Bench::new(), &mut faulted(), &mut bench, &mut waits] {
         let before = bench.server.command();
         assert_eq!((ask(bench, 0), bench.server.command()), (Ok(()), before));

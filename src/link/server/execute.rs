@@ -150,8 +150,8 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> Exchange<'a, ROWS, COLUMNS> {
         self.commit(staged)
     }
 
-    /// Writes this device's entries of a Sync Write, whose entries have one address and length, or of a Bulk Write. One
-    /// that is refused does not keep the next one, which may be a stop, from being written.
+    /// Writes this device's entries of a Sync Write (one address and length for all) or of a Bulk Write. After an entry
+    /// that is refused, the next one is still written: it may be a stop.
     fn write_listed(&mut self, instruction: u8, params: &[u8]) -> Result<(), StatusError> {
         let (mut common, mut list, mut written) = (None, params, Ok(()));
         if instruction == instruction::SYNC_WRITE {

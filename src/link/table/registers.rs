@@ -60,7 +60,7 @@ control_table! {
     70 HARDWARE_ERROR_STATUS: U8 ReadOnly, |view, _| u32::from(hardware_error(view.status().fault));
     /// If the bus is silent for longer, the finger releases the object (0.5 s at most; torque off ends that
     /// at once) and stops with fault 7, whatever arrives then; 0 is off. Reads -1 after a trip until 0 is written; until then goals
-    /// above 0 are refused with a range error, as by X-series servos, torque enable and motions with a result error.
+    /// above 0 are refused with a range error (as by X-series servos), and torque enable and motions with a result error.
     98 BUS_WATCHDOG: I8 ReadWrite "ms" * 20 in 0..=127 = 0, |view, _| view.watchdog(),
         Staged::set_watchdog;
     /// goal_force_mn at the address of an X-series servo's

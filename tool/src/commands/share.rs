@@ -41,8 +41,8 @@ const SLOW: Duration = Duration::from_secs(1);
 const JUNK: usize = 4096;
 /// Time after which a waiting packet checks again if it may go.
 const YIELD: Duration = Duration::from_micros(200);
-/// Time-outs of the bus (ten times `--timeout-ms`) after which a waiting read is dropped: its client has given up, and
-/// would take the answer for that to its next packet.
+/// A read that has waited for this many time-outs of the bus (ten times `--timeout-ms`) is dropped: its client has given
+/// up, and would take the answer for that of its next packet.
 const STALE: u32 = 30;
 /// Packets that wait for the bus, oldest first: instant of arrival, thread, and true for an urgent packet.
 static WAITING: Mutex<Vec<(Instant, ThreadId, bool)>> = Mutex::new(Vec::new());
@@ -157,7 +157,7 @@ fn converse(mut stream: TcpStream, bus: &Mutex<Bus>, lost: &Outbox<Error>) {
     let Ok(from) = stream.peer_addr() else { return };
     let _ = stream.set_nodelay(true).and_then(|()| stream.set_write_timeout(Some(SLOW)));
     let (mut receiver, mut raw, mut buffer) = (Receiver::new(), Vec::new(), [0; JUNK]);
-    // `gone` is true once an answer could not be delivered. Of what was received by then, only stops are passed.
+    // `gone` is true once an answer could not be delivered. Of the packets received before, only stops are passed then.
     let (mut commands, mut gone) = (false, false);
     'client: while let Ok(count @ 1..) = stream.read(&mut buffer) {
         for byte in &buffer[..count] {
@@ -173,7 +173,7 @@ fn converse(mut stream: TcpStream, bus: &Mutex<Bus>, lost: &Outbox<Error>) {
             let begin = inside.windows(HEADER.len()).rposition(|window| window == HEADER).unwrap_or_default();
             let bytes = std::mem::take(&mut raw).split_off(begin);
             let packet = receiver.packet();
-            if gone && !is_stop(&packet) {
+            if gone && !is_stop(&packet, &parts(&packet)) {
                 continue;
             }
             let (reads, came) = (READS.contains(&packet.instruction), Instant::now());
@@ -188,7 +188,7 @@ fn converse(mut stream: TcpStream, bus: &Mutex<Bus>, lost: &Outbox<Error>) {
                 Ok(answer) if stream.write_all(&answer).is_ok() => {}
                 Ok(_) => {
                     gone = true;
-                    // What was received by now can still be read, nothing later.
+                    // The bytes received so far can still be read; later ones are refused.
                     let _ = stream.shutdown(Shutdown::Both);
                 }
                 Err(why) => {
@@ -222,8 +222,8 @@ impl Bus {
             commander.heard = Instant::now();
         }
         let (commander, parts) = (self.commander(), parts(packet));
-        if commander != Some(from) && is_stop(packet) {
-            // A stopped client stops its own fingers at its end. That does not concern who commands now.
+        if commander != Some(from) && is_stop(packet, &parts) {
+            // A stopped client stops its own fingers before it exits. That takes the command from nobody.
             let cleans = self.commanders.get(&from).is_some_and(|own| parts.iter().all(|part| own.has(part.id)));
             if let Some(other) = commander.and_then(|other| self.commanders.get_mut(&other)) {
                 let meets = parts.iter().any(|part| part.id == BROADCAST || other.has(part.id));
@@ -278,7 +278,7 @@ impl Bus {
         ids.retain(|id| next.is_none_or(|next| !next.has(*id)));
         let own = self.client.id;
         self.client.fed = (why != SILENT).then(Instant::now);
-        // All fingers release at the same time. Then torque goes off one by one.
+        // All fingers release at the same time. Then torque is turned off one finger at a time.
         let [low, high] = address::GOAL_FORCE_MN.to_le_bytes();
         let goals = ids.iter().flat_map(|id| [*id, 0, 0, 0, 0]);
         let params: Vec<u8> = [low, high, 4, 0].into_iter().chain(goals).collect();
@@ -312,20 +312,19 @@ fn stop(client: &mut Client) -> Result<bool, Error> {
     Ok(drives)
 }
 
-/// True if a packet only stops fingers.
-fn is_stop(packet: &Packet<'_>) -> bool {
+/// True if a packet with these parts only stops fingers.
+fn is_stop(packet: &Packet<'_>, parts: &[Part<'_>]) -> bool {
     let stops = |part: &Part<'_>| {
         let register = table::register_at(part.address).filter(|register| STOPS.contains(&register.address));
         register.is_some_and(|register| table::encode(register, 0) == part.data)
     };
-    let parts = parts(packet);
     packet.instruction != instruction::REG_WRITE && !parts.is_empty() && parts.iter().all(stops)
 }
 
 /// Part of a packet for one device, or for all.
 struct Part<'a> {
     id: u8,
-    /// First register that it writes, and data; no data where it is no write.
+    /// Address of the first register written, and the data. A packet that writes nothing has no data.
     address: u16,
     data: &'a [u8],
 }

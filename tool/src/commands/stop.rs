@@ -84,8 +84,8 @@ impl Drop for Moving<'_> {
     }
 }
 
-/// Ends a motion that measures or a grip by the goal 0, then waits until the tip is clear of the object, at most for this
-/// time. Returns the last state, which in other modes is the first. A press that was ended is a grip.
+/// Ends a measuring motion or a grip by goal 0, then waits until the tip is clear of the object, at most for this time.
+/// Returns the last state, which in other modes is the first. A press that was ended is a grip.
 pub(super) fn release(within_s: f64, client: &mut Client) -> Result<State, Error> {
     let (begun, mut clock) = (Instant::now(), Clock::default());
     loop {

@@ -264,7 +264,7 @@ fn a_finger_of_a_group_is_stopped_once_its_commander_has_left() {
     assert_eq!(client.number(address::TORQUE_ENABLE).expect("it answers"), 1, "nobody commanded it");
 }
 
-/// Another client stops one of two. The commander lives, and feeds the other one, until it leaves.
+/// Another client stops one of two fingers. The commander feeds the watchdog of the other one until it leaves.
 #[test]
 fn the_other_fingers_of_a_stopped_commander_are_stopped_once_it_has_left() {
     let finger = Served::patient("grasp");

@@ -223,8 +223,14 @@ impl Bus {
         }
         let (commander, parts) = (self.commander(), parts(packet));
         if commander != Some(from) && is_stop(packet, &parts) {
-            // A stopped client stops its own fingers before it exits. That takes the command from nobody.
-            let cleans = self.commanders.get(&from).is_some_and(|own| parts.iter().all(|part| own.has(part.id)));
+            // A stopped client stops its own fingers before it exits, torque off last. That takes the command from nobody;
+            // what it stops later does.
+            let own = self.commanders.get_mut(&from);
+            let cleans = own.as_ref().is_some_and(|own| parts.iter().all(|part| own.has(part.id)));
+            if let Some(own) = own {
+                let last = |id: &u8| parts.iter().any(|part| part.address == address::TORQUE_ENABLE && part.id == *id);
+                own.ids.retain(|id| !last(id));
+            }
             if let Some(other) = commander.and_then(|other| self.commanders.get_mut(&other)) {
                 let meets = parts.iter().any(|part| part.id == BROADCAST || other.has(part.id));
                 other.stopped = meets && !cleans;

@@ -65,12 +65,8 @@ impl<'a> Moving<'a> {
         halt(self.client)?;
         // Only with torque off: until then nothing else stops the motor once this program has ended. A watchdog that
         // has tripped stays so, for `fingertip recover`.
-        if self.client.again(|client| client.number(address::BUS_WATCHDOG))? >= 0
-            && let Err(why) = self.client.again(|client| client.set(address::BUS_WATCHDOG, watchdog))
-            // Another client of `fingertip share` stopped this finger: it is at rest, and the watchdog is that client's.
-            && !why.refused_with(StatusError::Access as u8)
-        {
-            return Err(why);
+        if self.client.again(|client| client.number(address::BUS_WATCHDOG))? >= 0 {
+            set_watchdog(self.client, watchdog)?;
         }
         released
     }
@@ -170,6 +166,13 @@ pub fn stop_all(args: &Stop, reach: &Reach, json: bool) -> Result<(), Error> {
     if failed.is_empty() { Ok(()) } else { Err(failed.join("; ").into()) }
 }
 
+/// Sets the bus watchdog of a finger with torque off. Where another client of `fingertip share` commands, it is that
+/// client's, and stays. Returns whether it was set.
+fn set_watchdog(client: &mut Client, steps: i64) -> Result<bool, Error> {
+    let set = client.again(|client| client.set(address::BUS_WATCHDOG, steps)).map(|()| true);
+    set.or_else(|why| if why.refused_with(StatusError::Access as u8) { Ok(false) } else { Err(why) })
+}
+
 /// Stops one finger. A grip is released first, so that friction keeps no force at the tip; whatever comes of that, torque
 /// goes off.
 fn stop(client: &mut Client, releases: bool, json: bool) -> Result<Value, Error> {
@@ -180,7 +183,7 @@ fn stop(client: &mut Client, releases: bool, json: bool) -> Result<Value, Error>
     let before = before?;
     halted?;
     let watchdog = client.again(|client| client.number(address::BUS_WATCHDOG))?;
-    client.again(|client| client.set(address::BUS_WATCHDOG, 0))?;
+    let now = if set_watchdog(client, 0)? { "off" } else { "that of the client that commands" };
     let speed = wait_for(client, address::SPEED_UM_PER_S, ROLL_OUT, |speed| speed.abs() < REST_UM_PER_S)?;
     let after = client.again(State::read)?;
     let id = client.id;
@@ -192,7 +195,7 @@ fn stop(client: &mut Client, releases: bool, json: bool) -> Result<Value, Error>
             ..0 => "tripped".into(),
             steps => format!("{} ms", 20 * steps),
         };
-        say(format_args!("torque is off, measurements are aborted, the bus watchdog is off (it was {shown})"));
+        say(format_args!("torque is off, measurements are aborted, the bus watchdog is {now} (it was {shown})"));
         if let Some(fault) = after.fault_name() {
             say(format_args!("fault {} ({fault}) remains: `fingertip recover` clears it", after.fault));
         }

@@ -232,6 +232,8 @@ fn who_was_stopped_does_not_take_the_command_from_who_stopped_it() {
     second.set(address::BUS_WATCHDOG, 0).expect("it still commands");
     second.set(address::BAUD_RATE, 4).expect_err("the broker would not follow");
     second.write(address::ID, &[1, 4]).expect_err("the broker would not follow");
+    first.set(address::TORQUE_ENABLE, 0).expect("anyone stops");
+    second.set(address::BUS_WATCHDOG, 0).expect_err("the first one did not only clean up");
 }
 
 #[test]

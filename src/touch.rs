@@ -288,7 +288,7 @@ impl Touch {
 
     /// Takes note that another object is sought.
     pub fn seek(&mut self) {
-        if matches!(self.stage, Stage::Clear | Stage::Doubtful) {
+        if self.stage == Stage::Clear {
             *self = Self::default();
         }
     }

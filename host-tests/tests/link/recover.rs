@@ -406,10 +406,12 @@ fn a_motion_is_refused_where_it_cannot_begin() {
         bench.capture.state = state;
         assert_eq!(all(&mut bench), [true, false, false], "the capture's memory is in use");
     }
-    // The loop has not taken the jog yet, nor the stop after it: another motion would replace them.
+    // The loop has not taken the jog yet, nor the stop after it: another motion or a capture would replace them.
     let mut waits = Bench::new();
     let answers = [1, 2, 0, 1, 2, 0].map(|task| ask(&mut waits, task).is_ok());
     assert_eq!(answers, [true, false, true, false, false, true]);
+    assert_eq!(waits.write(address::CAPTURE, &[1]), RESULT);
+    assert_eq!(waits.write(address::CAPTURE, &[0]), Ok(()));
     // A stop is never refused. Without a motion to end it changes nothing: it would hide how the last one ended.
     for bench in [&mut Bench::new(), &mut faulted(), &mut bench, &mut waits] {
         let before = bench.server.command();

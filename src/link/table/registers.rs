@@ -247,7 +247,7 @@ control_table! {
     4232 MEASURE_TASK: U8 ReadOnly in 0..=3, |view, _| view.status().measure.task as u32;
     /// 1 arms a capture, which begins with the next tare in mode off and keeps every
     /// frame until its memory is full. 0 ends or cancels it. 1 gives an access error
-    /// with torque on, a result error while frames are being kept. Reads 0.
+    /// with torque on, a result error while frames are being kept, or a motion that measures runs or waits. Reads 0.
     4260 CAPTURE: U8 ReadWrite in 0..=1 = 0, |_, _| 0, Staged::set_capture;
     /// Capture: 0 none since reset, 1 armed, 2 keeping frames, 3 done.
     4261 CAPTURE_STATE: U8 ReadOnly in 0..=3, |view, _| view.snapshot.capture.standing.state as u32;

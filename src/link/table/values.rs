@@ -104,13 +104,13 @@ impl<const ROWS: usize, const COLUMNS: usize> Staged<'_, ROWS, COLUMNS> {
         Ok(())
     }
 
-    /// Arms the capture, or ends it.
+    /// Arms the capture, or ends it. Refused while a motion that measures runs or waits: its record needs the memory.
     pub(super) fn set_capture(&mut self, value: i64) -> Result<(), StatusError> {
         let arm = value != 0;
         if arm && self.settings.command.torque {
             return Err(StatusError::Access);
         }
-        if arm && self.snapshot.records() {
+        if arm && (self.snapshot.records() || self.measures()) {
             return Err(StatusError::Result);
         }
         self.actions.capture = Some(arm);

@@ -19,7 +19,7 @@ const TRIES: usize = 3;
 const PING_BITS: u32 = 14 * 10;
 /// No bus is slower: all IDs would take minutes to answer.
 pub const BAUD_MIN: i64 = 1_200;
-const ID_MAX: u8 = 252;
+pub const ID_MAX: u8 = 252;
 /// Time between two keep-alive packets.
 const FEED: Duration = Duration::from_millis(100);
 
@@ -209,7 +209,7 @@ impl Client {
         while answers > 0
             && let Some(left) = until.checked_duration_since(Instant::now())
         {
-            let bytes = self.line.read(left).map_err(|why| self.lost(why))?;
+            let bytes = self.receive(left)?;
             for byte in &bytes {
                 let event = receiver.push(*byte);
                 let packet = receiver.packet();
@@ -231,44 +231,37 @@ impl Client {
 
     /// Sends an instruction and waits for its answer: `length` bytes behind the error.
     fn ask(&mut self, doing: &str, instruction: u8, params: &[u8], length: usize) -> Result<Vec<u8>, Error> {
-        self.transmit(&packet(self.id, instruction, params))?;
-        // Until the whole answer is here.
-        self.owed = true;
-        let until = Instant::now() + self.timeout;
-        let mut receiver = Receiver::new();
-        let id = self.id;
-        let damaged = |what| {
+        let (id, mut receiver) = (self.id, Receiver::new());
+        let heard = self.pass(&packet(id, instruction, params), Some(id), 1)?;
+        let mut damaged = |what| {
+            // The right answer may come yet.
+            self.owed = true;
             let cause = "is the line noisy, or are there two devices with this ID?";
             Err(Error::Damaged(format!("{doing}: a damaged answer of ID {id} ({what}); {cause}")))
         };
-        while let Some(left) = until.checked_duration_since(Instant::now()) {
-            let bytes = self.line.read(left).map_err(|why| self.lost(why))?;
-            for byte in bytes {
-                let event = receiver.push(byte);
-                let packet = receiver.packet();
-                // On a line that echoes, the instruction comes back too.
-                if packet.id != id || packet.instruction != instruction::STATUS {
-                    continue;
-                }
-                match event {
-                    Some(Event::Packet) => {}
-                    Some(Event::BadCrc) => return damaged("its check sum is wrong"),
-                    _ => continue,
-                }
-                let Some((&error, data)) = packet.params.split_first() else { return damaged("it is empty") };
-                let number = error & !ALERT;
-                if number != 0 {
-                    self.owed = false;
-                    let meaning = table::meaning_of_error(number);
-                    let text = format!("{doing}: refused by ID {id} with error {number}: {meaning}");
-                    return Err(Error::Refused(text, number));
-                }
-                if data.len() != length {
-                    return damaged("it has another length than what was asked for");
-                }
-                self.owed = false;
-                return Ok(data.to_vec());
+        for byte in heard {
+            let event = receiver.push(byte);
+            let packet = receiver.packet();
+            // On a line that echoes, the instruction comes back too.
+            if packet.id != id || packet.instruction != instruction::STATUS {
+                continue;
             }
+            match event {
+                Some(Event::Packet) => {}
+                Some(Event::BadCrc) => return damaged("its check sum is wrong"),
+                _ => continue,
+            }
+            let Some((&error, data)) = packet.params.split_first() else { return damaged("it is empty") };
+            let number = error & !ALERT;
+            if number != 0 {
+                let meaning = table::meaning_of_error(number);
+                let text = format!("{doing}: refused by ID {id} with error {number}: {meaning}");
+                return Err(Error::Refused(text, number));
+            }
+            if data.len() != length {
+                return damaged("it has another length than what was asked for");
+            }
+            return Ok(data.to_vec());
         }
         let (port, baud, waited_ms) = (&self.port, self.baud, self.timeout.as_millis());
         Err(Error::Silent(format!(
@@ -279,14 +272,32 @@ impl Client {
 
     fn transmit(&mut self, packet: &[u8]) -> Result<(), Error> {
         self.settle()?;
-        self.line.discard().map_err(|why| self.lost(why))?;
-        if self.fed.is_some_and(|fed| fed.elapsed() >= FEED) {
-            self.fed = Some(Instant::now());
-            // A Sync Write to no device is a broadcast: it feeds all bus watchdogs.
-            let keep_alive = self::packet(BROADCAST, instruction::SYNC_WRITE, &[0; 4]);
-            self.line.write(&keep_alive).map_err(|why| self.lost(why))?;
-        }
+        self.line.discard().and_then(|()| self.feed()).map_err(|why| self.lost(why))?;
         self.line.write(packet).map_err(|why| self.lost(why))
+    }
+
+    /// Sends a keep-alive packet once one is due.
+    fn feed(&mut self) -> io::Result<()> {
+        if self.fed.is_none_or(|fed| fed.elapsed() < FEED) {
+            return Ok(());
+        }
+        self.fed = Some(Instant::now());
+        // A Sync Write to no device is a broadcast: it feeds all bus watchdogs.
+        self.line.write(&packet(BROADCAST, instruction::SYNC_WRITE, &[0; 4]))
+    }
+
+    /// Reads within this time; empty after it. Keep-alive packets are sent meanwhile, except while an answer to a
+    /// broadcast Ping may be on the line.
+    fn receive(&mut self, mut within: Duration) -> Result<Vec<u8>, Error> {
+        let pause = FEED.max(self.ping_slots());
+        loop {
+            let bytes = self.line.read(within.min(pause)).map_err(|why| self.lost(why))?;
+            if !bytes.is_empty() || within <= pause {
+                return Ok(bytes);
+            }
+            within -= pause;
+            self.feed().map_err(|why| self.lost(why))?;
+        }
     }
 
     /// Waits until the line is silent where an answer may come yet: the protocol does not number its packets, so a late
@@ -295,7 +306,7 @@ impl Client {
         // A line that babbles does not fall silent.
         let until = Instant::now() + 3 * self.timeout;
         while std::mem::take(&mut self.owed) {
-            let heard = !self.line.read(self.timeout).map_err(|why| self.lost(why))?.is_empty();
+            let heard = !self.receive(self.timeout)?.is_empty();
             self.owed = heard && Instant::now() < until;
         }
         Ok(())

@@ -6,14 +6,14 @@
 //! Packets of the commander, and writes, go before reads of others: they wait for one exchange at most.
 
 use super::{Interrupt, aside, say, stop};
-use crate::client::{self, Reach};
+use crate::client::{self, ID_MAX, Reach};
 use crate::{Client, Error, table};
-use fingertip::link::Reply;
-use fingertip::link::packet::{BROADCAST, Event, HEADER, Packet, Receiver, Sender, StatusError, instruction};
+use fingertip::link::packet::{BROADCAST, Event, HEADER, Packet, REPLY_MAX, Receiver, StatusError, instruction};
 use fingertip::shipped::address;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{Read as _, Write as _};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
+use std::ops::RangeInclusive;
 use std::sync::mpsc::{Sender as Outbox, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::ThreadId;
@@ -31,6 +31,8 @@ const READS: [u8; 6] = [
 /// Registers to which every client may write 0, to stop a finger.
 const STOPS: [u16; 5] =
     [address::TORQUE_ENABLE, address::MEASURE, address::GOAL_FORCE_MN, address::SHORT_GOAL_MN, address::MIRROR_GOAL_MN];
+/// Number of goals that fit in one Sync Write: an ID and four bytes each, beside 14 bytes.
+const GOALS: usize = (REPLY_MAX - 14) / 5;
 /// Reason for a stop during which the bus watchdogs are not fed.
 const SILENT: &str = "its client is silent";
 /// Longest release of a finger whose client left, s of the controller's clock. Other clients wait that long.
@@ -59,30 +61,24 @@ pub struct Args {
     listen: SocketAddr,
 }
 
-/// The bus, and the client that commands on it.
+/// The bus, and the clients that sent a packet on it.
 struct Bus {
     client: Client,
-    commanders: BTreeMap<SocketAddr, Commander>,
+    connections: BTreeMap<SocketAddr, Connection>,
     /// True if the last packet was urgent.
     urgent: bool,
 }
 
-/// A client that wrote.
-struct Commander {
-    /// Fingers that it wrote to: they are stopped once it leaves or is silent, except those of the next commander.
+#[derive(Default)]
+struct Connection {
+    /// IDs that it wrote to: they are stopped once it leaves or is silent, except those of the next commander.
     ids: BTreeSet<u8>,
     /// Bus watchdogs that it set, by ID.
     watchdogs: BTreeMap<u8, Duration>,
     /// Instant of its last packet.
-    heard: Instant,
+    heard: Option<Instant>,
     /// True once another client stopped one of its fingers: it writes no more.
     stopped: bool,
-}
-
-impl Commander {
-    fn has(&self, id: u8) -> bool {
-        self.ids.contains(&id) || self.ids.contains(&BROADCAST)
-    }
 }
 
 /// Serves until Ctrl-C, then stops what is still commanded.
@@ -96,7 +92,7 @@ pub fn run(args: &Args, reach: &Reach) -> Result<(), Error> {
     let address = listener.local_addr().map_err(cannot)?;
     say(format_args!("shares {} at tcp:{address}; Ctrl-C ends it", client.port));
     say(format_args!("next, in other terminals: fingertip --port tcp:{address} view"));
-    let bus = Arc::new(Mutex::new(Bus { client, commanders: BTreeMap::new(), urgent: false }));
+    let bus = Arc::new(Mutex::new(Bus { client, connections: BTreeMap::new(), urgent: false }));
     let (lost, losses) = channel();
     let shared = Arc::clone(&bus);
     std::thread::spawn(move || {
@@ -117,7 +113,7 @@ pub fn run(args: &Args, reach: &Reach) -> Result<(), Error> {
         }
     }
     let mut bus = turn(&bus, true);
-    for from in bus.commanders.keys().copied().collect::<Vec<_>>() {
+    for from in bus.connections.keys().copied().collect::<Vec<_>>() {
         bus.end_command(from, "`fingertip share` ends");
     }
     // Until the process exits, no client may move what was stopped.
@@ -200,7 +196,7 @@ fn converse(mut stream: TcpStream, bus: &Mutex<Bus>, lost: &Outbox<Error>) {
     }
     let mut bus = turn(bus, commands);
     bus.end_command(from, "its client left");
-    bus.commanders.remove(&from);
+    bus.connections.remove(&from);
 }
 
 impl Bus {
@@ -211,84 +207,79 @@ impl Bus {
         }
         // Reads of others would feed the watchdogs of a silent client.
         let slack = self.client.timeout;
-        let silent = |(other, commander): (&SocketAddr, &Commander)| {
-            let most = commander.watchdogs.values().min();
-            (*other != from && most.is_some_and(|most| commander.heard.elapsed() > *most + slack)).then_some(*other)
+        let silent = |(other, connection): (&SocketAddr, &Connection)| {
+            let (heard, most) = (connection.heard?, *connection.watchdogs.values().min()?);
+            (*other != from && heard.elapsed() > most + slack).then_some(*other)
         };
-        for other in self.commanders.iter().filter_map(silent).collect::<Vec<_>>() {
+        for other in self.connections.iter().filter_map(silent).collect::<Vec<_>>() {
             self.end_command(other, SILENT);
         }
-        if let Some(commander) = self.commanders.get_mut(&from) {
-            commander.heard = Instant::now();
-        }
         let (commander, parts) = (self.commander(), parts(packet));
+        let mut ids = parts.iter().flat_map(|part| part.ids.clone());
+        let own = self.connections.entry(from).or_default();
+        own.heard = Some(Instant::now());
         if commander != Some(from) && is_stop(packet, &parts) {
             // A stopped client stops its own fingers before it exits, torque off last. That takes the command from nobody;
             // what it stops later does.
-            let own = self.commanders.get_mut(&from);
-            let cleans = own.as_ref().is_some_and(|own| parts.iter().all(|part| own.has(part.id)));
-            if let Some(own) = own {
-                let last = |id: &u8| parts.iter().any(|part| part.address == address::TORQUE_ENABLE && part.id == *id);
-                own.ids.retain(|id| !last(id));
-            }
-            if let Some(other) = commander.and_then(|other| self.commanders.get_mut(&other)) {
-                let meets = parts.iter().any(|part| part.id == BROADCAST || other.has(part.id));
-                other.stopped = meets && !cleans;
+            let cleans = ids.clone().all(|id| own.ids.contains(&id));
+            let last = |part: &Part<'_>, id: &u8| part.address == address::TORQUE_ENABLE && part.ids.contains(id);
+            own.ids.retain(|id| !parts.iter().any(|part| last(part, id)));
+            if let Some(other) = commander.and_then(|other| self.connections.get_mut(&other)) {
+                other.stopped = !cleans && ids.any(|id| other.ids.contains(&id));
             }
         } else if !READS.contains(&packet.instruction) {
-            let known = self.commanders.get(&from);
-            let stopped = known.is_some_and(|own| own.stopped) || commander.is_some_and(|other| other != from);
-            let baud = parts.iter().any(|part| part.byte(address::BAUD_RATE).is_some());
-            // A write to no device feeds the watchdogs. A stopped client keeps its other fingers alive by it.
-            let refused = if parts.is_empty() { known.is_none() } else { stopped || baud };
-            if refused {
-                return Ok(if packet.id == BROADCAST { Vec::new() } else { refusal(packet.id) });
-            }
-            let new = || Commander {
-                ids: BTreeSet::new(),
-                watchdogs: BTreeMap::new(),
-                heard: Instant::now(),
-                stopped: false,
+            let stopped = own.stopped || commander.is_some_and(|other| other != from);
+            // The port keeps its speed. A Reg Write acts later or never, so it would not be known which watchdog runs.
+            let later = packet.instruction == instruction::REG_WRITE;
+            let fixed = |part: &Part<'_>| {
+                part.byte(address::BAUD_RATE).is_some() || later && part.byte(address::BUS_WATCHDOG).is_some()
             };
-            let commander = self.commanders.entry(from).or_insert_with(new);
-            commander.ids.extend(parts.iter().map(|part| part.id));
+            // A write to no device feeds the watchdogs. A stopped client keeps its other fingers alive by it.
+            let refused = if parts.is_empty() { own.ids.is_empty() } else { stopped || parts.iter().any(fixed) };
+            if refused {
+                let refusal = client::packet(packet.id, instruction::STATUS, &[StatusError::Access as u8]);
+                return Ok(if packet.id == BROADCAST { Vec::new() } else { refusal.to_vec() });
+            }
+            own.ids.extend(ids);
             let reset = (packet.instruction == instruction::REBOOT).then_some(0);
             for part in &parts {
                 let Some(steps) = reset.or(part.byte(address::BUS_WATCHDOG)) else { continue };
-                commander.watchdogs.retain(|id, _| ![*id, BROADCAST].contains(&part.id));
+                own.watchdogs.retain(|id, _| !part.ids.contains(id));
                 if steps > 0 {
-                    commander.watchdogs.insert(part.id, Duration::from_millis(20 * u64::from(steps)));
+                    let most = Duration::from_millis(20 * u64::from(steps));
+                    own.watchdogs.extend(part.ids.clone().map(|id| (id, most)));
                 }
             }
         }
         self.client.pass(raw, Some(packet.id).filter(|id| *id != BROADCAST), answers(packet))
     }
 
-    /// The client that may write.
+    /// The client that may write: it wrote and was not stopped.
     fn commander(&self) -> Option<SocketAddr> {
-        self.commanders.iter().find(|(_, commander)| !commander.stopped).map(|(from, _)| *from)
+        self.connections.iter().find(|(_, one)| !one.stopped && !one.ids.is_empty()).map(|(from, _)| *from)
     }
 
     /// Ends the command of a client: what it left with torque on is released and stopped.
     fn end_command(&mut self, from: SocketAddr, why: &str) {
-        let Some(commander) = self.commanders.get_mut(&from) else { return };
-        let mut ids = std::mem::take(&mut commander.ids);
-        commander.watchdogs.clear();
-        if !commander.stopped {
-            self.commanders.remove(&from);
-        }
-        if ids.remove(&BROADCAST) {
-            ids.extend(self.client.ping_all().unwrap_or_default().iter().map(|pong| pong.id));
-        }
-        let next = self.commander().and_then(|next| self.commanders.get(&next));
-        ids.retain(|id| next.is_none_or(|next| !next.has(*id)));
-        let own = self.client.id;
+        let Some(Connection { ids, watchdogs, .. }) = self.connections.get_mut(&from) else { return };
+        watchdogs.clear();
+        let ids = std::mem::take(ids);
+        let next = self.commander().map(|next| &self.connections[&next].ids);
+        let mut ids: Vec<u8> = ids.into_iter().filter(|id| next.is_none_or(|next| !next.contains(id))).collect();
         self.client.fed = (why != SILENT).then(Instant::now);
+        // A client that wrote by broadcast: absent IDs would take a time-out each.
+        if ids.len() > GOALS {
+            let found = self.client.ping_all().unwrap_or_default();
+            ids.retain(|id| found.iter().any(|pong| pong.id == *id));
+        }
+        let own = self.client.id;
         // All fingers release at the same time. Then torque is turned off one finger at a time.
         let [low, high] = address::GOAL_FORCE_MN.to_le_bytes();
-        let goals = ids.iter().flat_map(|id| [*id, 0, 0, 0, 0]);
-        let params: Vec<u8> = [low, high, 4, 0].into_iter().chain(goals).collect();
-        let _ = self.client.pass(&client::packet(BROADCAST, instruction::SYNC_WRITE, &params), None, 0);
+        for some in ids.chunks(GOALS) {
+            let goals = some.iter().flat_map(|id| [*id, 0, 0, 0, 0]);
+            let params: Vec<u8> = [low, high, 4, 0].into_iter().chain(goals).collect();
+            let _ = self.client.pass(&client::packet(BROADCAST, instruction::SYNC_WRITE, &params), None, 0);
+        }
         for id in ids {
             self.client.id = id;
             match stop(&mut self.client) {
@@ -329,7 +320,8 @@ fn is_stop(packet: &Packet<'_>, parts: &[Part<'_>]) -> bool {
 
 /// Part of a packet for one device, or for all.
 struct Part<'a> {
-    id: u8,
+    /// IDs that it reaches.
+    ids: RangeInclusive<u8>,
     /// Address of the first register written, and the data. A packet that writes nothing has no data.
     address: u16,
     data: &'a [u8],
@@ -344,25 +336,26 @@ impl Part<'_> {
 
 fn parts<'a>(packet: &Packet<'a>) -> Vec<Part<'a>> {
     let Packet { id, instruction, params, .. } = *packet;
+    let ids = |id| if id == BROADCAST { 0..=ID_MAX } else { id..=id };
     let word = |low: &u8, high: &u8| u16::from_le_bytes([*low, *high]);
     match (instruction, params) {
         (instruction::WRITE | instruction::REG_WRITE, [low, high, data @ ..]) => {
-            vec![Part { id, address: word(low, high), data }]
+            vec![Part { ids: ids(id), address: word(low, high), data }]
         }
         (instruction::SYNC_WRITE, [low, high, short, long, all @ ..]) => {
             let each = all.chunks(1 + usize::from(word(short, long)));
-            each.map(|one| Part { id: one[0], address: word(low, high), data: &one[1..] }).collect()
+            each.map(|one| Part { ids: ids(one[0]), address: word(low, high), data: &one[1..] }).collect()
         }
         (instruction::BULK_WRITE, mut rest) => {
             let mut parts = Vec::new();
             while let [id, low, high, short, long, all @ ..] = rest {
                 let (data, behind) = all.split_at(all.len().min(usize::from(word(short, long))));
-                parts.push(Part { id: *id, address: word(low, high), data });
+                parts.push(Part { ids: ids(*id), address: word(low, high), data });
                 rest = behind;
             }
             parts
         }
-        _ => vec![Part { id, address: 0, data: &[] }],
+        _ => vec![Part { ids: ids(id), address: 0, data: &[] }],
     }
 }
 
@@ -374,11 +367,4 @@ fn answers(packet: &Packet<'_>) -> usize {
         instruction::PING if packet.id == BROADCAST => usize::MAX,
         _ => usize::from(packet.id != BROADCAST),
     }
-}
-
-/// The answer to a write while another client commands.
-fn refusal(id: u8) -> Vec<u8> {
-    let mut reply = Reply::new();
-    Sender::status(&mut reply, id, Some(StatusError::Access), false).finish();
-    reply.to_vec()
 }

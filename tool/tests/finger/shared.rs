@@ -2,7 +2,7 @@
 
 use crate::served::{Served, client, ended, line_with};
 use crate::stopped::RESIDUAL_N;
-use fingertip::link::packet::{BROADCAST, instruction};
+use fingertip::link::packet::{BROADCAST, StatusError, instruction};
 use fingertip::shipped::address;
 use fingertip::state::Mode;
 use fingertip_cli::Client;
@@ -27,6 +27,12 @@ fn broker(finger: &Served, listen: &str, timeout: &str) -> (Child, String) {
     let line = line_with("tcp:", broker.stdout.take().expect("a pipe"));
     let address = line.split("tcp:").nth(1).and_then(|rest| rest.split(';').next()).expect("an address");
     (broker, address.to_owned())
+}
+
+/// Writes `length` bytes of several devices: `values` has each ID and its bytes. No device answers.
+fn sync_write(client: &mut Client, register: u16, length: u8, values: &[u8]) {
+    let params = [&register.to_le_bytes()[..], &[length, 0], values].concat();
+    client.pass(&packet(BROADCAST, instruction::SYNC_WRITE, &params), None, 0).expect("it listens");
 }
 
 impl Shared {
@@ -64,6 +70,14 @@ impl Shared {
         let press = self.start(&["press", "1", "--seconds", "1000000", "--within-s", "3600"]);
         self.finger.until("Force:");
         press
+    }
+
+    /// Ends the broker. Returns the number of its packets meanwhile.
+    fn packets_at_its_end(&mut self) -> u64 {
+        let before = self.finger.heard();
+        Served::interrupt(&self.broker);
+        self.broker.wait().expect("it ends");
+        self.finger.heard() - before
     }
 
     fn until_released(&self) {
@@ -217,11 +231,12 @@ fn clients_that_send_junk_or_read_nothing_block_nobody() {
     assert_eq!(client.ping_all().expect("it answers").len(), 1);
 }
 
-/// The stopped program turns torque off, too.
+/// The stopped program turns torque off, too. It wrote by broadcast.
 #[test]
-fn who_was_stopped_does_not_take_the_command_from_who_stopped_it() {
-    let shared = Shared::begin("wall");
+fn a_stop_takes_the_command_except_to_clean_up_or_of_another_finger() {
+    let mut shared = Shared::begin("wall");
     let (mut first, mut second) = (shared.client(), shared.client());
+    first.set_all(address::BUS_WATCHDOG, 25).expect("it listens");
     first.set(address::BUS_WATCHDOG, 25).expect("it obeys");
     for _ in 0..2 {
         second.set(address::TORQUE_ENABLE, 0).expect("anyone stops");
@@ -229,23 +244,36 @@ fn who_was_stopped_does_not_take_the_command_from_who_stopped_it() {
     second.set(address::BUS_WATCHDOG, 0).expect("it commands now");
     first.set(address::TORQUE_ENABLE, 0).expect("anyone stops");
     first.set(address::BUS_WATCHDOG, 25).expect_err("it was stopped");
+    let mut third = shared.client();
+    sync_write(&mut third, address::TORQUE_ENABLE, 1, &[9, 0]);
+    third.ping().expect("it answers");
     second.set(address::BUS_WATCHDOG, 0).expect("it still commands");
     second.set(address::BAUD_RATE, 4).expect_err("the broker would not follow");
     second.write(address::ID, &[1, 4]).expect_err("the broker would not follow");
+    let [low, high] = address::BUS_WATCHDOG.to_le_bytes();
+    let answer = second.pass(&packet(1, instruction::REG_WRITE, &[low, high, 0]), Some(1), 1).expect("it answers");
+    assert_eq!(answer[8], StatusError::Access as u8, "the broker would not know when it acts");
     first.set(address::TORQUE_ENABLE, 0).expect("anyone stops");
     second.set(address::BUS_WATCHDOG, 0).expect_err("the first one did not only clean up");
+    for client in [&mut first, &mut second] {
+        client.set_all(address::TORQUE_ENABLE, 0).expect("it listens");
+        client.ping().expect("it answers");
+    }
+    assert_eq!(shared.packets_at_its_end(), 0, "no finger is left to stop");
 }
 
+/// The clock of the finger waits for packets, so its watchdog does not trip: the keep-alive packets are counted.
 #[test]
-fn a_stop_of_another_finger_leaves_a_commander_its_command() {
-    let shared = Shared::begin("wall");
-    let (mut first, mut second) = (shared.client(), shared.client());
-    first.set(address::BUS_WATCHDOG, 0).expect("it obeys");
-    let [low, high] = address::TORQUE_ENABLE.to_le_bytes();
-    let other = packet(BROADCAST, instruction::SYNC_WRITE, &[low, high, 1, 0, 9, 0]);
-    second.pass(&other, None, 0).expect("anyone stops");
-    second.ping().expect("it answers");
-    first.set(address::BUS_WATCHDOG, 0).expect("it still commands");
+fn the_end_feeds_all_fingers_and_asks_many_ids_by_one_ping() {
+    for (last, packets) in [(9, 8..60), (9 + 80, 2..8)] {
+        let mut shared = Shared::within("900", Served::patient("wall"));
+        let mut client = shared.client();
+        let steps: Vec<u8> = (9..=last).flat_map(|id| [id, 25]).collect();
+        sync_write(&mut client, address::BUS_WATCHDOG, 1, &steps);
+        client.ping().expect("it answers");
+        let sent = shared.packets_at_its_end();
+        assert!(packets.contains(&sent), "{sent} packets, IDs 9 to {last}");
+    }
 }
 
 #[test]
@@ -255,9 +283,7 @@ fn a_finger_of_a_group_is_stopped_once_its_commander_has_left() {
     finger.tared(2).set(address::TORQUE_ENABLE, 1).expect("it obeys");
     let shared = Shared::of(finger);
     let mut commander = shared.client();
-    let [low, high] = address::TORQUE_ENABLE.to_le_bytes();
-    let torque = packet(BROADCAST, instruction::SYNC_WRITE, &[low, high, 1, 0, 1, 1]);
-    commander.pass(&torque, None, 0).expect("it listens");
+    sync_write(&mut commander, address::TORQUE_ENABLE, 1, &[1, 1]);
     while commander.number(address::TORQUE_ENABLE).expect("it answers") != 1 {}
     drop(commander);
     shared.until_released();
@@ -280,15 +306,13 @@ fn the_other_fingers_of_a_stopped_commander_are_stopped_once_it_has_left() {
         first.set(address::TORQUE_ENABLE, 1).expect("it obeys");
     }
     first.set(address::BUS_WATCHDOG, 50).expect("it obeys");
-    let [low, high] = address::GOAL_FORCE_MN.to_le_bytes();
-    let none = packet(BROADCAST, instruction::SYNC_WRITE, &[low, high, 4, 0, 1, 0, 0, 0, 0]);
-    second.pass(&none, None, 0).expect("anyone stops");
+    sync_write(&mut second, address::GOAL_FORCE_MN, 4, &[1, 0, 0, 0, 0]);
     second.number(address::TORQUE_ENABLE).expect("it answers");
     first.set(address::GOAL_FORCE_MN, 500).expect_err("it was stopped");
     first.id = 1;
     let begun_s = shared.finger.now_s();
     while shared.finger.now_s() < begun_s + 3.0 {
-        first.pass(&packet(BROADCAST, instruction::SYNC_WRITE, &[0; 4]), None, 0).expect("it listens");
+        sync_write(&mut first, 0, 0, &[]);
         first.ping().expect("it answers");
     }
     second.id = 2;

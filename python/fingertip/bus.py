@@ -13,7 +13,7 @@ from typing import Any, Dict, Iterable, List, Mapping, Optional, Set, Type, Unio
 from . import registers as reg
 from .device import encoded
 from .finger import MODEL, PATIENCE_S, Finger, check_silence
-from .line import DAMAGED, FingertipError, Line, NoAnswer, PortLost, Refused
+from .line import DAMAGED, FORBIDDEN, FingertipError, Line, NoAnswer, PortLost, Refused
 from .state import FIRST, Mode, State, length
 
 _RELEASE_S = 0.5  # longest wait for the release when a bus or the program ends
@@ -209,13 +209,15 @@ class Bus:
         if silence_s is None:
             return self.unwatch(ids)
         with self.line.lock:
+            added = [device_id for device_id in ids if device_id not in self._silence_s]
             self._silence_s.update(dict.fromkeys(ids, silence_s))
             self.line.feed_s = min(self._silence_s.values()) / 4
             if self._feeder is None:
                 self._feeder = threading.Thread(target=self._feed, daemon=True)
                 self._feeder.start()
         failed = self._set(reg.BUS_WATCHDOG, dict.fromkeys(ids, 20 * round(silence_s / 0.02)))
-        self._forget(failed)
+        if failed:
+            self.unwatch([*added, *failed], failed)
         _check(failed)
 
     def _feed(self) -> None:
@@ -232,18 +234,17 @@ class Bus:
             time.sleep(feed_s / 2)
 
     def unwatch(self, ids: Iterable[int], failed: Iterable[int] = ()) -> None:
-        """Turns the watchdogs off and feeds them no more. Those of fingers that did not answer stay on, to stop them."""
-        watched = [device_id for device_id in ids if device_id in self._silence_s]
-        unanswered = self._set(reg.BUS_WATCHDOG, {device_id: 0 for device_id in watched if device_id not in failed})
-        self._forget(watched)
-        _check(unanswered)
+        """Turns the watchdogs off and feeds them no more. Those of fingers that did not answer stay on, to stop them.
 
-    def _forget(self, ids: Iterable[int]) -> None:
-        """Feeds the watchdogs of these fingers no more."""
+        Where another client of `fingertip share` commands, the watchdogs are left to that client.
+        """
+        watched = [device_id for device_id in ids if device_id in self._silence_s]
+        kept = self._set(reg.BUS_WATCHDOG, {device_id: 0 for device_id in watched if device_id not in failed})
         with self.line.lock:
-            for device_id in ids:
+            for device_id in watched:
                 self._silence_s.pop(device_id, None)
             self.line.feed_s = min(self._silence_s.values()) / 4 if self._silence_s else None
+        _check({device_id: why for device_id, why in kept.items() if getattr(why, "number", None) != FORBIDDEN})
 
     def _look(self, ids: Iterable[int], pressures: bool = False) -> "Dict[int, Union[State, FingertipError]]":
         """The states of these fingers; for a finger without one the error."""
@@ -282,7 +283,10 @@ class Bus:
             self.line.sync_write(register.address, register.width, data)
 
     def _set(self, register: reg.Register, values: Mapping[int, int]) -> Dict[int, FingertipError]:
-        """Writes a register of each finger, with an answer. Returns the failures."""
+        """Writes a register of each finger, with an answer. Returns the failures.
+
+        The register must be one that can be written while torque is on: then only `fingertip share` refuses with error 7.
+        """
         failed: Dict[int, FingertipError] = {}
         for device_id, value in values.items():
             for _ in range(1 if device_id in self._absent else _TRIES):
@@ -292,11 +296,13 @@ class Bus:
                     break
                 except NoAnswer as why:
                     failed[device_id] = why
-                except PortLost:
-                    raise
-                except FingertipError as why:
+                except Refused as why:
                     failed[device_id] = why
-                    if not isinstance(why, Refused) or why.number != DAMAGED:
+                    if why.number == FORBIDDEN:
+                        # Another client commands. Once this one leaves, `share` stops all its fingers but those of the other.
+                        for finger in self.fingers.values():
+                            finger.wrote = False
+                    if why.number != DAMAGED:
                         break
         return failed
 

@@ -19,7 +19,7 @@ _ERRORS = {
     6: "a value beyond what other registers allow",
     7: "the register cannot be written, or not while torque is on",
 }
-DAMAGED = 3
+DAMAGED, FORBIDDEN = 3, 7
 _ALERT = 0x80
 _BROADCAST = 254
 _TCP, _BUSY = "tcp:", b"busy: "

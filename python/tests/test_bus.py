@@ -151,13 +151,33 @@ class Group(OnServed):
         self.open_bus().close()
         bus = self.open_bus(tared=False)
         refused = mock.patch.object(Device, "write_bytes", side_effect=Refused("write", 7))
-        for wrote, silence_s in [(False, None), (False, LONG_S), (True, LONG_S)]:
+        for wrote, silence_s in [(False, None), (False, LONG_S), (True, None), (True, LONG_S)]:
             for finger in bus.fingers.values():
                 finger.wrote = wrote
             with refused, mock.patch.object(bus.line, "sync_write") as told, self.assertRaises(Refused):
                 bus.press(0.5, silence_s)
             told.assert_not_called()
-            self.assertEqual([finger.wrote for finger in bus.fingers.values()], [wrote] * 2)
+            self.assertEqual([finger.wrote for finger in bus.fingers.values()], [False] * 2, "nothing to release at the end")
+
+    def test_a_release_after_another_client_took_the_command_raises_nothing(self) -> None:
+        bus = self.pressing()
+        write = Device.write_bytes
+
+        def share(device: Device, address: int, data: bytes, doing: str = "") -> None:
+            if any(data) or address == reg.BUS_WATCHDOG.address:
+                raise Refused(doing, 7)
+            write(device, address, data, doing)
+
+        with mock.patch.object(Device, "write_bytes", share):
+            bus.release()
+        self.assert_released(ids=[1, 2])
+        self.assertIsNone(bus.line.feed_s)
+
+    def test_a_watchdog_that_one_refuses_is_turned_off_at_the_others(self) -> None:
+        bus = self.open_bus()
+        bus.fingers[2].write_bytes = mock.Mock(side_effect=Refused("write", 7))  # type: ignore[method-assign]
+        self.assertRaises(Refused, bus.press, 0.5, LONG_S)
+        self.assertEqual((bus.fingers[1].read(reg.BUS_WATCHDOG), bus.line.feed_s), (0, None))
 
     def test_one_that_does_not_answer_does_not_keep_the_others(self) -> None:
         bus = self.pressing(SOON_MS)

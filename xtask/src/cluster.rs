@@ -1,23 +1,21 @@
-//! The examples for clusters, tried on this machine: Slurm with one node, GNU parallel, the shell of the Kubernetes job.
+//! The examples for clusters, tried on this machine: tasks of a Slurm array and pods of a Kubernetes job, each in its
+//! environment, and GNU parallel.
 
 use crate::console::{self, Console};
 use crate::host;
 use crate::host::Program;
 use crate::install::{self, Environment};
-use anyhow::{Context, Result, bail};
-use std::net::TcpListener;
-use std::os::unix::fs::PermissionsExt;
+use anyhow::{Context, Result};
+use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::time::Duration;
-use std::{fs, thread};
+use std::process::Command;
 
 /// Shares and runs of the sweep, and its scene: one that draws, and breaks bounds in none of these.
-const SHARES: &str = "3";
+const SHARES: u32 = 3;
 const SEEDS: &str = "12";
 const SCENE: &str = "host-tests/sim/scenes/raspberry.toml";
-/// Which Debian packages have what the examples need.
-const PACKAGES: [&str; 5] = ["munge", "parallel", "slurm-client", "slurmctld", "slurmd"];
+/// Debian package that an example needs.
+const PACKAGES: [&str; 1] = ["parallel"];
 /// Script that summarises the runs, and reads the Kubernetes job.
 const CLIENTS: Environment = Environment {
     folder: "venv-cluster",
@@ -26,7 +24,7 @@ const CLIENTS: Environment = Environment {
     does: "the summary of a sweep is tried by it",
 };
 
-/// Makes sure of the schedulers and of a Python with the rest, and returns its interpreter.
+/// Makes sure of GNU parallel and of a Python with the rest, and returns its interpreter.
 pub fn ensure(console: &mut Console) -> Result<PathBuf> {
     install::packages(&PACKAGES, "the test of the examples for clusters", console)?;
     install::environment(&CLIENTS, console)
@@ -53,17 +51,16 @@ pub fn run(console: &mut Console) -> Result<()> {
     tried("one sweep", &mut command, console)?;
 
     let shared = folder.join("slurm");
-    let slurm = Slurm::start(console)?;
-    let mut command = slurm.command("sbatch");
-    command.args(["--wait", "--output=/dev/null"]).arg(format!("--array=1-{SHARES}")).arg(examples.join("slurm.sh"));
-    given(&mut command, &shared);
-    tried("an array job of Slurm", &mut command, console)?;
-    drop(slurm);
+    for task in 1..=SHARES {
+        let mut command = slurm_task([task, 1, SHARES, SHARES]);
+        given(&mut command, &shared);
+        tried("a task of a Slurm array", &mut command, console)?;
+    }
     same(&sweep, &whole, &shared)?;
 
     let parallel = folder.join("parallel");
     let mut command = Command::new(examples.join("parallel.sh"));
-    given(command.arg(SHARES), &parallel);
+    given(command.arg(SHARES.to_string()), &parallel);
     tried("GNU parallel", &mut command, console)?;
     same(&sweep, &whole, &parallel)?;
 
@@ -76,7 +73,12 @@ pub fn run(console: &mut Console) -> Result<()> {
     }
     let check = host::root().join("xtask/src/cluster/check.py");
     let mut command = Command::new(&python);
-    command.arg(&check).arg("kubernetes").arg(examples.join("kubernetes.yaml")).arg(&kubernetes).args([SEEDS, SHARES]);
+    command
+        .arg(&check)
+        .arg("kubernetes")
+        .arg(examples.join("kubernetes.yaml"))
+        .arg(&kubernetes)
+        .args([SEEDS, &SHARES.to_string()]);
     tried("the shell of the Kubernetes job", &mut command, console)?;
     same(&sweep, &whole, &kubernetes)?;
 
@@ -98,8 +100,7 @@ fn tried(what: &str, command: &mut Command, console: &Console) -> Result<()> {
 fn same(sweep: &Path, whole: &Path, folder: &Path) -> Result<()> {
     let mut merge = Command::new(sweep);
     let share = |number: u32| folder.join(format!("runs-{number}-of-{SHARES}.csv"));
-    let shares = SHARES.parse().unwrap_or(0);
-    merge.arg("merge").args((1..=shares).map(share)).arg("--out").arg(folder);
+    merge.arg("merge").args((1..=SHARES).map(share)).arg("--out").arg(folder);
     console::output(&mut merge)?;
     for file in ["runs.csv", "summary.csv"] {
         let read = |folder: &Path| fs::read(folder.join(file)).with_context(|| format!("cannot read {file}"));
@@ -112,123 +113,13 @@ fn same(sweep: &Path, whole: &Path, folder: &Path) -> Result<()> {
     Ok(())
 }
 
-// Slurm with one node, as long as a value of this lives.
-
-/// Number of attempts to reach the controller, and the time between two of them.
-const TRIES: u32 = 600;
-const BETWEEN: Duration = Duration::from_millis(100);
-
-/// The daemons, and the folder with all that is theirs. It is not in the build folder: the path of a socket is short.
-pub struct Slurm {
-    folder: PathBuf,
-    daemons: Vec<Child>,
-}
-
-impl Slurm {
-    /// Starts the daemons, and waits until the controller answers.
-    pub fn start(console: &mut Console) -> Result<Self> {
-        let folder = std::env::temp_dir().join(format!("fingertip-slurm-{}", std::process::id()));
-        let mut slurm = Self { folder, daemons: Vec::new() };
-        slurm.lay_out().context("cannot lay out a folder for Slurm")?;
-        let folder = slurm.folder.clone();
-        let mut munged = Command::new("munged");
-        for (option, file) in
-            [("key-file", "key"), ("socket", "socket"), ("pid-file", "pid"), ("log-file", "log"), ("seed-file", "seed")]
-        {
-            munged.arg(format!("--{option}={}", folder.join(format!("munge.{file}")).display()));
-        }
-        slurm.spawn(munged.args(["--foreground", "--force"]))?;
-        slurm.spawn(Command::new("slurmctld").arg("-D").env("SLURM_CONF", folder.join("slurm.conf")))?;
-        slurm.spawn(Command::new("slurmd").arg("-D").env("SLURM_CONF", folder.join("slurm.conf")))?;
-        console.say("Started Slurm with one node.");
-        for _ in 0..TRIES {
-            let answer = slurm.command("sinfo").args(["--noheader", "--states=idle", "--format=%n"]).output();
-            if answer.is_ok_and(|answer| answer.status.success() && !answer.stdout.is_empty()) {
-                return Ok(slurm);
-            }
-            thread::sleep(BETWEEN);
-        }
-        let log = |name: &str| fs::read_to_string(slurm.folder.join(name)).unwrap_or_default();
-        bail!("Slurm does not answer:\n{}\n{}", log("slurmctld.log"), log("slurmd.log"))
-    }
-
-    /// One of Slurm's programs.
-    pub fn command(&self, program: &str) -> Command {
-        let mut command = Command::new(program);
-        command.env("SLURM_CONF", self.folder.join("slurm.conf"));
-        command
-    }
-
-    fn spawn(&mut self, daemon: &mut Command) -> Result<()> {
-        let started = daemon.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
-        self.daemons.push(started.with_context(|| format!("cannot start {}", daemon.get_program().display()))?);
-        Ok(())
-    }
-
-    fn lay_out(&self) -> Result<()> {
-        let folder = &self.folder;
-        for name in ["state", "spool"] {
-            fs::create_dir_all(folder.join(name))?;
-        }
-        // Whoever reads it may give this machine's Slurm jobs; it dies with it.
-        let key = folder.join("munge.key");
-        fs::write(&key, random(128)?)?;
-        fs::set_permissions(&key, fs::Permissions::from_mode(0o400))?;
-        fs::write(folder.join("slurm.conf"), self.conf()?)?;
-        Ok(())
-    }
-
-    fn conf(&self) -> Result<String> {
-        let folder = self.folder.display();
-        let name = fs::read_to_string("/proc/sys/kernel/hostname")?;
-        let host = name.trim().split('.').next().unwrap_or("localhost");
-        // Both at once, so that they differ.
-        let free = [TcpListener::bind("127.0.0.1:0")?, TcpListener::bind("127.0.0.1:0")?];
-        let [controller, node] = [free[0].local_addr()?.port(), free[1].local_addr()?.port()];
-        Ok(format!(
-            "ClusterName=one
-SlurmctldHost={host}(127.0.0.1)
-SlurmctldPort={controller}
-SlurmdPort={node}
-SlurmUser=root
-AuthInfo=socket={folder}/munge.socket
-StateSaveLocation={folder}/state
-SlurmdSpoolDir={folder}/spool
-SlurmctldPidFile={folder}/slurmctld.pid
-SlurmdPidFile={folder}/slurmd.pid
-SlurmctldLogFile={folder}/slurmctld.log
-SlurmdLogFile={folder}/slurmd.log
-ProctrackType=proctrack/linuxproc
-TaskPlugin=task/none
-SelectType=select/cons_tres
-SelectTypeParameters=CR_CPU
-MpiDefault=none
-ReturnToService=2
-NodeName={host} NodeAddr=127.0.0.1 CPUs={cpus} State=UNKNOWN
-PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP
-",
-            cpus = thread::available_parallelism().map_or(1, usize::from)
-        ))
-    }
-}
-
-/// Returns random bytes.
-fn random(count: u64) -> Result<Vec<u8>> {
-    use std::io::Read;
-    let mut bytes = Vec::new();
-    fs::File::open(Path::new("/dev/urandom"))?.take(count).read_to_end(&mut bytes)?;
-    Ok(bytes)
-}
-
-impl Drop for Slurm {
-    fn drop(&mut self) {
-        for daemon in self.daemons.iter_mut().rev() {
-            // Whoever has ended is no loss.
-            let _ = daemon.kill();
-            let _ = daemon.wait();
-        }
-        let _ = fs::remove_dir_all(&self.folder);
-    }
+/// A task of a Slurm array: its number, the least and the largest number of the array, and how many there are.
+fn slurm_task(task: [u32; 4]) -> Command {
+    let mut command = Command::new("sh");
+    command.arg(host::root().join("examples/cluster/slurm.sh")).env_remove("SHARES");
+    let names = ["ID", "MIN", "MAX", "COUNT"].map(|name| format!("SLURM_ARRAY_TASK_{name}"));
+    command.envs(names.iter().zip(task.map(|number| number.to_string())));
+    command
 }
 
 #[cfg(test)]
@@ -236,12 +127,9 @@ mod tests {
     use super::*;
 
     /// Command that a task of an array would run; `None` if it refuses.
-    fn task([id, min, max, count]: [u32; 4], shares: Option<&str>) -> Option<String> {
-        let mut command = Command::new("sh");
-        command.arg(host::root().join("examples/cluster/slurm.sh")).arg("scene").env("SWEEP", "echo");
-        let names = ["ID", "MIN", "MAX", "COUNT"].map(|name| format!("SLURM_ARRAY_TASK_{name}"));
-        command.envs(names.iter().zip([id, min, max, count].map(|number| number.to_string())));
-        command.env_remove("SHARES").envs(shares.map(|shares| ("SHARES", shares)));
+    fn task(of: [u32; 4], shares: Option<&str>) -> Option<String> {
+        let mut command = slurm_task(of);
+        command.arg("scene").env("SWEEP", "echo").envs(shares.map(|shares| ("SHARES", shares)));
         let output = command.output().expect("sh starts");
         output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().into())
     }

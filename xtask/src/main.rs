@@ -120,7 +120,7 @@ enum Command {
     /// Make the packages that others take, and test them from a project outside of this workspace
     #[command(after_help = "Examples:\n  cargo xtask package")]
     Package,
-    /// Try the examples for clusters here: Slurm with one node, GNU parallel, the Kubernetes job's shell, DuckDB
+    /// Try the examples for clusters here: Slurm's tasks, GNU parallel, the Kubernetes job's shell, DuckDB
     #[command(after_help = "Examples:\n  cargo xtask cluster")]
     Cluster,
     /// Install everything that the other commands need, for use offline

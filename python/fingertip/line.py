@@ -17,7 +17,7 @@ _ERRORS = {
     4: "a value outside of its register's range",
     5: "the data do not cover whole registers",
     6: "a value beyond what other registers allow",
-    7: "the register cannot be written, or not while torque is on",
+    7: "the register cannot be written, or not while torque is on; or another client of `fingertip share` commands",
 }
 DAMAGED, FORBIDDEN = 3, 7
 _ALERT = 0x80

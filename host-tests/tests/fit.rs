@@ -425,37 +425,6 @@ fn with(pitch_um: i32, tip_radius_um: i32) -> Config {
     allowed(Params { pitch_um, tip_radius_um, ..Params::DEFAULT })
 }
 
-#[test]
-fn other_parameters_begin_the_fit_anew() {
-    let last = with(4_000, 4_000);
-    for (pitch_um, tip_radius_um) in [(500, 16_000), (1_500, 10_000), (500, 4_000)] {
-        let mut setup = Setup::default();
-        (setup.wall.centre_x_mm, setup.wall.centre_y_mm) = (5.0, 4.0);
-        let mut pipelines = [&with(pitch_um, tip_radius_um), &last].map(Pipeline::new);
-        let sense = Sense { supply_mv: 6_000, ..Sense::default() };
-        let command = Command { tare_request: 1, ..Command::default() };
-        let mut world = Plant::new(&setup);
-        let mut frame = Frame::EMPTY;
-        world.fill_frame(&mut frame);
-        for count in 0..TARE_FRAMES + 500 {
-            if count == TARE_FRAMES + 2 {
-                world.place(setup.wall.distance_mm + 1.5);
-                world.fill_frame(&mut frame);
-            }
-            // In the middle of a refinement, whichever.
-            if count == TARE_FRAMES + 237 {
-                pipelines.iter_mut().for_each(|pipeline| pipeline.configure(&last));
-            }
-            frame.sequence += 1;
-            let [before, fresh] =
-                pipelines.each_mut().map(|pipeline| pipeline.step(&frame, &sense, &command).1.contact);
-            if count >= TARE_FRAMES + 237 {
-                assert_eq!(before, fresh, "{pitch_um} um, {tip_radius_um} um, frame {count}");
-            }
-        }
-    }
-}
-
 /// A fit that is given another geometry during a refinement begins again by itself: its sums would overflow.
 #[test]
 fn a_fit_that_is_handed_another_geometry_begins_anew() {

@@ -45,15 +45,6 @@ fn garbage_is_a_fault_with_the_defaults_and_the_next_save_ends_it() {
 }
 
 #[test]
-fn the_bytes_are_the_documented_ones() {
-    let bytes = encode(&record(9), 0x1234_5678);
-    assert_eq!(bytes[..], of_values(&named(&record(9)), 0x1234_5678));
-    assert_eq!(bytes[..8], *b"FTPR\x78\x56\x34\x12");
-    assert_eq!(bytes[12..16], crc32(b"id").to_le_bytes());
-    assert_eq!(bytes[16..20], 9u32.to_le_bytes());
-}
-
-#[test]
 fn every_flipped_bit_of_the_newest_is_seen_and_the_one_before_counts() {
     for sector in [Sector::A, Sector::B] {
         let mut both = [encode(&record(1), 1), encode(&record(2), 2)].concat();

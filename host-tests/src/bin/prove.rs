@@ -61,11 +61,6 @@ fn main() -> ExitCode {
         all.extend(reference::relaxation(0..1_000_000 / share / 1_000, progress));
         all
     });
-    println!("the relaxation filter over and over, terms of 1 to {} periods", paper::PERIODS_MAX / share as u32);
-    for (name, pattern) in [("constant extreme", [i32::MAX; 2]), ("alternating extremes", [i32::MAX, 0])] {
-        let reference::LongRun { steps, low, high } = reference::long_run(&pattern, paper::PERIODS_MAX / share as u32);
-        println!("  {name}: repeats itself from step {steps} on, between {low} and {high} N");
-    }
     let sections = [inputs, grid, points, rest];
     let (oracle, unread) = match reference::check() {
         Ok(tallies) => (judged("The points of `host-tests/oracle/park2003.csv`", |_| tallies.to_vec()).1, 0),

@@ -352,38 +352,3 @@ fn judge(tally: &mut Tally, bits: i32, fraction_bits: isize, exact: &Real, at: [
 fn real_u32(number: u32) -> Real {
     real((number >> 1) as i32, -1) + real((number & 1) as i32, 0)
 }
-
-/// End state of a filter after repeating inputs.
-#[derive(Clone, Copy, Debug)]
-pub struct LongRun {
-    /// Steps until its state came back to one it had had: from there on everything repeats, however long it runs.
-    pub steps: u64,
-    /// The least output in the repeating part, N.
-    pub low: f64,
-    /// The largest output in the repeating part, N.
-    pub high: f64,
-}
-
-/// Feeds the relaxation filter a repeating pattern until its state repeats, with time constants from one period to the
-/// longest of `periods_max`.
-pub fn long_run(pattern: &[i32], periods_max: u32) -> LongRun {
-    let share = Ratio::from_bits(65_536 / 3);
-    let terms =
-        [1, periods_max.isqrt(), periods_max].map(|periods| RelaxationTerm { share, time_constant_us: 100 * periods });
-    let filter = Relaxation::new(100, &terms).expect("inside the domain");
-    let mut state = RelaxationState::REST;
-    let mut steps = 0;
-    while steps < 1_000_000_000 {
-        let before = state;
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for &elastic in pattern {
-            let relaxed = f64::from(filter.step(&mut state, newtons(elastic)).to_bits()) / 65_536.0;
-            (low, high) = (low.min(relaxed), high.max(relaxed));
-            steps += 1;
-        }
-        if state == before {
-            return LongRun { steps, low, high };
-        }
-    }
-    panic!("no repetition in {steps} steps");
-}

@@ -230,16 +230,6 @@ fn a_part_of_a_fast_read_that_is_refused_is_zeros_and_a_packet_too_long_is_none(
     assert_eq!(first.ask(0x9A, &[1, 7, 0, 1, 0]).number(), 2, "only for all");
 }
 
-/// A driver without indirect addresses reads each device from its least address to its largest, as ROBOTIS' own do.
-#[test]
-fn bulk_read_goes_across_gaps() {
-    let mut devices = [device(1), device(2)];
-    let read = answers(&mut devices, 0x92, &hex("01 40 00 FF 00  02 00 01 00 01"));
-    let [(1, 0, first), (2, 0, second)] = &read[..] else { panic!("{read:?}") };
-    assert_eq!((first.len(), second.len()), (255, 256));
-    assert_eq!(second[48..52], [102, 0, 0, 0], "the frame counter");
-}
-
 // What each instruction does, and when it is answered.
 
 const GOAL: [u8; 6] = [0, 1, 0xE8, 3, 0, 0]; // 1000 mN to address 256

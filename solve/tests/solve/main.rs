@@ -6,9 +6,8 @@ mod record;
 mod strokes;
 
 use crate::finger::{Draw, Finger, Part, Place, plan, presses};
-use fingertip::measure::series::{Head, check, step_bytes};
+use fingertip::measure::series::{Head, check};
 use solve::gains::Condition;
-use solve::press::{Branch, Press};
 use solve::record::{Ended, Reason};
 use solve::scale::Held;
 use solve::scale::{HeldSeries, NoDrift};
@@ -181,52 +180,14 @@ fn refusals_are_sentences_with_their_number() {
     assert_eq!(scale(&[]).unwrap_err().to_string(), "the largest force is 0.000 N; 0.1 N is needed");
 }
 
-// The bytes that the chip makes of a press.
+// Bytes and counts as the chip has them.
 
 /// A series of a head and a body.
 fn sealed(head: &Head, body: &[u8]) -> Vec<u8> {
     [&Head { check: check(body), ..*head }.bytes(), body].concat()
 }
 
-/// Byte of a standard deviation in codes.
-fn deviation(codes: f64) -> u8 {
-    let variance = (16.0 * codes * codes) as u64;
-    if variance == 0 {
-        return 0;
-    }
-    let exponent = variance.ilog2();
-    (((exponent << 3) as u8) | ((variance << 3 >> exponent) as u8 & 7)).max(1)
-}
-
 /// Millimetres of an encoder count by the default parameters.
 fn mm_per_count() -> f64 {
     TAU / 1600.0 / 3.583
-}
-
-/// A press as a series, with frames of this length.
-fn press(press: &Press, frame_ns: u32, origin: i32) -> Vec<u8> {
-    let mut body = Vec::new();
-    for step in &press.steps {
-        let length = body.len() + step_bytes(step.taxels.len());
-        for time_s in step.time_s {
-            body.extend(((1e9 * time_s / f64::from(frame_ns)).round() as u32).to_le_bytes());
-        }
-        for travel_mm in step.travel_mm {
-            body.extend(((travel_mm / mm_per_count()).round() as i32 + origin).to_le_bytes());
-        }
-        body.extend((step.frames as u16).to_le_bytes());
-        body.extend([u8::from(step.branch == Branch::Unloading), 0]);
-        body.extend([0; 2]);
-        body.extend((step.chip_c.map_or(0.0, |chip_c| 10.0 * (chip_c + 273.15)).round() as u16).to_le_bytes());
-        for taxel in &step.taxels {
-            body.extend(((8.0 * (taxel.mean + 128.0)).round() as u16).to_le_bytes());
-        }
-        body.extend(step.taxels.iter().map(|taxel| deviation(taxel.deviation)));
-        for taxels in step.taxels.chunks(8) {
-            body.push(taxels.iter().enumerate().map(|(bit, taxel)| u8::from(taxel.bad) << bit).sum());
-        }
-        body.resize(length, 0);
-    }
-    let (shape, rows) = ([press.array.rows as u8, press.array.columns as u8], press.steps.len() as u32);
-    sealed(&Head { kind: 1, shape, rows, frame_ns, origin, ..Head::NONE }, &body)
 }

@@ -1,12 +1,11 @@
 //! Young's modulus of drawn tips.
 
-use crate::finger::{Draw, FRAME_NS, Finger, Part, Place, cycle, plan, presses};
-use fingertip::params::Params;
+use crate::finger::{Draw, Finger, Part, Place, cycle, plan, presses};
 use solve::gains::Verdict;
 use solve::gains::{Condition, NoGains};
 use solve::modulus::{Modulus, NoModulus};
 use solve::press::Press;
-use solve::{gains, modulus, record};
+use solve::{gains, modulus};
 
 /// Errors and uncertainties in percent, of tips that are drawn by these seeds.
 fn errors(seeds: std::ops::Range<u64>, count: usize, plan: &[Part]) -> Vec<[f64; 2]> {
@@ -67,12 +66,11 @@ fn an_array_of_any_shape_gives_the_modulus() {
                 let kept = step.taxels.chunks(10).skip(row).take(rows);
                 step.taxels = kept.flat_map(|taxels| taxels[column..column + columns].to_vec()).collect();
             }
-            let bytes = crate::press(press, FRAME_NS, 5);
-            let press = record::press(&bytes, &Params::DEFAULT).expect("a series");
-            let (found, errors) = solved(&draw, std::slice::from_ref(&press));
+            let pitch_mm = press.array.pitch_mm;
+            let (found, errors) = solved(&draw, &presses);
             println!("{found}");
             // The middle of an array with an odd number of rows or columns lies half a pitch before that of 10.
-            let off = |size: usize| if size % 2 == 1 { 0.5 * press.array.pitch_mm } else { 0.0 };
+            let off = |size: usize| if size % 2 == 1 { 0.5 * pitch_mm } else { 0.0 };
             let axis = found.gains.presses[0].pose.axis_mm;
             for (axis, whole) in axis.into_iter().zip([whole[0] + off(columns), whole[1] + off(rows)]) {
                 assert!((axis - whole).abs() < 0.1, "{axis} {whole}");

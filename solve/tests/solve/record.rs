@@ -1,10 +1,11 @@
 //! The bytes of a series: read to the last bit, and never a panic.
 
-use crate::finger::{Draw, FRAME_NS, cycle, presses};
 use crate::sealed;
+use fingertip::measure::Task;
 use fingertip::measure::series::{HEAD, Head, check, step_bytes};
 use fingertip::params::Params;
 use proptest::prelude::*;
+use sim::native::bench::Bench;
 use solve::press::{Branch, Press};
 use solve::record::{Ended, Kind, NoRecord, Reason, press, strokes};
 use solve::{gains, modulus};
@@ -148,12 +149,17 @@ fn every_fault_of_a_series_is_named() {
     );
 }
 
-/// A press with wrong numbers in any place, under a right check.
+/// A press of the core with wrong numbers in any place, under a right check.
 #[test]
 fn a_press_with_changed_bytes_is_solved_or_refused() {
-    let taken = presses(&Draw::plain(250.0), 1, &cycle(5.0, 3.0)).remove(0);
-    let (length, records) = (step_bytes(100), taken.steps.len() as u32);
-    let bytes = crate::press(&taken, FRAME_NS, 0);
+    let mut bench: Bench = Bench::default();
+    bench.tare();
+    bench.run(0.05);
+    bench.measure(Task::Press, |_| {});
+    let bytes = bench.kept();
+    let length = step_bytes(100);
+    let records = ((bytes.len() - HEAD) / length) as u32;
+    assert!(modulus(&[press(bytes, PARAMS).expect("a press")]).is_ok());
     for seed in 0..8 {
         let mut rng = fastrand::Rng::with_seed(seed);
         let mut body = bytes[HEAD..].to_vec();
@@ -164,7 +170,7 @@ fn a_press_with_changed_bytes_is_solved_or_refused() {
                 body[at] = rng.u8(..);
             }
         }
-        let read = press(&sealed(&Head { frame_ns: FRAME_NS, ..press_head([10, 10], records) }, &body), PARAMS);
+        let read = press(&sealed(&press_head([10, 10], records), &body), PARAMS);
         assert!(read.is_ok(), "{read:?}");
         solved(read);
     }

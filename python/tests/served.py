@@ -16,6 +16,9 @@ from typing import Any, Dict, List, NamedTuple, Optional, Tuple
 
 from fingertip import Bus, Fingertip, FingertipError, PortLost
 
+# Under `nohup` the programs of the tests would ignore it too.
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
 SERVE = os.environ.get("FINGERTIP_SERVE", "")
 PYTHON = Path(__file__).resolve().parents[1]
 PATIENT_MS = 60_000.0  # time within which the slowest machine answers

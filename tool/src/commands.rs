@@ -18,9 +18,10 @@ use fingertip::link::packet::BROADCAST;
 use fingertip::measure::MeasureState;
 use fingertip::shipped::address;
 use serde_json::Value;
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use std::io::{self, Write as _};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// True once output was lost against the user's will.
@@ -60,12 +61,22 @@ fn report(text: impl std::fmt::Display, json: bool) {
     }
 }
 
-/// Says an answer for scripts.
-fn say_json(value: &Value) {
-    say(serde_json::to_string_pretty(value).unwrap_or_default());
+/// Answers of a command for several IDs, until they are printed as one array. With `None` each is printed at once.
+static ANSWERS: Mutex<Option<Vec<Value>>> = Mutex::new(None);
+
+fn answers() -> MutexGuard<'static, Option<Vec<Value>>> {
+    ANSWERS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Runs a command for each ID of `--id`, also after an error of one.
+/// Says an answer for scripts.
+fn say_json(value: &Value) {
+    match &mut *answers() {
+        Some(answers) => answers.push(value.clone()),
+        None => say(format_args!("{value:#}")),
+    }
+}
+
+/// Runs a command for each ID of `--id`, also after an error of one. Several answers in JSON are one array.
 pub fn each(reach: &Reach, titled: bool, command: impl Fn(&mut Client) -> Result<(), Error>) -> Result<(), Error> {
     let mut client = Client::open(reach)?;
     let mut ids = reach.ids.clone();
@@ -76,10 +87,11 @@ pub fn each(reach: &Reach, titled: bool, command: impl Fn(&mut Client) -> Result
             return Err("no fingertip answers: is it powered, and is the baud rate right?".into());
         }
     }
-    if let [id] = ids[..] {
-        client.id = id;
+    if let ([id], false) = (&ids[..], reach.ids.contains(&BROADCAST)) {
+        client.id = *id;
         return command(&mut client);
     }
+    *answers() = Some(Vec::new());
     let mut failed = Vec::new();
     for id in ids {
         client.id = id;
@@ -89,6 +101,10 @@ pub fn each(reach: &Reach, titled: bool, command: impl Fn(&mut Client) -> Result
         if let Err(why) = command(&mut client) {
             failed.push(format!("ID {id}: {why}"));
         }
+    }
+    let all = answers().take().unwrap_or_default();
+    if !all.is_empty() {
+        say_json(&Value::Array(all));
     }
     if failed.is_empty() { Ok(()) } else { Err(failed.join("; ").into()) }
 }
@@ -101,12 +117,15 @@ const INTERRUPT_EVERY: Duration = Duration::from_millis(50);
 pub struct Interrupt(Arc<AtomicBool>);
 
 impl Interrupt {
-    /// Catches the signals: from now on they do not end the program by themselves.
+    /// Catches the signals: from now on they do not end the program by themselves. Under `nohup`, SIGHUP stays ignored.
     pub fn catch() -> Result<Self, Error> {
         let flag = Arc::new(AtomicBool::new(false));
-        let set = flag.clone();
-        ctrlc::set_handler(move || set.store(true, Ordering::Relaxed))
-            .map_err(|why| format!("cannot wait for Ctrl-C: {why}"))?;
+        // SIGINT is also ignored in background jobs of a script, but a finger that moves must stop after Ctrl-C.
+        let signals = [Some(SIGINT), Some(SIGTERM), (!ignores_hangup()).then_some(SIGHUP)];
+        for signal in signals.into_iter().flatten() {
+            signal_hook::flag::register(signal, flag.clone())
+                .map_err(|why| format!("cannot wait for Ctrl-C: {why}"))?;
+        }
         Ok(Self(flag))
     }
 
@@ -128,6 +147,13 @@ impl Interrupt {
             std::thread::sleep(left.min(INTERRUPT_EVERY));
         }
     }
+}
+
+/// True if this program was started with SIGHUP ignored. False on systems without `/proc`.
+fn ignores_hangup() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| u64::from_str_radix(line.strip_prefix("SigIgn:")?.trim(), 16).ok());
+    mask.is_some_and(|mask| mask >> (SIGHUP - 1) & 1 == 1)
 }
 
 /// Reads a register until it is as wanted, or the time is over. The last number.

@@ -12,8 +12,8 @@ use std::process::ExitCode;
 /// Finds, watches, records, sets up and moves a fingertip controller on its bus.
 ///
 /// Names carry their units: force_mn is in mN. Exit code 0: done; 1: refused or not reached; 2: not understood, and
-/// nothing was sent; 3: a force was reached, but not held; 130: a signal ended a command that moves the finger, which was
-/// stopped.
+/// nothing was sent; 3: a force was reached, but not held; 130: a signal came while a command moved or stopped the finger,
+/// which was stopped.
 #[derive(Parser)]
 #[command(
     name = "fingertip",
@@ -31,7 +31,7 @@ use std::process::ExitCode;
 struct Cli {
     #[command(flatten)]
     reach: Reach,
-    /// Answer in JSON, for scripts; an error is the last line of standard error: {"error": TEXT, "exit_code": CODE}
+    /// Answer in JSON, for scripts, with an array for several IDs; an error is the last line of standard error: {"error": TEXT, "exit_code": CODE}
     #[arg(long, global = true)]
     json: bool,
     #[command(subcommand)]
@@ -134,7 +134,7 @@ fn run(cli: &Cli) -> Result<(), Error> {
     match &cli.command {
         Command::Scan(args) => device::scan(args, &cli.reach, cli.json),
         Command::Info => for_each(&|client| device::info(client, cli.json)),
-        Command::Share(args) => share::run(args, &cli.reach),
+        Command::Share(args) => share::run(args, &cli.reach, cli.json),
         Command::View(args) => view::run(args, &mut connect()?),
         Command::Stream(args) => stream::run(args, &mut connect()?),
         Command::Record(args) => record::run(args, record::format(args)?, &mut connect()?, cli.json),
@@ -144,7 +144,7 @@ fn run(cli: &Cli) -> Result<(), Error> {
         Command::Tare(args) => for_each(&|client| stop::tare(args, client, cli.json)),
         Command::Commission(args) => calibrate::commission(args, &mut connect()?, cli.json),
         Command::Press(args) => press::run(args, &mut connect()?, cli.json),
-        Command::Stop(args) => stop::stop_all(args, &cli.reach, cli.json),
+        Command::Stop(args) => stop::run(args, &cli.reach, cli.json),
         Command::Identify(args) => calibrate::identify(args, &mut connect()?, cli.json),
         Command::Calibrate(args) => calibrate::calibrate(args, &mut connect()?, cli.json),
         Command::Recover => for_each(&|client| stop::recover(client, cli.json)),

@@ -127,7 +127,8 @@ pub fn meaning_of_error(number: u8) -> &'static str {
         6 => "a value beyond what other registers allow",
         7 => {
             "the register cannot be written, or not while torque is on (`fingertip press` and `torque_enable` \
-             turn it on), or another client of `fingertip share` commands the finger until it ends"
+             turn it on), or another client of `fingertip share` commands the finger until it ends; \
+             `share` keeps the bus speed"
         }
         _ => "an error that this program does not know",
     }

@@ -1,11 +1,13 @@
 //! The guided procedures: `fingertip calibrate`, `identify` and `commission`.
 
-use super::guided::motion::{HOLDS, WEIGHT, press_name};
-use super::guided::{Options, Presses, Procedure, yes_or_no};
+use super::guided::motion::{HOLDS, WEIGHT, held, press_name};
+use super::guided::{Options, Presses, Procedure, Session, yes_or_no};
 use super::params;
 use super::press::direction_confirmed;
 use crate::{Client, Error, numbers, table};
+use fingertip::link::settings::Saved;
 use fingertip::measure::Task;
+use fingertip::shipped::address;
 use serde_json::json;
 use solve::Value;
 use solve::modulus::Modulus;
@@ -51,38 +53,50 @@ pub struct Calibrate {
 }
 
 impl Calibrate {
-    fn goals_mn(&self) -> Vec<i64> {
-        match (self.no_scale, self.scale_n.is_empty()) {
-            (true, _) => Vec::new(),
-            (false, true) => GOALS_N.iter().map(|goal| (1e3 * goal) as i64).collect(),
-            (false, false) => self.scale_n.clone(),
+    /// Forces to hold, mN. Without --scale-n they are those that the session has held. Fails where the session, --scale-n and
+    /// --shown-n differ.
+    fn goals_mn(&self, json: bool, session: &Session) -> Result<Vec<i64>, Error> {
+        if self.no_scale {
+            return Ok(Vec::new());
         }
-    }
-
-    /// Refuses options that contradict each other, and with `--json` questions without an answer.
-    fn check(&self, json: bool) -> Result<(), Error> {
-        self.how.check(json)?;
-        let (goals, shown) = (self.goals_mn(), self.shown_n.len());
-        if json && shown == 0 && !goals.is_empty() {
+        let mn = |goal_n: f64| (1e3 * goal_n).round() as i64;
+        let stored: Vec<i64> =
+            session.numbers(HOLDS).iter().filter_map(|hold| hold["goal_n"].as_f64().map(mn)).collect();
+        if json && self.shown_n.is_empty() && stored.is_empty() {
             return Err(Error::NotUnderstood("--json asks no questions: give --shown-n, or --no-scale".into()));
         }
-        if shown != 0 && shown != goals.len() {
-            let goals = goals.len();
+        let goals = match (&self.scale_n[..], &stored[..]) {
+            ([], []) => GOALS_N.map(mn).to_vec(),
+            ([], stored) => stored.to_vec(),
+            (given, _) => given.to_vec(),
+        };
+        let (shown, n) = (&self.shown_n, |goals: &[i64]| goals.iter().map(|mn| *mn as f64 * 1e-3).collect::<Vec<_>>());
+        let fits = shown.is_empty() || shown.len() == goals.len();
+        if !stored.is_empty() && (goals != stored || !fits) {
+            let [stored, goals] = [n(&stored), n(&goals)];
+            return Err(format!(
+                "the session has holds of {stored:?} N, which --scale-n {goals:?} or --shown-n {shown:?} does not fit"
+            )
+            .into());
+        }
+        if !fits {
+            let [shown, goals] = [shown.len(), goals.len()];
             return Err(Error::NotUnderstood(format!("--shown-n has {shown} numbers for {goals} forces of --scale-n")));
         }
-        Ok(())
+        Ok(goals)
     }
 }
 
 /// Measures gains and modulus by presses, the scale of forces by a kitchen scale, and on request creep and temperature.
 pub fn calibrate(args: &Calibrate, client: &mut Client, json: bool) -> Result<(), Error> {
-    args.check(json)?;
+    args.how.check(json)?;
     direction_confirmed(client)?;
     let mut procedure = Procedure::begin("calibrate", &args.options, json, client)?;
+    let goals_mn = args.goals_mn(json, &procedure.session)?;
     procedure.press_all(args.presses, &args.how)?;
-    let modulus = procedure.modulus(args.presses)?;
+    let Some(modulus) = procedure.modulus(args.presses)? else { return procedure.finish() };
     procedure.find_gains(&modulus);
-    scale(args, &modulus, &mut procedure)?;
+    scale(args, &goals_mn, &modulus, &mut procedure)?;
     if let Some(seconds) = args.creep_s {
         creep(seconds, args, &mut procedure)?;
     }
@@ -94,31 +108,38 @@ pub fn calibrate(args: &Calibrate, client: &mut Client, json: bool) -> Result<()
 
 /// Modulus, and with a scale the array's sensitivity: a press measures the product of modulus and common gain, a scale the
 /// common gain by itself.
-fn scale(args: &Calibrate, modulus: &Modulus, procedure: &mut Procedure<'_>) -> Result<(), Error> {
-    let goals_mn = args.goals_mn();
+fn scale(args: &Calibrate, goals_mn: &[i64], modulus: &Modulus, procedure: &mut Procedure<'_>) -> Result<(), Error> {
     let share = modulus.sigma_kpa / modulus.kpa;
     if goals_mn.is_empty() {
         procedure.found.row("modulus_pa", 1e3 * modulus.kpa, Some(1e3 * modulus.sigma_kpa));
         procedure.found.more.insert("remaining".into(), json!({ "force_percent": 100.0 * share }));
         return Ok(());
     }
-    if !procedure.session.steps.contains_key(HOLDS) {
+    if !procedure.reuses(HOLDS) {
+        procedure.ready()?;
         if !args.how.no_wait {
             procedure.run.enter("put a scale under the plate and zero it, the tip in the air", "--no-wait")?;
         }
         procedure.tare_after(args.how.pause_s)?;
+        procedure.hold_all(goals_mn, &args.shown_n)?;
     }
-    procedure.hold_all(&goals_mn, &args.shown_n)?;
-    let before = &procedure.session.before;
+    let mut holds = procedure.session.numbers(HOLDS).to_vec();
+    holds.iter_mut().zip(&args.shown_n).for_each(|(hold, shown_n)| hold["shown_n"] = json!(shown_n));
+    let before = procedure.session.before.clone();
     let after = procedure.found.gains.iter().flat_map(|gains| gains.after.iter().flatten());
     let factors =
         after.zip(before.gains.iter().flatten()).map(|(after, before)| f64::from(*after) / f64::from(*before));
-    let held = procedure.held(&factors.collect::<Vec<_>>(), &args.shown_n);
+    let held = held(&holds, &factors.collect::<Vec<_>>());
     let scale = match solve::scale(&held) {
         Ok(scale) => scale,
         Err(why) => {
-            let why = format!("the numbers of the scale were refused: {why}; the next run holds again");
-            return procedure.without(HOLDS, why);
+            let why = format!("the numbers of the scale were refused: {why}");
+            if args.shown_n.is_empty() {
+                return procedure.without(HOLDS, format!("{why}; the next run holds again"));
+            }
+            // The holds may be good: numbers of the command line are corrected there.
+            procedure.found.refuse(format!("{why}; the holds are kept: correct --shown-n"));
+            return Ok(());
         }
     };
     let (factor, part) = (scale.value, scale.relative());
@@ -126,6 +147,7 @@ fn scale(args: &Calibrate, modulus: &Modulus, procedure: &mut Procedure<'_>) -> 
     let parts = modulus.parts;
     let of_modulus = parts.residuals.hypot(parts.presses).hypot(parts.memory).hypot(part);
     let codes = f64::from(before.params.codes_per_kpa_milli) / factor;
+    procedure.session.done(HOLDS, holds.into())?;
     let found = &mut procedure.found;
     found.row("modulus_pa", 1e3 * modulus.kpa * factor, Some(1e3 * modulus.kpa * factor * of_modulus));
     found.row("codes_per_kpa_milli", codes, Some(codes * part));
@@ -195,7 +217,7 @@ pub fn identify(args: &Identify, client: &mut Client, json: bool) -> Result<(), 
     direction_confirmed(client)?;
     let mut procedure = Procedure::begin("identify", &args.options, json, client)?;
     procedure.press_all(args.presses, &args.how)?;
-    let modulus = procedure.modulus(args.presses)?;
+    let Some(modulus) = procedure.modulus(args.presses)? else { return procedure.finish() };
     let found = &mut procedure.found;
     found.row("modulus_pa", 1e3 * modulus.kpa, Some(1e3 * modulus.sigma_kpa));
     found.more.insert("remaining".into(), json!({ "modulus_percent": 100.0 * modulus.sigma_kpa / modulus.kpa }));
@@ -236,11 +258,14 @@ pub fn commission(args: &Commission, client: &mut Client, json: bool) -> Result<
         return Err(Error::NotUnderstood("--json asks no questions: give --forward yes or --forward no".into()));
     }
     let mut procedure = Procedure::begin("commission", &args.options, json, client)?;
-    // A controller that restarted does not know it any more.
-    if !procedure.session.steps.contains_key(JOG) || direction_confirmed(procedure.client).is_err() {
-        direction(args, &mut procedure)?;
+    // A controller that restarted does not know it any more; another finger may never have known it.
+    if direction_confirmed(procedure.client).is_err() || !procedure.reuses(JOG) {
+        procedure.session.forget(STROKES)?;
+        if !direction(args, &mut procedure)? {
+            return procedure.finish();
+        }
     }
-    if !procedure.session.records.contains_key(STROKES) {
+    if !procedure.reuses(STROKES) {
         procedure.tare()?;
         procedure.run.report("strokes: 1 mm to both sides, some 10 s");
         let bytes = procedure.motion(Task::Strokes)?;
@@ -251,8 +276,8 @@ pub fn commission(args: &Commission, client: &mut Client, json: bool) -> Result<
     procedure.finish()
 }
 
-/// The jog shows which way the motor goes; a person says whether that is towards the object.
-fn direction(args: &Commission, procedure: &mut Procedure<'_>) -> Result<(), Error> {
+/// The jog shows which way the motor goes; a person says whether that is towards the object. Returns the answer.
+fn direction(args: &Commission, procedure: &mut Procedure<'_>) -> Result<bool, Error> {
     procedure.tare()?;
     procedure.run.report("jog: watch the tip. It moves by 0.8 mm and back, with 8 % of duty at most");
     procedure.motion(Task::Jog)?;
@@ -261,14 +286,22 @@ fn direction(args: &Commission, procedure: &mut Procedure<'_>) -> Result<(), Err
         None => procedure.run.yes("did the tip first move towards the object?", "--forward yes or --forward no")?,
     };
     params::set(&[(table::find(DIRECTION)?, forward.into())], procedure.client)?;
-    if !forward {
-        return Err(
-            "the tip first moved away from the object: swap the motor's leads and the encoder's channels, both, \
-                    then run it again. Torque is refused until then"
-                .into(),
-        );
+    if forward {
+        return procedure.session.done(JOG, json!({ "forward": true })).map(|()| true);
     }
-    procedure.session.done(JOG, json!({ "forward": true }))
+    procedure.without(
+        JOG,
+        "the tip first moved away from the object: swap the motor's leads and the encoder's channels, both, then run it \
+         again. Torque is refused until then"
+            .into(),
+    )?;
+    // A confirmation that the flash holds would be back after a reset, and the tip would press the wrong way.
+    if procedure.client.number(address::SAVED_STATE)? != Saved::Same as i64
+        && let Err(why) = params::save(procedure.client, procedure.run.json)
+    {
+        procedure.found.refuse(format!("direction_confirmed 0 was not saved: {why}. After a reset it may be 1 again"));
+    }
+    Ok(false)
 }
 
 fn solve_strokes(args: &Commission, procedure: &mut Procedure<'_>) -> Result<(), Error> {
@@ -283,8 +316,8 @@ fn solve_strokes(args: &Commission, procedure: &mut Procedure<'_>) -> Result<(),
     let drive = match solve::strokes::solve(&record) {
         Ok(drive) => drive,
         Err(why) => {
-            session.forget(STROKES)?;
-            return Err(format!("the strokes give no drive: {why}. The next run makes them again").into());
+            let why = format!("the strokes give no drive: {why}. The next run makes them again");
+            return procedure.without(STROKES, why);
         }
     };
     let mut row = |name, unit: f64, value: Value| found.row(name, unit * value.value, Some(unit * value.sigma));

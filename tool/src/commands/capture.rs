@@ -150,8 +150,8 @@ fn keep(args: &Args, client: &mut Client, interrupt: &Interrupt, json: bool) -> 
             return Err(no_tare(state));
         }
     };
-    // Without a new tare a press would use the old zero.
-    if let Some(goal_mn) = args.press.filter(|_| begun) {
+    // Without a new tare a press would use the old zero. After a signal torque stays off.
+    if let Some(goal_mn) = args.press.filter(|_| begun && !interrupt.came()) {
         // During the tare, so that the approach begins right after it.
         press::begin(goal_mn, client)?;
     }

@@ -23,7 +23,12 @@ pub fn scan(args: &Scan, reach: &Reach, json: bool) -> Result<(), Error> {
     if ports.is_empty() {
         return Err(Error::NoPort);
     }
-    let speeds = if args.speeds.is_empty() { BAUD_RATES.to_vec() } else { args.speeds.clone() };
+    let mut speeds = if args.speeds.is_empty() { BAUD_RATES.to_vec() } else { args.speeds.clone() };
+    // A TCP port has no baud rate. The rate only sets the longest wait: one pass at the first one, the slowest by default.
+    let tcp = reach.port.as_ref().is_some_and(|port| port.starts_with("tcp:"));
+    if tcp {
+        speeds.truncate(1);
+    }
     let mut found = Vec::new();
     'ports: for port in &ports {
         for &baud in &speeds {
@@ -43,7 +48,7 @@ pub fn scan(args: &Scan, reach: &Reach, json: bool) -> Result<(), Error> {
     if json {
         let line = |(port, baud, pong): &(&String, u32, Pong)| {
             json!({
-                "port": port, "baud": baud, "id": pong.id, "model_number": pong.model,
+                "port": port, "baud": (!tcp).then_some(baud), "id": pong.id, "model_number": pong.model,
                 "firmware_version": pong.firmware, "fingertip": pong.is_fingertip(),
             })
         };
@@ -51,19 +56,15 @@ pub fn scan(args: &Scan, reach: &Reach, json: bool) -> Result<(), Error> {
     } else {
         for (port, baud, pong) in &found {
             let what = if pong.is_fingertip() { "fingertip" } else { "another device" };
-            say(format_args!(
-                "{port}  {baud} baud  ID {}  {what}, model {}, firmware {}",
-                pong.id, pong.model, pong.firmware
-            ));
+            let at = if tcp { String::new() } else { format!("  {baud} baud") };
+            let Pong { id, model, firmware } = pong;
+            say(format_args!("{port}{at}  ID {id}  {what}, model {model}, firmware {firmware}"));
         }
     }
     if found.is_empty() {
         let speeds = speeds.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
-        return Err(format!(
-            "nothing answers on {} at {speeds} baud: is it powered, and are the bus's wires right?",
-            ports.join(", ")
-        )
-        .into());
+        let (ports, at) = (ports.join(", "), if tcp { String::new() } else { format!(" at {speeds} baud") });
+        return Err(format!("nothing answers on {ports}{at}: is it powered, and are the bus's wires right?").into());
     }
     Ok(())
 }

@@ -9,6 +9,8 @@ use fingertip::params::Params;
 use fingertip::pressure::GAIN_ONE;
 use fingertip::shipped::address;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::io::{Errno, read};
+use rustix::termios::{QueueSelector, tcflush};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -71,8 +73,18 @@ impl<'a> Procedure<'a> {
     ) -> Result<Self, Error> {
         let run = Run { options, interrupt: Interrupt::catch()?, json };
         let session = Session::open(options.session.as_deref(), command, client)?;
-        same_settings(&session, client)?;
-        Ok(Self { run, client, session, found: Found::default() })
+        let mut procedure = Self { run, client, session, found: Found::default() };
+        procedure.settings()?;
+        Ok(procedure)
+    }
+
+    /// True if the session has this step, which is then not repeated: the user reads that.
+    pub fn reuses(&self, step: &str) -> bool {
+        let has = self.session.steps.contains_key(step);
+        if has {
+            aside(format_args!("the session has the step {step}: it is reused"));
+        }
+        has
     }
 }
 
@@ -94,7 +106,7 @@ impl Run<'_> {
     }
 
     /// Asks until the answer can be parsed, three times at most. `idle` runs every 50 ms meanwhile. `option` gives the answer
-    /// without a question, which `--json` demands.
+    /// without a question, which `--json` demands. Keys that were pressed before the question do not answer it.
     fn parsed<T>(
         &self,
         question: &str,
@@ -107,6 +119,8 @@ impl Run<'_> {
         }
         let mut why = String::new();
         for _ in 0..TRIES {
+            // Fails where no terminal is attached: a pipe keeps its lines.
+            let _ = tcflush(io::stdin(), QueueSelector::IFlush);
             aside(question);
             let line = self.line(option, idle)?;
             match parse(line.trim()) {
@@ -127,36 +141,22 @@ impl Run<'_> {
     }
 
     fn line(&self, option: &str, idle: &mut dyn FnMut() -> Result<(), Error>) -> Result<String, Error> {
-        let input = io::stdin();
-        let wait = Timespec { tv_sec: 0, tv_nsec: POLL_NS };
+        let (input, wait) = (io::stdin(), Timespec { tv_sec: 0, tv_nsec: POLL_NS });
+        // A read of one byte never waits for the rest of a line. Bytes behind the line stay for the next question.
+        let (mut line, mut byte) = (Vec::new(), [0]);
         loop {
             self.interrupt.check()?;
             idle()?;
-            match poll(&mut [PollFd::new(&input, PollFlags::IN)], Some(&wait)) {
-                Ok(0) | Err(rustix::io::Errno::INTR) => continue,
-                Ok(_) => {}
+            let ready = poll(&mut [PollFd::new(&input, PollFlags::IN)], Some(&wait));
+            match ready.and_then(|ready| if ready == 0 { Err(Errno::AGAIN) } else { read(&input, &mut byte) }) {
+                Ok(0) if line.is_empty() => return Err(format!("nobody answers: give {option}").into()),
+                Ok(1) if byte != *b"\n" => line.extend(byte),
+                Ok(_) => return Ok(String::from_utf8_lossy(&line).into_owned()),
+                Err(Errno::AGAIN | Errno::INTR) => {}
                 Err(why) => return Err(format!("cannot read an answer: {why}").into()),
             }
-            let line = unbuffered_line().map_err(|why| format!("cannot read an answer: {why}"))?;
-            return line.ok_or_else(|| format!("nobody answers: give {option}").into());
         }
     }
-}
-
-/// A line of the standard input; none at its end. Bytes behind the line stay for the next question.
-fn unbuffered_line() -> io::Result<Option<String>> {
-    let (mut line, mut byte) = (Vec::new(), [0]);
-    loop {
-        match rustix::io::read(io::stdin(), &mut byte) {
-            Ok(0) if line.is_empty() => return Ok(None),
-            Ok(0) => break,
-            Ok(_) if byte == *b"\n" => break,
-            Ok(_) => line.extend(byte),
-            Err(rustix::io::Errno::INTR) => {}
-            Err(why) => return Err(why.into()),
-        }
-    }
-    Ok(Some(String::from_utf8_lossy(&line).into_owned()))
 }
 
 pub fn yes_or_no(text: &str) -> Result<bool, String> {
@@ -269,7 +269,7 @@ impl Session {
     }
 
     /// Numbers of a step that is done; none of one that is not.
-    fn numbers(&self, step: &str) -> &[Value] {
+    pub fn numbers(&self, step: &str) -> &[Value] {
         self.steps.get(step).and_then(Value::as_array).map(Vec::as_slice).unwrap_or_default()
     }
 
@@ -327,6 +327,9 @@ pub struct Found {
     pub refused: Vec<String>,
     /// True if a part that was requested has no result: nothing is written then.
     blocked: bool,
+    /// True once the controller has the values, and once its flash has them.
+    applied: bool,
+    saved: bool,
     /// Further entries of the JSON object: dead and odd taxels, remaining errors.
     pub more: Map<String, Value>,
     /// Remarks for the user, one sentence each.
@@ -337,41 +340,61 @@ impl Found {
     pub fn row(&mut self, name: &'static str, after: f64, sigma: Option<f64>) {
         self.rows.push(Row { name, after, sigma });
     }
+
+    /// Records why a part has no result. The procedure then writes no parameter.
+    pub fn refuse(&mut self, why: String) {
+        self.refused.push(why);
+        self.blocked = true;
+    }
 }
 
-/// Step of a session that lists what is being written.
+/// Step of a session: every set of values that it began to write.
 const WRITTEN: &str = "written";
 
-/// Fails where the controller's settings are neither those before the session nor those that it has written.
-pub fn same_settings(session: &Session, client: &mut Client) -> Result<(), Error> {
-    let (now, before) = (Settings::read(client)?, &session.before);
-    let written = session.steps.get(WRITTEN);
-    let differs = |name: &&str| {
-        let written = written.and_then(|written| written["parameters"][*name].as_i64());
-        now.get(name) != before.get(name) && now.get(name).map(i64::from) != written
-    };
-    let names = Params::RANGES.into_iter().map(|(name, ..)| name).filter(|name| *name != "direction_confirmed");
-    let mut names: Vec<&str> = names.filter(differs).collect();
-    if now.gains != before.gains && !written.is_some_and(|written| written["gains"] == json!(now.gains)) {
-        names.push("gains");
+impl Session {
+    /// Names of parameters, and `gains`, whose values are neither those before the session nor, with `written`, those that
+    /// it began to write.
+    fn changed(&self, now: &Settings, written: bool) -> Vec<&'static str> {
+        let written = if written { self.numbers(WRITTEN) } else { &[] };
+        let differs = |name: &&str| {
+            let value = now.get(name);
+            value != self.before.get(name) && !written.iter().any(|set| set["parameters"][*name] == json!(value))
+        };
+        let names = Params::RANGES.into_iter().map(|(name, ..)| name).filter(|name| *name != "direction_confirmed");
+        let gains = now.gains != self.before.gains && !written.iter().any(|set| set["gains"] == json!(now.gains));
+        names.filter(differs).chain(gains.then_some("gains")).collect()
     }
-    if names.is_empty() {
-        return Ok(());
-    }
-    let names = names.join(", ");
-    Err(format!("the controller's {names} changed since this session began: begin one in another folder").into())
 }
 
 impl Procedure<'_> {
-    /// Records why a part has no result, and drops its step. The procedure then writes no parameter.
+    /// Reads the controller's settings. Fails where they are neither those before the session nor those that it has written.
+    fn settings(&mut self) -> Result<Settings, Error> {
+        let now = Settings::read(self.client)?;
+        let names = self.session.changed(&now, true).join(", ");
+        if names.is_empty() {
+            return Ok(now);
+        }
+        Err(format!("the controller's {names} changed since this session began (did it restart?): begin another one")
+            .into())
+    }
+
+    /// Fails unless the settings are those before the session: all motions of a session are made and solved with them.
+    pub fn unchanged(&mut self) -> Result<(), Error> {
+        let now = self.settings()?;
+        if self.session.changed(&now, false).is_empty() {
+            return Ok(());
+        }
+        Err("this session's values are written: begin another one, as a motion needs the settings before".into())
+    }
+
+    /// Refuses a part, and drops its step: the next run repeats it.
     pub fn without(&mut self, step: &str, why: String) -> Result<(), Error> {
-        self.found.refused.push(why);
-        self.found.blocked = true;
+        self.found.refuse(why);
         self.session.forget(step)
     }
 
-    /// Shows the results, writes them if confirmed, and prints the JSON object. Fails if a part has no result, or the
-    /// controller refuses: then nothing was changed.
+    /// Shows the results, writes them if confirmed, and prints the JSON object, also where that fails. Fails if a part has
+    /// no result, or the controller refuses: then nothing was changed.
     pub fn finish(mut self) -> Result<(), Error> {
         if !self.run.json {
             self.show();
@@ -379,7 +402,7 @@ impl Procedure<'_> {
         let value = |row: &Row| Ok((table::find(row.name)?, row.after.round() as i64));
         let values: Vec<params::Value> = self.found.rows.iter().map(value).collect::<Result<_, String>>()?;
         // As after a session that is run once more.
-        let now = Settings::read(self.client)?;
+        let now = self.settings()?;
         let is_set = self.found.gains.as_ref().is_none_or(|gains| gains.after == now.gains)
             && values.iter().all(|(register, value)| now.get(&table::name(register)).map(i64::from) == Some(*value));
         let nothing = self.found.rows.is_empty() && self.found.gains.is_none();
@@ -389,34 +412,42 @@ impl Procedure<'_> {
                 || self.run.options.apply
                 || !self.run.json && { self.run.yes("write these values to the controller?", "--apply")? });
         self.run.interrupt.check()?;
-        if wanted && !is_set {
-            self.write(&values)?;
-            self.run.report("written; `fingertip params save` or --save keeps them over a reset");
-            if self.found.gains.is_some() {
-                // The zeros of the old gains are wrong under new ones.
-                self.tare()
-                    .map_err(|why| format!("the values are written, but the tare that new gains need failed: {why}"))?;
-            }
-        }
-        let saved = wanted && self.run.options.save;
-        if saved {
-            params::save(self.client, self.run.json)?;
-        }
+        let done = if wanted { self.write(&values, is_set) } else { Ok(()) };
         if self.run.json {
-            say(self.as_json(wanted, saved));
+            say(self.as_json());
         } else if !wanted {
-            say("nothing was written");
+            say("no result was written");
         }
         let Found { blocked, refused, .. } = self.found;
-        if blocked { Err(format!("nothing was written: {}", refused.join("; ")).into()) } else { Ok(()) }
+        if blocked { Err(format!("no result was written: {}", refused.join("; ")).into()) } else { done }
     }
 
-    /// Writes gains and parameters: all of them or none.
-    fn write(&mut self, values: &[params::Value]) -> Result<(), Error> {
-        let named: Map<_, _> = values.iter().map(|(register, value)| (table::name(register), json!(value))).collect();
-        let gains = self.found.gains.as_ref().map(|gains| gains.after.as_slice());
-        self.session.done(WRITTEN, json!({ "parameters": named, "gains": gains }))?;
-        params::with_gains(gains, self.client, |client, _| params::set(values, client).map(drop))
+    /// Writes gains and parameters, all of them or none, unless they are set; tares if new gains need that, and saves.
+    fn write(&mut self, values: &[params::Value], is_set: bool) -> Result<(), Error> {
+        if !is_set {
+            // The controller may have restarted while the question waited.
+            self.settings()?;
+            let named: Map<_, _> =
+                values.iter().map(|(register, value)| (table::name(register), json!(value))).collect();
+            let gains = self.found.gains.as_ref().map(|gains| gains.after.as_slice());
+            let mut written = self.session.numbers(WRITTEN).to_vec();
+            written.push(json!({ "parameters": named, "gains": gains }));
+            self.session.done(WRITTEN, written.into())?;
+            params::with_gains(gains, self.client, |client, _| params::set(values, client).map(drop))?;
+            self.run.report("written; `fingertip params save` or --save keeps them over a reset");
+        }
+        self.found.applied = true;
+        // The zeros of the old gains are wrong under new ones: the controller asks for a tare.
+        let mut tared = Ok(());
+        if self.found.gains.is_some() && !self.is_tared()? {
+            let why = |why| format!("the values are written, but the tare that new gains need failed: {why}").into();
+            tared = self.zeros().map_err(why);
+        }
+        if self.run.options.save {
+            params::save(self.client, self.run.json)?;
+            self.found.saved = true;
+        }
+        tared
     }
 
     fn show(&self) {
@@ -445,7 +476,7 @@ impl Procedure<'_> {
     }
 
     /// One object in one line, for programs.
-    fn as_json(&self, applied: bool, saved: bool) -> Value {
+    fn as_json(&self) -> Value {
         let (found, settings) = (&self.found, &self.session.before);
         let [mut before, mut after, mut sigma] = [(); 3].map(|()| Map::new());
         for row in &found.rows {
@@ -459,8 +490,8 @@ impl Procedure<'_> {
             sigma.insert("gains".into(), json!(gains.sigma));
         }
         let mut all = json!({
-            "before": before, "after": after, "sigma": sigma, "refused": found.refused, "applied": applied, "saved": saved,
-            "session": self.session.folder,
+            "before": before, "after": after, "sigma": sigma, "refused": found.refused, "applied": found.applied,
+            "saved": found.saved, "session": self.session.folder,
         });
         if let Some(all) = all.as_object_mut() {
             all.extend(found.more.clone());

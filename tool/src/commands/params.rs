@@ -79,7 +79,7 @@ pub type Value = (&'static Register, i64);
 pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Error> {
     match command {
         Command::Get { names } => get(names, client, json),
-        Command::Set { values, save } => change(values, *save, client, json),
+        Command::Set { values, save } => conclude(&set(values, client)?, *save, client, json),
         Command::Save => save(client, json).map(|()| {
             if json {
                 say_json(&json!({ "saved": true }));
@@ -97,12 +97,16 @@ pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Err
             // Who moves a device to another address or speed means it, and says so by `set`.
             values.retain(|(register, _)| !is_bus(register));
             torque_is_off(client)?;
+            let mut changed = Vec::new();
             with_gains(gains.as_deref(), client, |client, new| {
+                changed = set(&values, client)?;
                 if new && !json {
                     say("the taxels' gains are others now: tare");
                 }
-                change(&values, *save, client, json)
-            })
+                Ok(())
+            })?;
+            // The new gains stay with the new parameters, also if the save fails.
+            conclude(&changed, *save, client, json)
         }
         Command::Diff { file } => diff(file.as_deref(), client, json),
     }
@@ -151,9 +155,8 @@ pub(super) fn with_gains(
     })
 }
 
-/// Sets them, saves them on request, and reports the changes.
-fn change(values: &[Value], save_too: bool, client: &mut Client, json: bool) -> Result<(), Error> {
-    let changed = set(values, client)?;
+/// Reports the changes, and saves them on request.
+fn conclude(changed: &[Changed], save_too: bool, client: &mut Client, json: bool) -> Result<(), Error> {
     let lines: Vec<String> =
         changed.iter().map(|(register, from, to)| format!("{}: {from} -> {to}", name(register))).collect();
     let now: Vec<Value> = changed.iter().map(|(register, _, to)| (*register, *to)).collect();
@@ -317,9 +320,12 @@ pub(super) fn set(values: &[Value], client: &mut Client) -> Result<Vec<Changed>,
             if from == value {
                 return Ok(());
             }
-            // Before it is known: where its answer is lost it is set all the same.
-            changed.push((register, from, value));
-            set_one(register, value, client)
+            let done = set_one(register, value, client);
+            // A register whose answer was lost may be set all the same.
+            if !matches!(done, Err(Error::Refused(..))) {
+                changed.push((register, from, value));
+            }
+            done
         });
         if let Err(why) = done {
             return Err(put_back(&before, &changed, client, &why));
@@ -383,27 +389,24 @@ pub fn named(params: &Params) -> Map<String, serde_json::Value> {
     names.zip(params.to_array().map(serde_json::Value::from)).collect()
 }
 
-/// Undoes what was set; the error has the result.
+/// Undoes what was set, each register also after an error of another one; the error has the result.
 fn put_back(params: &[u8], changed: &[Changed], client: &mut Client, why: &Error) -> Error {
-    let mut undone = if changed.iter().any(|(r, ..)| is_param(r)) {
-        client.again(|client| client.write(address::PARAMS, params))
-    } else {
-        Ok(())
-    };
-    for (register, from, _) in changed.iter().rev().filter(|(register, ..)| !is_param(register)) {
-        undone = undone.and_then(|()| set_one(register, *from, client));
+    let mut failed: Vec<(String, Error)> = Vec::new();
+    if changed.iter().any(|(register, ..)| is_param(register))
+        && let Err(why) = client.again(|client| client.write(address::PARAMS, params))
+    {
+        failed.push(("the parameters".into(), why));
     }
-    match undone {
-        Ok(()) => Error::Other(format!("{why}; what was set before is put back: nothing was changed")),
-        Err(second) => {
-            let names: Vec<String> = changed.iter().map(|(register, ..)| name(register)).collect();
-            Error::Other(format!(
-                "{why}; and putting back failed: {second}. Only some are set, of {}: \
-                 a reboot brings back what was saved",
-                names.join(", ")
-            ))
+    for (register, from, _) in changed.iter().rev().filter(|(register, ..)| !is_param(register)) {
+        if let Err(why) = set_one(register, *from, client) {
+            failed.push((name(register), why));
         }
     }
+    let Some((_, second)) = failed.first() else {
+        return Error::Other(format!("{why}; what was set before is put back: nothing was changed"));
+    };
+    let left = failed.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
+    Error::Other(format!("{why}; and putting back failed: {second}. A reset brings back the saved values of {left}"))
 }
 
 const PARAMETERS: &str = "parameters";

@@ -10,6 +10,7 @@ use crate::client::{self, ID_MAX, Reach};
 use crate::{Client, Error, table};
 use fingertip::link::packet::{BROADCAST, Event, HEADER, Packet, REPLY_MAX, Receiver, StatusError, instruction};
 use fingertip::shipped::address;
+use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{Read as _, Write as _};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
@@ -82,7 +83,7 @@ struct Connection {
 }
 
 /// Serves until Ctrl-C, then stops what is still commanded.
-pub fn run(args: &Args, reach: &Reach) -> Result<(), Error> {
+pub fn run(args: &Args, reach: &Reach, json: bool) -> Result<(), Error> {
     let interrupt = Interrupt::catch()?;
     let mut client = Client::open(reach)?;
     // An unanswered packet takes two thirds, half of that for a late answer: the next one is still answered in time.
@@ -90,8 +91,12 @@ pub fn run(args: &Args, reach: &Reach) -> Result<(), Error> {
     let cannot = |why| Error::Other(format!("cannot listen at {}: {why}", args.listen));
     let listener = TcpListener::bind(args.listen).map_err(cannot)?;
     let address = listener.local_addr().map_err(cannot)?;
-    say(format_args!("shares {} at tcp:{address}; Ctrl-C ends it", client.port));
-    say(format_args!("next, in other terminals: fingertip --port tcp:{address} view"));
+    if json {
+        say(json!({ "port": client.port, "address": format!("tcp:{address}") }));
+    } else {
+        say(format_args!("shares {} at tcp:{address}; Ctrl-C ends it", client.port));
+        say(format_args!("next, in other terminals: fingertip --port tcp:{address} view"));
+    }
     let bus = Arc::new(Mutex::new(Bus { client, connections: BTreeMap::new(), urgent: false }));
     let (lost, losses) = channel();
     let shared = Arc::clone(&bus);
@@ -251,7 +256,19 @@ impl Bus {
                 }
             }
         }
-        self.client.pass(raw, Some(packet.id).filter(|id| *id != BROADCAST), answers(packet))
+        let answer = self.client.pass(raw, Some(packet.id).filter(|id| *id != BROADCAST), answers(packet))?;
+        // Once a write of the ID is accepted (no error in byte 8, whose top bit is the alert), only the new ID answers.
+        if packet.instruction == instruction::WRITE
+            && answer.get(8).is_some_and(|error| error & 0x7F == 0)
+            && let Some(id) = parts.iter().find_map(|part| part.byte(address::ID))
+        {
+            for one in self.connections.values_mut() {
+                one.ids = one.ids.iter().map(|known| if *known == packet.id { id } else { *known }).collect();
+                let watchdog = one.watchdogs.remove(&packet.id);
+                one.watchdogs.extend(watchdog.map(|most| (id, most)));
+            }
+        }
+        Ok(answer)
     }
 
     /// The client that may write: it wrote and was not stopped.

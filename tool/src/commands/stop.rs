@@ -131,8 +131,16 @@ pub struct Stop {
     all: bool,
 }
 
+/// Stops the requested fingers, also after a signal: a finger that was released still has torque on, and perhaps no bus
+/// watchdog.
+pub fn run(args: &Stop, reach: &Reach, json: bool) -> Result<(), Error> {
+    let interrupt = Interrupt::catch()?;
+    stop_all(args, reach, json)?;
+    interrupt.check()
+}
+
 /// Turns torque off, which aborts measurements, sets the bus watchdog to 0, and reports what was found and changed.
-pub fn stop_all(args: &Stop, reach: &Reach, json: bool) -> Result<(), Error> {
+fn stop_all(args: &Stop, reach: &Reach, json: bool) -> Result<(), Error> {
     if !args.all {
         return super::each(reach, false, |client| {
             let stopped = stop(client, true, json)?;

@@ -167,6 +167,21 @@ fn a_register_that_is_named_twice_changes_nothing() {
 }
 
 #[test]
+fn a_register_that_cannot_be_put_back_does_not_keep_the_others() {
+    let finger = Served::begin("wall");
+    let set = ["--timeout-ms", "1000", "params", "set", "return_delay_time=100", "fit_level=4"];
+    let begun = finger.heard();
+    finger.done(&set);
+    let packets = finger.heard() - begun;
+    finger.done(&["params", "set", "return_delay_time=250", "fit_level=3"]);
+    // Lost: the packet that sets `fit_level`, before one read of each, and the packet that puts it back.
+    finger.command(&format!("deaf after {} for 2", packets - 3));
+    finger.refuses(&set, &["putting back failed: set fit_level to 3", "saved values of fit_level\n"]);
+    let now = finger.json(&["params", "get", "return_delay_time", "fit_level"]);
+    assert_eq!(now, serde_json::json!({ "return_delay_time": 250, "fit_level": 3 }));
+}
+
+#[test]
 fn a_backup_that_was_cut_changes_nothing() {
     let finger = Served::begin("wall");
     let file = finger.file("cut.toml");

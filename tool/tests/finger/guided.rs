@@ -3,10 +3,12 @@
 use crate::served::{self, Served};
 use crate::stopped::{ENDS, End, RESIDUAL_N, end_behind, is_at_rest};
 use fingertip::link::packet::instruction::REBOOT;
+use fingertip::shipped::address;
 use serde_json::{Value, json};
 use std::fs;
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::process::Stdio;
+use std::time::{Duration, Instant};
 
 /// Options of a calibration without questions and without the pause of a real sensor.
 const QUICK: [&str; 6] = ["calibrate", "--no-wait", "--pause-s", "0", "--within-s", "3600"];
@@ -170,14 +172,8 @@ fn a_wrong_answer_changes_nothing() {
     finger.refuses(&["identify", "--no-wait"], &["`fingertip commission`"]);
     finger.done(&["params", "set", "direction_confirmed=1"]);
 
-    // What the scale shows is ten times what is read.
     let session = finger.file("scale");
     let calibrate = [&QUICK[..], &["--presses", "1", "--scale-n", "1", "--apply", "--session", &session]].concat();
-    let (code, found, why) = output(&finger, &[&calibrate[..], &["--shown-n", "10"]].concat());
-    assert!(why.contains("a half to two is allowed") && code == Some(1), "{why}");
-    assert_eq!((&found["applied"], found["refused"].as_array().map(Vec::len)), (&false.into(), Some(1)), "{found}");
-    assert_eq!(parameters(&finger), before);
-
     // A signal while the force is held.
     let child = finger.start(&[&calibrate[..], &["--shown-n", "1"]].concat());
     finger.until("Force:");
@@ -186,6 +182,11 @@ fn a_wrong_answer_changes_nothing() {
     assert_eq!(ended.status.code(), Some(130), "{ended:?}");
     assert!(finger.true_force_n() < 0.05, "{}", finger.command("state"));
     is_at_rest(&finger, "interrupted");
+    assert_eq!(parameters(&finger), before);
+    // What the scale shows is ten times what is read.
+    let (code, found, why) = output(&finger, &[&calibrate[..], &["--shown-n", "10"]].concat());
+    assert!(why.contains("a half to two is allowed") && code == Some(1), "{why}");
+    assert_eq!((&found["applied"], found["refused"].as_array().map(Vec::len)), (&false.into(), Some(1)), "{found}");
     assert_eq!(parameters(&finger), before);
     let found = finger.json(&[&calibrate[..], &["--shown-n", "1.1"]].concat());
     assert_eq!(found["applied"], true, "{found}");
@@ -203,6 +204,161 @@ fn a_program_is_asked_nothing() {
         let (code, found, why) = output(&finger, arguments);
         assert!(code == Some(2) && found.is_null() && why.contains(option), "{arguments:?}: {why}");
     }
+}
+
+/// Starts a command, gives it `first`, waits for the question, does `meanwhile` and answers. Returns exit code and errors.
+fn asked(finger: &Served, arguments: &[&str], talk: [&str; 3], meanwhile: &str) -> (Option<i32>, String) {
+    let [first, question, answer] = talk;
+    let mut command = finger.fingertip(arguments);
+    let command = command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut child = command.spawn().expect("it starts");
+    let mut input = child.stdin.take().expect("a pipe");
+    input.write_all(first.as_bytes()).expect("it reads");
+    let mut said = String::new();
+    for line in BufReader::new(child.stderr.take().expect("a pipe")).lines() {
+        said += &(line.expect("text") + "\n");
+        if said.lines().last().is_some_and(|line| line.contains(question)) {
+            finger.command(meanwhile);
+            input.write_all(answer.as_bytes()).expect("it reads");
+        }
+    }
+    (child.wait().expect("it ends").code(), said)
+}
+
+#[test]
+fn a_session_moves_and_writes_only_under_its_first_settings() {
+    let finger = Served::patient("wall");
+    let before = parameters(&finger);
+    let reboot = format!("raw {REBOOT}");
+    let press = ["identify", "--pause-s", "0", "--within-s", "3600"];
+    // A restart loses the radius that was not saved.
+    for (arguments, talk) in [
+        ([&press[..], &["--apply"]].concat(), ["", "then press Enter", "\n"]),
+        (press.to_vec(), ["\n", "write these values", "yes\n"]),
+    ] {
+        finger.done(&["params", "set", "tip_radius_um=9600"]);
+        let (code, said) = asked(&finger, &arguments, talk, &reboot);
+        assert!(code == Some(1) && said.contains("tip_radius_um changed since this session began"), "{talk:?}: {said}");
+        assert_eq!(parameters(&finger), before, "{talk:?}");
+    }
+
+    // A refused result has an object too.
+    finger.done(&["params", "set", "tip_radius_um=9000"]);
+    let (code, found, _) = output(&finger, &[&press[..], &["--no-wait"]].concat());
+    assert!(code == Some(1) && found["refused"][0].as_str().is_some_and(|why| why.contains("no modulus")), "{found}");
+    finger.done(&["params", "set", "tip_radius_um=10000"]);
+
+    let session = finger.file("once");
+    let calibrate = [&QUICK[..], &["--apply", "--session", &session]].concat();
+    finger.done(&[&calibrate[..], &["--presses", "1", "--no-scale"]].concat());
+    let more = [&["--presses", "2", "--no-scale"][..], &["--presses", "1", "--scale-n", "1", "--shown-n", "1.1"]];
+    for more in more {
+        finger.refuses(&[&calibrate[..], more].concat(), &["this session's values are written: begin another one"]);
+    }
+}
+
+#[test]
+fn numbers_of_a_scale_belong_to_their_holds() {
+    let finger = Served::patient("wall");
+    let session = finger.file("scale");
+    let calibrate = [&QUICK[..], &["--presses", "1", "--session", &session]].concat();
+    let run = |more: &[&str]| output(&finger, &[&calibrate[..], more].concat());
+    run(&["--scale-n", "1,2", "--shown-n", "1.1,2.2"]);
+    let heard = finger.heard();
+    for wrong in [["--scale-n", "1", "--shown-n", "1.1"], ["--scale-n", "2,1", "--shown-n", "2.2,1.1"]] {
+        let (code, _, why) = run(&wrong);
+        assert!(code == Some(1) && why.contains("holds of [1.0, 2.0] N"), "{wrong:?}: {why}");
+    }
+    let (code, found, why) = run(&["--scale-n", "1,2", "--shown-n", "10,20"]);
+    assert!(code == Some(1) && found["applied"] == false && why.contains("correct --shown-n"), "{why}");
+    let corrected = run(&["--scale-n", "1,2", "--shown-n", "1.2,2.4"]).1;
+    assert!(near(&corrected["scale"]["factor"], 1.2, 0.02), "{corrected}");
+    let (_, again, why) = run(&[]);
+    assert_eq!(again, corrected, "a number that was corrected is kept: {why}");
+    assert!(why.contains("the session has the step holds: it is reused"), "{why}");
+    assert!(finger.heard() - heard < 200, "nothing moves");
+
+    // The values are written, but the tare fails.
+    finger.command("fault supply-low");
+    finger.refuses(&["press", "0.5", "--within-s", "3600"], &["fault 9"]);
+    let (code, found, why) = run(&["--apply"]);
+    assert!(code == Some(1) && why.contains("the tare that new gains need failed"), "{why}");
+    assert_eq!((&found["applied"], &found["saved"]), (&true.into(), &false.into()), "{found}");
+    finger.command("mend");
+    finger.done(&["recover"]);
+    assert_eq!(run(&["--apply"]).1["applied"], true);
+    assert_eq!(finger.json(&["info"])["limit_names"], json!([]), "it is tared");
+    // A write that is refused does not lock the session.
+    let other = ["--scale-n", "1,2", "--shown-n", "1.1,2.2", "--apply"];
+    finger.set(&[(address::TORQUE_ENABLE, 1)]);
+    let (code, found, why) = run(&other);
+    assert!(code == Some(1) && found["applied"] == false && why.contains("Nothing was changed"), "{why}");
+    finger.set(&[(address::TORQUE_ENABLE, 0)]);
+    let (code, found, why) = run(&other);
+    assert!(code == Some(0) && found["applied"] == true, "{why}");
+}
+
+#[test]
+fn a_jog_that_is_repeated_repeats_the_strokes() {
+    let finger = Served::patient("wall");
+    let session = finger.file("drive");
+    let commission = ["commission", "--forward", "yes", "--within-s", "3600", "--session", &session];
+    let strokes = || fs::read(finger.file("drive/strokes.fts")).expect("it was kept");
+    finger.json(&commission);
+    let first = strokes();
+    let (_, _, said) = output(&finger, &commission);
+    assert!(said.contains("step jog: it is reused") && said.contains("step strokes.fts: it is reused"), "{said}");
+    finger.done(&["params", "set", "direction_confirmed=0"]);
+    finger.json(&commission);
+    assert!(strokes() != first, "another finger, by all that is known");
+
+    // A confirmation that the flash holds is withdrawn there.
+    finger.done(&["params", "save"]);
+    let (code, found, why) = output(&finger, &["commission", "--forward", "no", "--within-s", "3600"]);
+    assert!(code == Some(1) && found["refused"][0].as_str().is_some_and(|why| why.contains("swap")), "{found}, {why}");
+    finger.command(&format!("raw {REBOOT}"));
+    assert_eq!(parameters(&finger)["direction_confirmed"], 0);
+}
+
+#[test]
+fn answers_come_after_their_question_and_a_signal_ends_half_of_one() {
+    let finger = Served::patient("wall");
+    let commission = ["commission", "--within-s", "3600"];
+    let mut terminal = serve::Port::open(&serve::Place::Pty(None)).expect("a pseudo-terminal");
+    let input = fs::File::open(terminal.name()).expect("its other side");
+    terminal.send(b"yes\n");
+    let mut command = finger.fingertip(&commission);
+    let mut child = command.stdin(input).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("it starts");
+    served::line_with("towards the object?", child.stderr.take().expect("a pipe"));
+    terminal.send(b"no\n");
+    assert_eq!(child.wait().expect("it ends").code(), Some(1), "a key before the question does not answer it");
+    finger.done(&["params", "set", "direction_confirmed=1"]);
+
+    let mut command = finger.fingertip(&commission);
+    let command = command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut child = command.spawn().expect("it starts");
+    served::line_with("towards the object?", child.stderr.take().expect("a pipe"));
+    child.stdin.as_mut().expect("a pipe").write_all(b"y").expect("it reads");
+    std::thread::sleep(Duration::from_millis(200));
+    Served::interrupt(&child);
+    let until = Instant::now() + Duration::from_secs(60);
+    while child.try_wait().expect("it was started").is_none() {
+        assert!(Instant::now() < until, "a signal is not seen");
+        std::thread::sleep(Served::LOOK);
+    }
+    assert_eq!(child.wait().expect("it ends").code(), Some(130));
+}
+
+#[test]
+fn a_press_on_a_silent_bus_names_the_fault() {
+    let finger = Served::patient("wall");
+    finger.command("stall at Press: 0.5");
+    let child = finger.start(&["identify", "--no-wait", "--pause-s", "0", "--within-s", "3600"]);
+    Served::wait_for(|| finger.command("stalled") == "true");
+    finger.until_alone("Release:");
+    finger.command("go on");
+    let (code, said) = served::ended(&child.wait_with_output().expect("it ends"));
+    assert!(code == Some(1) && said.contains("fault 7"), "{said}");
 }
 
 /// Force at the tip that the dry friction of the scene's motor holds, N: 0.12 mN m, a gear of 43, a drum of 12 mm.

@@ -55,15 +55,14 @@ fn several_ids_are_asked_one_after_the_other() {
     let finger = Served::begin("grasp");
     let why = Served::not_understood(&["--id", "1,2", "press", "1"]);
     assert!(why.contains("takes one --id"), "{why}");
-    let infos = || {
-        let text = finger.done(&["--id", "all", "--timeout-ms", "1000", "info", "--json"]);
-        serde_json::Deserializer::from_str(&text).into_iter().map(|info| info.expect("JSON")).collect()
-    };
+    let infos = || finger.json(&["--id", "all", "--timeout-ms", "1000", "info"]).as_array().expect("a list").clone();
     let why = finger.refused(&["--id", "9,2", "--timeout-ms", "1000", "tare"]);
     assert!(why.contains("ID 9: ping: no answer") && !why.contains("ID 2"), "{why}");
     let [first, second]: [serde_json::Value; 2] = Vec::try_into(infos()).expect("two fingers");
     assert_eq!((&first["id"], &second["id"]), (&1.into(), &2.into()));
     assert_eq!((first["limit_names"][0].as_str(), second["limit_names"][0].as_str()), (Some("not tared"), None));
+    let stopped = finger.json(&["--id", "1,2", "stop"]);
+    assert_eq!((&stopped[0]["id"], &stopped[1]["id"]), (&1.into(), &2.into()));
     let said = finger.done(&["--id", "1,2", "tare"]);
     assert!(said.starts_with("ID 1:\ntared: ") && said.contains("\nID 2:\ntared: "), "{said}");
     let said = finger.done(&["--id", "all", "--timeout-ms", "1000", "stop"]);
@@ -173,8 +172,14 @@ fn a_backup_is_restored_whole() {
     let text = fs::read_to_string(&file).expect("it was written");
     let gains = "row_3 = [16384, 16384, 16384, 16384, ";
     assert!(text.contains(gains), "{text}");
-    fs::write(&file, text.replace(gains, "row_3 = [16384, 16384, 16384, 20000, ")).expect("a file");
+    let with = |gain| text.replace(gains, &format!("row_3 = [16384, 16384, 16384, {gain}, "));
+    fs::write(&file, with(21_000)).expect("a file");
+    let begun = finger.heard();
     finger.done(&["params", "restore", &file]);
+    // A save that fails takes back neither gains nor parameters.
+    finger.command(&format!("deaf after {} for 1", finger.heard() - begun));
+    fs::write(&file, with(20_000)).expect("a file");
+    finger.refuses(&["--timeout-ms", "1000", "params", "restore", &file, "--save"], &["no answer"]);
     assert_eq!(finger.json(&["params", "diff"])["gains"]["now"][3][3], 20_000);
     let other =
         text.replace(gains, "row_3 = [16384, 16384, 16384, 8191, ").replace("clearance_um = 500", "clearance_um = 600");

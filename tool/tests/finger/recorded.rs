@@ -11,9 +11,11 @@ use mcap::read::Options;
 use mcap::{MessageStream, Summary};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
+use rustix::process::Signal;
 use serde_json::Value;
 use sim::recording::{SCALARS, schemas};
 use std::fs;
+use std::process::Stdio;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Host's time, s since 1970.
@@ -86,6 +88,25 @@ fn a_recording_that_is_interrupted_is_whole() {
     finger.end();
     let (code, said) = ended(&child.wait_with_output().expect("it ends"));
     assert_eq!(code, Some(1), "{said}");
+}
+
+#[test]
+fn a_hangup_does_not_end_a_recording_under_nohup() {
+    let finger = Served::begin("wall");
+    let (file, part) = (finger.file("nohup.csv"), finger.file("nohup.csv.part"));
+    let record = finger.fingertip(&["record", &file]);
+    let mut nohup = std::process::Command::new("nohup");
+    nohup.arg(record.get_program()).args(record.get_args()).env("FINGERTIP_PORT", &finger.port).stdout(Stdio::null());
+    let mut child = nohup.spawn().expect("it starts");
+    Served::recorded(&part);
+    Served::signal(&child, Signal::HUP);
+    let length = || fs::metadata(&part).map_or(0, |part| part.len());
+    let before = length();
+    // More than what was still in its buffer.
+    Served::wait_for(|| length() > before + 30_000 || fs::metadata(&file).is_ok());
+    assert!(fs::metadata(&file).is_err(), "it goes on");
+    Served::signal(&child, Signal::TERM);
+    assert!(child.wait().expect("it ends").success() && fs::metadata(&file).is_ok());
 }
 
 #[test]

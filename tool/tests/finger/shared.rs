@@ -21,11 +21,12 @@ struct Shared {
     address: String,
 }
 
-/// Starts a broker; it and its address, once it listens.
+/// Starts a broker; it and its address, once it listens. The address is in a line of JSON.
 fn broker(finger: &Served, listen: &str, timeout: &str) -> (Child, String) {
-    let mut broker = finger.start(&["share", "--listen", listen, "--timeout-ms", timeout]);
+    let mut broker = finger.start(&["share", "--listen", listen, "--timeout-ms", timeout, "--json"]);
     let line = line_with("tcp:", broker.stdout.take().expect("a pipe"));
-    let address = line.split("tcp:").nth(1).and_then(|rest| rest.split(';').next()).expect("an address");
+    let line: serde_json::Value = serde_json::from_str(&line).expect(&line);
+    let address = line["address"].as_str().and_then(|port| port.strip_prefix("tcp:")).expect("an address");
     (broker, address.to_owned())
 }
 
@@ -353,6 +354,40 @@ fn clients_that_ask_an_absent_id_do_not_starve_a_press() {
         press.number(address::PRESENT_MODE).expect("it is answered in time");
     }
     press.set(address::GOAL_FORCE_MN, 900).expect("it still commands");
+}
+
+/// The broker stops the finger at its new ID, and does not wait for answers of the old one.
+#[test]
+fn an_id_that_a_client_set_is_followed() {
+    let mut shared = Shared::within("900", Served::patient("wall"));
+    let mut client = shared.client();
+    client.set(address::BUS_WATCHDOG, 25).expect("it obeys");
+    client.set(address::ID, 7).expect("it obeys");
+    let sent = shared.packets_at_its_end();
+    assert!((2..8).contains(&sent), "{sent} packets");
+}
+
+/// The broker always refuses `baud_rate`, the last of the three.
+#[test]
+fn a_refused_parameter_does_not_keep_the_others_from_being_put_back() {
+    let shared = Shared::begin("wall");
+    let set = ["params", "set", "return_delay_time=100", "id=7", "baud_rate=1"];
+    let (code, said) = ended(&shared.output(&set));
+    assert!(code == Some(1) && said.contains("nothing was changed") && said.contains("the bus speed"), "{said}");
+    let info = shared.output(&["info", "--json"]);
+    let info: serde_json::Value = serde_json::from_slice(&info.stdout).expect("JSON");
+    assert_eq!((&info["id"], &info["return_delay_us"]), (&1.into(), &500.into()));
+}
+
+#[test]
+fn a_scan_through_tcp_finds_each_finger_once() {
+    let shared = Shared::within("900", Served::patient("wall"));
+    let scan = |more: &[&str]| shared.output(&[&["scan", "--speeds", "57600,9600"], more].concat()).stdout;
+    let found: serde_json::Value = serde_json::from_slice(&scan(&["--json"])).expect("JSON");
+    let found = found.as_array().expect("a list");
+    assert_eq!((found.len(), &found[0]["id"], &found[0]["baud"]), (1, &1.into(), &serde_json::Value::Null));
+    let text = String::from_utf8(scan(&[])).expect("text");
+    assert!(text.lines().count() == 1 && !text.contains("baud"), "{text}");
 }
 
 /// As `view` does it.

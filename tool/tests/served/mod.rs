@@ -9,12 +9,14 @@ use fingertip_cli::client::{Reach, packet};
 use rustix::process::{Pid, Signal};
 use serve::native::Native;
 use serve::{Finger as _, Place, Port, Stop};
+use signal_hook::consts::SIGHUP;
 use sim::effects::Named;
 use sim::native::served::Bus;
 use std::cell::RefCell;
 use std::io::{BufRead as _, BufReader, Read};
 use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -179,6 +181,8 @@ impl Served {
     pub const LOOK: Duration = Duration::from_millis(2);
 
     pub fn begin(scene: &str) -> Self {
+        // Under `nohup` the programs would ignore it too. A handler, which they do not inherit, ends that.
+        signal_hook::flag::register(SIGHUP, Arc::default()).expect("a handler");
         let scene = sim::cli::load(scene, &[], None).expect("a scene");
         let mut port = Port::open(&Place::Pty(None)).expect("a pseudo-terminal");
         let (name, stop) = (port.name().to_owned(), port.stopper());

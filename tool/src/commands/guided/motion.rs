@@ -3,14 +3,14 @@
 
 use super::{GainRows, Presses, Procedure, Run};
 use crate::commands::stop::{Moving, measure_tare};
-use crate::commands::{TOUCHED, capture, no_fault, no_fault_nor_motion, press, stopped};
+use crate::commands::{TOUCHED, capture, no_fault, no_fault_nor_motion, press, stopped, wait_for};
 use crate::state::{RESTARTED, State};
 use crate::{Client, Error, numbers, table};
 use fingertip::capture::CaptureState;
 use fingertip::measure::{Ended, MeasureState, Task};
 use fingertip::pressure::{GAIN_MAX, GAIN_ONE};
 use fingertip::shipped::address;
-use fingertip::state::Mode;
+use fingertip::state::{Limits, Mode};
 use serde_json::{Value, json};
 use solve::gains::Condition;
 use solve::modulus::Modulus;
@@ -25,6 +25,8 @@ const LOOK: Duration = Duration::from_millis(10);
 /// Time between two reports of progress.
 const REPORT: Duration = Duration::from_secs(1);
 const TARE: Duration = Duration::from_secs(5);
+/// Longest wait for a controller that releases the object by itself.
+const RELEASE: Duration = Duration::from_secs(2);
 
 /// Words for an early end: reason with its number, and what to do.
 fn ended_early(task: Task, number: i64, value: i64) -> Error {
@@ -48,8 +50,13 @@ pub fn press_name(number: u32) -> String {
 }
 
 impl Procedure<'_> {
-    /// Fails if a motion cannot begin, with the reason.
-    fn ready(&mut self) -> Result<(), Error> {
+    /// Fails if a motion of the session cannot begin, with the reason.
+    pub fn ready(&mut self) -> Result<(), Error> {
+        self.at_rest()?;
+        self.unchanged()
+    }
+
+    fn at_rest(&mut self) -> Result<(), Error> {
         no_fault_nor_motion(self.client)?;
         if self.client.number(address::TORQUE_ENABLE)? != 0 {
             return Err("torque is on: turn it off first, by `fingertip stop`".into());
@@ -69,6 +76,18 @@ impl Procedure<'_> {
 
     pub fn tare(&mut self) -> Result<(), Error> {
         self.ready()?;
+        self.zeros()
+    }
+
+    /// True if the controller has zeros for its gains that were measured in the air.
+    pub fn is_tared(&mut self) -> Result<bool, Error> {
+        let limits = Limits(self.client.again(|client| client.number(address::LIMITS))? as u16);
+        Ok(!limits.has(Limits::NOT_TARED) && !limits.has(Limits::TARED_TOUCHING))
+    }
+
+    /// Tares under any settings.
+    pub fn zeros(&mut self) -> Result<(), Error> {
+        self.at_rest()?;
         self.run.report("tare: nothing may touch the tip");
         if measure_tare(TARE, self.client)?.touched { Err(TOUCHED.into()) } else { Ok(()) }
     }
@@ -83,7 +102,7 @@ impl Procedure<'_> {
         let ended = carry_out(task, &self.run, moving.client);
         moving.finish(ended)?;
         if task == Task::Jog {
-            return Ok(Vec::new());
+            return self.unchanged().map(|()| Vec::new());
         }
         let kept = self.client.block(address::CAPTURE_STATE, address::CAPTURE_COUNT)?;
         let now = kept.number(address::CAPTURE_COUNT);
@@ -93,7 +112,8 @@ impl Procedure<'_> {
             )
             .into());
         }
-        capture::fetch(self.client, now, self.run.json)
+        let bytes = capture::fetch(self.client, now, self.run.json)?;
+        self.unchanged().map(|()| bytes)
     }
 
     /// Waits until the controller's chip has this temperature.
@@ -132,13 +152,13 @@ impl Procedure<'_> {
 
     /// Presses once, unless the session has it: pause in the air, press, release.
     pub fn press(&mut self, name: &str, question: &str, options: &Presses) -> Result<(), Error> {
-        if self.session.records.contains_key(name) {
+        if self.reuses(name) {
             return Ok(());
         }
+        self.ready()?;
         if !options.no_wait {
             self.run.enter(question, "--no-wait")?;
         }
-        self.ready()?;
         self.tare_after(options.pause_s)?;
         self.run.report("press: takes about 10 s");
         let bytes = self.motion(Task::Press)?;
@@ -152,17 +172,16 @@ impl Procedure<'_> {
         Ok(record::press(bytes, &self.session.before.params).map_err(|why| format!("{name}: {why}"))?)
     }
 
-    /// Solves all presses together, and reports those that do not count, and taxels that are dead or odd. Where no press
-    /// counts the session forgets them, so that the next run presses again.
-    pub fn modulus(&mut self, count: u32) -> Result<Modulus, Error> {
+    /// Solves all presses together, and reports those that do not count, and taxels that are dead or odd. Returns none where
+    /// no press counts: the session forgets them, so that the next run presses again.
+    pub fn modulus(&mut self, count: u32) -> Result<Option<Modulus>, Error> {
         let presses = (1..=count).map(|number| self.pressed(&press_name(number))).collect::<Result<Vec<_>, _>>()?;
         self.run.report("solving modulus, poses and gains");
         let modulus = match solve::modulus(&presses) {
             Ok(modulus) => modulus,
             Err(why) => {
-                self.session.forget("press-")?;
-                let text = "Nothing was written; the next run presses again";
-                return Err(format!("the presses give no modulus: {why}. {text}").into());
+                let why = format!("the presses give no modulus: {why}. The next run presses again");
+                return self.without("press-", why).map(|()| None);
             }
         };
         let (gains, found) = (&modulus.gains, &mut self.found);
@@ -175,7 +194,7 @@ impl Procedure<'_> {
             found.more.insert(name.into(), places.collect());
         }
         found.notes.push(modulus.to_string());
-        Ok(modulus)
+        Ok(Some(modulus))
     }
 
     /// Finds the gains to write: those in force over what each taxel reads too much.
@@ -231,6 +250,11 @@ fn carry_out(task: Task, run: &Run<'_>, client: &mut Client) -> Result<(), Error
             } else if state == MeasureState::Done as i64 || full {
                 Ok(())
             } else {
+                if ended == Ended::Interrupted as i64 {
+                    // On a silent bus the controller releases the object first: the fault follows.
+                    wait_for(client, address::PRESENT_MODE, RELEASE, |mode| mode != Mode::Release as i64)?;
+                    no_fault(client)?;
+                }
                 Err(ended_early(task, ended, value))
             };
         }
@@ -269,37 +293,19 @@ impl Procedure<'_> {
     /// Holds each force in turn. Before its reading the finger goes to the goals of [`SWINGS`] around it. The tip is at rest
     /// and clear of the plate afterwards.
     pub fn hold_all(&mut self, goals_mn: &[i64], shown_n: &[f64]) -> Result<(), Error> {
-        if self.session.steps.contains_key(HOLDS) {
-            return Ok(());
-        }
+        self.ready()?;
         let moving = Moving::begin(self.client, &self.run.interrupt)?;
         let held = hold(goals_mn, shown_n, &self.run, moving.client);
         let held = moving.finish(held)?;
+        self.unchanged()?;
         self.session.done(HOLDS, held.into())
-    }
-
-    /// Shown and read forces. The controller read them with the gains before; `factors` are gains to write over gains before,
-    /// by which each taxel's part of the force changes. Numbers of the command line replace those of the session.
-    pub fn held(&self, factors: &[f64], shown_n: &[f64]) -> Vec<Held> {
-        let holds = self.session.numbers(HOLDS);
-        let replaced = |index: usize| shown_n.get(index).copied().filter(|_| shown_n.len() == holds.len());
-        let one = |(index, hold): (usize, &Value)| {
-            let pressures = hold["pressures_pa"].as_array()?.iter().filter_map(Value::as_f64);
-            let (mut sum, mut after) = (0.0, 0.0);
-            for (pressure, factor) in pressures.zip(factors) {
-                (sum, after) = (sum + pressure, after + pressure * factor);
-            }
-            let change = if sum > 0.0 { after / sum } else { 1.0 };
-            let shown_n = replaced(index).or(hold["shown_n"].as_f64())?;
-            Some(Held { shown_n, read_n: hold["read_n"].as_f64()? * change })
-        };
-        holds.iter().enumerate().filter_map(one).collect()
     }
 
     /// Readings under a weight that a person lays on the tip, with torque off. A force that the loop holds would not do: the
     /// loop keeps the reading constant, and creep would be in the force.
     pub fn weight(&mut self, seconds: f64) -> Result<HeldSeries, Error> {
-        if !self.session.steps.contains_key(WEIGHT) {
+        if !self.reuses(WEIGHT) {
+            self.ready()?;
             self.run.report(format_args!(
                 "lay a weight of 50 to 500 g on the tip within 60 s, and leave it there for {seconds} s"
             ));
@@ -319,6 +325,7 @@ impl Procedure<'_> {
                 readings.push(json!([time_s, force_mn as f64 * 1e-3]));
                 std::thread::sleep(10 * LOOK);
             }
+            self.unchanged()?;
             self.session.done(WEIGHT, readings.into())?;
             self.run.report("take the weight off the tip within 60 s");
             if !self.force_within(|force_mn| force_mn < WEIGHT_MN / 2)? {
@@ -341,6 +348,21 @@ impl Procedure<'_> {
         }
         Ok(true)
     }
+}
+
+/// Shown and read forces of holds. `factors` are gains to write over gains before, by which each taxel's part of a force
+/// changes.
+pub fn held(holds: &[Value], factors: &[f64]) -> Vec<Held> {
+    let one = |hold: &Value| {
+        let pressures = hold["pressures_pa"].as_array()?.iter().filter_map(Value::as_f64);
+        let (mut sum, mut after) = (0.0, 0.0);
+        for (pressure, factor) in pressures.zip(factors) {
+            (sum, after) = (sum + pressure, after + pressure * factor);
+        }
+        let change = if sum > 0.0 { after / sum } else { 1.0 };
+        Some(Held { shown_n: hold["shown_n"].as_f64()?, read_n: hold["read_n"].as_f64()? * change })
+    };
+    holds.iter().filter_map(one).collect()
 }
 
 fn hold(goals_mn: &[i64], shown_n: &[f64], run: &Run<'_>, client: &mut Client) -> Result<Vec<Value>, Error> {

@@ -311,7 +311,8 @@ pub(super) fn set(values: &[Value], client: &mut Client) -> Result<Vec<Changed>,
     let mut changed: Vec<Changed> = params.iter().map(|(r, value)| (*r, block.number(r.address), *value)).collect();
     changed.retain(|(_, from, to)| from != to);
     if after != before {
-        client.again(|client| client.write(address::PARAMS, &after)).map_err(|why| unsure(&why))?;
+        let written = client.again(|client| client.write(address::PARAMS, &after));
+        written.map_err(|why| if matches!(why, Error::Refused(..)) { why } else { unsure(&why) })?;
     }
     // Those of the bus come last: behind them the controller is found elsewhere.
     let (bus, plain): (Vec<Value>, Vec<Value>) = others.into_iter().partition(|(register, _)| is_bus(register));

@@ -1,5 +1,5 @@
-//! The examples for clusters, tried on this machine: tasks of a Slurm array and pods of a Kubernetes job, each in its
-//! environment, and GNU parallel.
+//! Runs the examples for clusters on this machine, without a cluster: each task of Slurm and each pod of Kubernetes runs
+//! with the environment variables that it would get there.
 
 use crate::console::{self, Console};
 use crate::host;
@@ -14,8 +14,6 @@ use std::process::Command;
 const SHARES: u32 = 3;
 const SEEDS: &str = "12";
 const SCENE: &str = "host-tests/sim/scenes/raspberry.toml";
-/// Debian package that an example needs.
-const PACKAGES: [&str; 1] = ["parallel"];
 /// Script that summarises the runs, and reads the Kubernetes job.
 const CLIENTS: Environment = Environment {
     folder: "venv-cluster",
@@ -24,9 +22,9 @@ const CLIENTS: Environment = Environment {
     does: "the summary of a sweep is tried by it",
 };
 
-/// Makes sure of GNU parallel and of a Python with the rest, and returns its interpreter.
+/// Installs GNU parallel, and a Python environment with DuckDB and PyYAML. Returns the environment's interpreter.
 pub fn ensure(console: &mut Console) -> Result<PathBuf> {
-    install::packages(&PACKAGES, "the test of the examples for clusters", console)?;
+    install::packages(&["parallel"], "the test of the examples for clusters", console)?;
     install::environment(&CLIENTS, console)
 }
 

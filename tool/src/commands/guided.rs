@@ -119,7 +119,7 @@ impl Run<'_> {
         }
         let mut why = String::new();
         for _ in 0..TRIES {
-            // Fails where no terminal is attached: a pipe keeps its lines.
+            // Drops keys pressed before the question. Without a terminal this fails, and a pipe keeps its lines.
             let _ = tcflush(io::stdin(), QueueSelector::IFlush);
             aside(question);
             let line = self.line(option, idle)?;
@@ -177,7 +177,7 @@ pub fn yes_or_no(text: &str) -> Result<bool, String> {
 // A file is written beside its place and renamed once it is whole. A record is listed in `session.json` after it was
 // written: a kill between the two repeats the motion.
 
-const VERSION: u64 = 1;
+const VERSION: u64 = 2;
 
 /// Parameters and gains of the controller at one time.
 #[derive(Clone, Debug, PartialEq)]
@@ -348,7 +348,7 @@ impl Found {
     }
 }
 
-/// Step of a session: every set of values that it began to write.
+/// Name of the step that lists each set of values sent to the controller, also one whose write failed.
 const WRITTEN: &str = "written";
 
 impl Session {
@@ -367,7 +367,8 @@ impl Session {
 }
 
 impl Procedure<'_> {
-    /// Reads the controller's settings. Fails where they are neither those before the session nor those that it has written.
+    /// Reads the controller's parameters and gains. Fails if one has neither its value from before the session nor one that
+    /// the session sent.
     fn settings(&mut self) -> Result<Settings, Error> {
         let now = Settings::read(self.client)?;
         let names = self.session.changed(&now, true).join(", ");

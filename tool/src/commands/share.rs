@@ -234,7 +234,7 @@ impl Bus {
             }
         } else if !READS.contains(&packet.instruction) {
             let stopped = own.stopped || commander.is_some_and(|other| other != from);
-            // The port keeps its speed. A Reg Write acts later or never, so it would not be known which watchdog runs.
+            // The bus speed is fixed. A Reg Write acts only at an Action, so `share` would not know which watchdog time holds.
             let later = packet.instruction == instruction::REG_WRITE;
             let fixed = |part: &Part<'_>| {
                 part.byte(address::BAUD_RATE).is_some() || later && part.byte(address::BUS_WATCHDOG).is_some()
@@ -284,11 +284,6 @@ impl Bus {
         let next = self.commander().map(|next| &self.connections[&next].ids);
         let mut ids: Vec<u8> = ids.into_iter().filter(|id| next.is_none_or(|next| !next.contains(id))).collect();
         self.client.fed = (why != SILENT).then(Instant::now);
-        // A client that wrote by broadcast: absent IDs would take a time-out each.
-        if ids.len() > GOALS {
-            let found = self.client.ping_all().unwrap_or_default();
-            ids.retain(|id| found.iter().any(|pong| pong.id == *id));
-        }
         let own = self.client.id;
         // All fingers release at the same time. Then torque is turned off one finger at a time.
         let [low, high] = address::GOAL_FORCE_MN.to_le_bytes();
@@ -296,6 +291,11 @@ impl Bus {
             let goals = some.iter().flat_map(|id| [*id, 0, 0, 0, 0]);
             let params: Vec<u8> = [low, high, 4, 0].into_iter().chain(goals).collect();
             let _ = self.client.pass(&client::packet(BROADCAST, instruction::SYNC_WRITE, &params), None, 0);
+        }
+        // A client that wrote by broadcast: absent IDs would take a time-out each.
+        if ids.len() > GOALS {
+            let found = self.client.ping_all().unwrap_or_default();
+            ids.retain(|id| found.iter().any(|pong| pong.id == *id));
         }
         for id in ids {
             self.client.id = id;

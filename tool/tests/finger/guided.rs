@@ -206,7 +206,8 @@ fn a_program_is_asked_nothing() {
     }
 }
 
-/// Starts a command, gives it `first`, waits for the question, does `meanwhile` and answers. Returns exit code and errors.
+/// Runs a command: writes `first` to its input, and at `question` does `meanwhile`, then writes `answer`. Returns its exit
+/// code and standard error.
 fn asked(finger: &Served, arguments: &[&str], talk: [&str; 3], meanwhile: &str) -> (Option<i32>, String) {
     let [first, question, answer] = talk;
     let mut command = finger.fingertip(arguments);
@@ -288,7 +289,7 @@ fn numbers_of_a_scale_belong_to_their_holds() {
     finger.done(&["recover"]);
     assert_eq!(run(&["--apply"]).1["applied"], true);
     assert_eq!(finger.json(&["info"])["limit_names"], json!([]), "it is tared");
-    // A write that is refused does not lock the session.
+    // After a refused write the session can write again.
     let other = ["--scale-n", "1,2", "--shown-n", "1.1,2.2", "--apply"];
     finger.set(&[(address::TORQUE_ENABLE, 1)]);
     let (code, found, why) = run(&other);
@@ -312,7 +313,7 @@ fn a_jog_that_is_repeated_repeats_the_strokes() {
     finger.json(&commission);
     assert!(strokes() != first, "another finger, by all that is known");
 
-    // A confirmation that the flash holds is withdrawn there.
+    // The answer no also clears direction_confirmed in flash: it reads 0 after a reboot.
     finger.done(&["params", "save"]);
     let (code, found, why) = output(&finger, &["commission", "--forward", "no", "--within-s", "3600"]);
     assert!(code == Some(1) && found["refused"][0].as_str().is_some_and(|why| why.contains("swap")), "{found}, {why}");

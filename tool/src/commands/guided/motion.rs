@@ -172,8 +172,8 @@ impl Procedure<'_> {
         Ok(record::press(bytes, &self.session.before.params).map_err(|why| format!("{name}: {why}"))?)
     }
 
-    /// Solves all presses together, and reports those that do not count, and taxels that are dead or odd. Returns none where
-    /// no press counts: the session forgets them, so that the next run presses again.
+    /// Solves all presses together, and reports those that do not count, and taxels that are dead or odd. Returns
+    /// none if no press counts: the session drops all presses, and the next run presses again.
     pub fn modulus(&mut self, count: u32) -> Result<Option<Modulus>, Error> {
         let presses = (1..=count).map(|number| self.pressed(&press_name(number))).collect::<Result<Vec<_>, _>>()?;
         self.run.report("solving modulus, poses and gains");

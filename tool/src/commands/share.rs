@@ -10,6 +10,8 @@ use crate::client::{self, ID_MAX, Reach};
 use crate::{Client, Error, table};
 use fingertip::link::packet::{BROADCAST, Event, HEADER, Packet, REPLY_MAX, Receiver, StatusError, instruction};
 use fingertip::shipped::address;
+use rustix::io::Errno;
+use rustix::net::{RecvFlags, recv};
 use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{Read as _, Write as _};
@@ -36,6 +38,7 @@ const STOPS: [u16; 5] =
 const GOALS: usize = (REPLY_MAX - 14) / 5;
 /// Reason for a stop during which the bus watchdogs are not fed.
 const SILENT: &str = "its client is silent";
+const LEFT: &str = "its client left";
 /// Longest release of a finger whose client left, s of the controller's clock. Other clients wait that long.
 const RELEASE_S: f64 = 0.5;
 /// Longest wait for a client that does not take its answers.
@@ -80,6 +83,15 @@ struct Connection {
     heard: Option<Instant>,
     /// True once another client stopped one of its fingers: it writes no more.
     stopped: bool,
+    stream: Option<TcpStream>,
+}
+
+impl Connection {
+    /// True once the client has left and its last packet was read, also before its thread has noticed it.
+    fn left(&self) -> bool {
+        let next = |stream| recv(stream, &mut [0], RecvFlags::PEEK | RecvFlags::DONTWAIT);
+        self.stream.as_ref().is_some_and(|stream| matches!(next(stream), Ok((0, _)) | Err(Errno::CONNRESET)))
+    }
 }
 
 /// Serves until Ctrl-C, then stops what is still commanded.
@@ -158,6 +170,7 @@ fn converse(mut stream: TcpStream, bus: &Mutex<Bus>, lost: &Outbox<Error>) {
     let Ok(from) = stream.peer_addr() else { return };
     let _ = stream.set_nodelay(true).and_then(|()| stream.set_write_timeout(Some(SLOW)));
     let (mut receiver, mut raw, mut buffer) = (Receiver::new(), Vec::new(), [0; JUNK]);
+    lock(bus).connections.entry(from).or_default().stream = stream.try_clone().ok();
     // `gone` is true once an answer could not be delivered. Of the packets received before, only stops are passed then.
     let (mut commands, mut gone) = (false, false);
     'client: while let Ok(count @ 1..) = stream.read(&mut buffer) {
@@ -200,7 +213,7 @@ fn converse(mut stream: TcpStream, bus: &Mutex<Bus>, lost: &Outbox<Error>) {
         }
     }
     let mut bus = turn(bus, commands);
-    bus.end_command(from, "its client left");
+    bus.end_command(from, LEFT);
     bus.connections.remove(&from);
 }
 
@@ -212,12 +225,16 @@ impl Bus {
         }
         // Reads of others would feed the watchdogs of a silent client.
         let slack = self.client.timeout;
-        let silent = |(other, connection): (&SocketAddr, &Connection)| {
-            let (heard, most) = (connection.heard?, *connection.watchdogs.values().min()?);
-            (*other != from && heard.elapsed() > most + slack).then_some(*other)
+        let silent = |one: &Connection| {
+            let most = one.watchdogs.values().min().zip(one.heard);
+            most.is_some_and(|(most, heard)| heard.elapsed() > *most + slack)
         };
-        for other in self.connections.iter().filter_map(silent).collect::<Vec<_>>() {
-            self.end_command(other, SILENT);
+        let ended = |(other, one): (&SocketAddr, &Connection)| {
+            let why = if one.left() { LEFT } else { silent(one).then_some(SILENT)? };
+            (*other != from && !one.ids.is_empty()).then_some((*other, why))
+        };
+        for (other, why) in self.connections.iter().filter_map(ended).collect::<Vec<_>>() {
+            self.end_command(other, why);
         }
         let (commander, parts) = (self.commander(), parts(packet));
         let mut ids = parts.iter().flat_map(|part| part.ids.clone());

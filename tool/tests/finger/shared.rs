@@ -325,6 +325,19 @@ fn the_other_fingers_of_a_stopped_commander_are_stopped_once_it_has_left() {
     }
 }
 
+/// As a script does: one program after the other.
+#[test]
+fn once_a_commander_has_left_the_next_client_writes() {
+    let shared = Shared::begin("wall");
+    let mut clients: Vec<Client> = std::iter::repeat_with(|| shared.client()).take(100).collect();
+    for client in &mut clients {
+        client.ping().expect("it answers");
+    }
+    for mut client in clients {
+        client.set(address::BUS_WATCHDOG, 25).expect("it obeys");
+    }
+}
+
 /// Each of their packets waits for nothing, for 4 s.
 #[test]
 fn clients_that_ask_an_absent_id_do_not_starve_a_press() {

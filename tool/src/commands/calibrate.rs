@@ -1,13 +1,11 @@
 //! The guided procedures: `fingertip calibrate`, `identify` and `commission`.
 
 use super::guided::motion::{HOLDS, WEIGHT, held, press_name};
-use super::guided::{Options, Presses, Procedure, Session, yes_or_no};
+use super::guided::{DIRECTION, Options, Presses, Procedure, Session, yes_or_no};
 use super::params;
 use super::press::direction_confirmed;
 use crate::{Client, Error, numbers, table};
-use fingertip::link::settings::Saved;
 use fingertip::measure::Task;
-use fingertip::shipped::address;
 use serde_json::json;
 use solve::Value;
 use solve::modulus::Modulus;
@@ -229,7 +227,6 @@ const OHMMETER: f64 = 0.01;
 /// Steps of the session.
 const JOG: &str = "jog";
 const STROKES: &str = "strokes.fts";
-const DIRECTION: &str = "direction_confirmed";
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
@@ -285,22 +282,18 @@ fn direction(args: &Commission, procedure: &mut Procedure<'_>) -> Result<bool, E
         Some(forward) => forward,
         None => procedure.run.yes("did the tip first move towards the object?", "--forward yes or --forward no")?,
     };
-    params::set(&[(table::find(DIRECTION)?, forward.into())], procedure.client)?;
+    let meant = params::set(&[(table::find(DIRECTION)?, forward.into())], None, procedure.client)?.meant;
     if forward {
         return procedure.session.done(JOG, json!({ "forward": true })).map(|()| true);
     }
-    procedure.without(
-        JOG,
-        "the tip first moved away from the object: swap the motor's leads and the encoder's channels, both, then run it \
-         again. Torque is refused until then"
-            .into(),
-    )?;
     // A confirmation that the flash holds would be back after a reset, and the tip would press the wrong way.
-    if procedure.client.number(address::SAVED_STATE)? != Saved::Same as i64
-        && let Err(why) = params::save(procedure.client, procedure.run.json)
-    {
-        procedure.found.refuse(format!("direction_confirmed 0 was not saved: {why}. After a reset it may be 1 again"));
-    }
+    let kept = match params::save(&meant, procedure.client, procedure.run.json) {
+        Ok(()) => "The flash keeps that, and all parameters as they are set now".into(),
+        Err(why) => format!("But direction_confirmed 0 was not saved: {why}. After a reset it may be 1 again"),
+    };
+    let why = "the tip first moved away from the object: swap the motor's leads and the encoder's channels, both, then run it \
+               again. Torque is refused until then";
+    procedure.without(JOG, format!("{why}. {kept}"))?;
     Ok(false)
 }
 

@@ -177,7 +177,7 @@ pub fn yes_or_no(text: &str) -> Result<bool, String> {
 // A file is written beside its place and renamed once it is whole. A record is listed in `session.json` after it was
 // written: a kill between the two repeats the motion.
 
-const VERSION: u64 = 2;
+const VERSION: u64 = 3;
 
 /// Parameters and gains of the controller at one time.
 #[derive(Clone, Debug, PartialEq)]
@@ -193,9 +193,12 @@ impl Settings {
         Ok(Self { params: params::of_bytes(&bytes), gains: params::read_gains(client)? })
     }
 
+    fn named(&self) -> impl Iterator<Item = (&'static str, i32)> {
+        Params::RANGES.into_iter().map(|(name, ..)| name).zip(self.params.to_array())
+    }
+
     fn get(&self, name: &str) -> Option<i32> {
-        let index = Params::RANGES.iter().position(|(known, ..)| *known == name)?;
-        self.params.to_array().get(index).copied()
+        self.named().find_map(|(known, value)| (known == name).then_some(value))
     }
 
     fn json(&self) -> Value {
@@ -327,7 +330,7 @@ pub struct Found {
     pub refused: Vec<String>,
     /// True if a part that was requested has no result: nothing is written then.
     blocked: bool,
-    /// True once the controller has the values, and once its flash has them.
+    /// True if the controller has the values at the end, and if its flash has them.
     applied: bool,
     saved: bool,
     /// Further entries of the JSON object: dead and odd taxels, remaining errors.
@@ -348,7 +351,9 @@ impl Found {
     }
 }
 
-/// Name of the step that lists each set of values sent to the controller, also one whose write failed.
+/// Not compared: the jog changes it.
+pub(super) const DIRECTION: &str = "direction_confirmed";
+/// Name of the step that lists all settings sent to the controller, also those of which the write failed.
 const WRITTEN: &str = "written";
 
 impl Session {
@@ -356,13 +361,11 @@ impl Session {
     /// it began to write.
     fn changed(&self, now: &Settings, written: bool) -> Vec<&'static str> {
         let written = if written { self.numbers(WRITTEN) } else { &[] };
-        let differs = |name: &&str| {
-            let value = now.get(name);
-            value != self.before.get(name) && !written.iter().any(|set| set["parameters"][*name] == json!(value))
-        };
-        let names = Params::RANGES.into_iter().map(|(name, ..)| name).filter(|name| *name != "direction_confirmed");
-        let gains = now.gains != self.before.gains && !written.iter().any(|set| set["gains"] == json!(now.gains));
-        names.filter(differs).chain(gains.then_some("gains")).collect()
+        let sent: Vec<Settings> = written.iter().filter_map(Settings::of).chain([self.before.clone()]).collect();
+        let differs =
+            |(name, value): &(&str, i32)| *name != DIRECTION && sent.iter().all(|sent| sent.get(name) != Some(*value));
+        let gains = sent.iter().all(|sent| sent.gains != now.gains);
+        now.named().filter(differs).map(|(name, _)| name).chain(gains.then_some("gains")).collect()
     }
 }
 
@@ -400,12 +403,10 @@ impl Procedure<'_> {
         if !self.run.json {
             self.show();
         }
-        let value = |row: &Row| Ok((table::find(row.name)?, row.after.round() as i64));
-        let values: Vec<params::Value> = self.found.rows.iter().map(value).collect::<Result<_, String>>()?;
         // As after a session that is run once more.
         let now = self.settings()?;
-        let is_set = self.found.gains.as_ref().is_none_or(|gains| gains.after == now.gains)
-            && values.iter().all(|(register, value)| now.get(&table::name(register)).map(i64::from) == Some(*value));
+        let after = self.after(&now);
+        let is_set = after == now;
         let nothing = self.found.rows.is_empty() && self.found.gains.is_none();
         let wanted = !self.found.blocked
             && !nothing
@@ -413,7 +414,7 @@ impl Procedure<'_> {
                 || self.run.options.apply
                 || !self.run.json && { self.run.yes("write these values to the controller?", "--apply")? });
         self.run.interrupt.check()?;
-        let done = if wanted { self.write(&values, is_set) } else { Ok(()) };
+        let done = if wanted { self.write(&after, is_set) } else { Ok(()) };
         if self.run.json {
             say(self.as_json());
         } else if !wanted {
@@ -423,32 +424,48 @@ impl Procedure<'_> {
         if blocked { Err(format!("no result was written: {}", refused.join("; ")).into()) } else { done }
     }
 
-    /// Writes gains and parameters, all of them or none, unless they are set; tares if new gains need that, and saves.
-    fn write(&mut self, values: &[params::Value], is_set: bool) -> Result<(), Error> {
+    /// Settings before the session with what it found: nothing else that an earlier run of it wrote is left.
+    fn after(&self, now: &Settings) -> Settings {
+        let row = |name| self.found.rows.iter().find(|row| row.name == name);
+        let direction = now.params.direction_confirmed;
+        let before = Params { direction_confirmed: direction, ..self.session.before.params };
+        let mut values = before.to_array();
+        for (value, (name, ..)) in values.iter_mut().zip(Params::RANGES) {
+            *value = row(name).map_or(*value, |row| row.after.round() as i32);
+        }
+        let gains = self.found.gains.as_ref().map_or(&self.session.before.gains, |gains| &gains.after);
+        Settings { params: Params::from_array(&values), gains: gains.clone() }
+    }
+
+    /// Writes gains and parameters, all of them or none; tares if new gains need that, and saves.
+    fn write(&mut self, after: &Settings, is_set: bool) -> Result<(), Error> {
         if !is_set {
             // The controller may have restarted while the question waited.
             self.settings()?;
-            let named: Map<_, _> =
-                values.iter().map(|(register, value)| (table::name(register), json!(value))).collect();
-            let gains = self.found.gains.as_ref().map(|gains| gains.after.as_slice());
             let mut written = self.session.numbers(WRITTEN).to_vec();
-            written.push(json!({ "parameters": named, "gains": gains }));
+            written.push(after.json());
             self.session.done(WRITTEN, written.into())?;
-            params::with_gains(gains, self.client, |client, _| params::set(values, client).map(drop))?;
+        }
+        let values = after.named().map(|(name, value)| Ok((table::find(name)?, value.into())));
+        let values: Vec<params::Value> = values.collect::<Result<_, String>>()?;
+        let meant = params::set(&values, Some(after.gains.clone()), self.client)?.meant;
+        if !is_set {
             self.run.report("written; `fingertip params save` or --save keeps them over a reset");
         }
-        self.found.applied = true;
         // The zeros of the old gains are wrong under new ones: the controller asks for a tare.
-        let mut tared = Ok(());
+        let mut done = Ok(());
         if self.found.gains.is_some() && !self.is_tared()? {
             let why = |why| format!("the values are written, but the tare that new gains need failed: {why}").into();
-            tared = self.zeros().map_err(why);
+            done = self.zeros().map_err(why);
         }
         if self.run.options.save {
-            params::save(self.client, self.run.json)?;
-            self.found.saved = true;
+            let saved = params::save(&meant, self.client, self.run.json);
+            self.found.saved = saved.is_ok();
+            done = done.and(saved);
         }
-        tared
+        let has = meant.check(self.client);
+        self.found.applied = has.is_ok();
+        done.and(has)
     }
 
     fn show(&self) {

@@ -79,34 +79,30 @@ pub type Value = (&'static Register, i64);
 pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Error> {
     match command {
         Command::Get { names } => get(names, client, json),
-        Command::Set { values, save } => conclude(&set(values, client)?, *save, client, json),
-        Command::Save => save(client, json).map(|()| {
+        Command::Set { values, save } => conclude(&set(values, None, client)?, *save, client, json),
+        Command::Save => {
+            save(&Stored::read(client)?, client, json)?;
             if json {
                 say_json(&json!({ "saved": true }));
             }
-        }),
+            Ok(())
+        }
         Command::Backup { file, force } => {
-            let (values, gains) = (read_all(client)?, read_gains(client)?);
-            write_backup(file, *force, client, &values, &gains)?;
-            let count = values.len();
-            told(json, &values, &format!("{count} parameters and the taxels' gains in {}", file.display()));
+            let stored = Stored::read(client)?;
+            write_backup(file, *force, client, &stored)?;
+            let count = stored.values.len();
+            told(json, &stored.values, &format!("{count} parameters and the taxels' gains in {}", file.display()));
             Ok(())
         }
         Command::Restore { file, save } => {
             let Backup { mut values, gains } = read_backup(file)?;
             // Who moves a device to another address or speed means it, and says so by `set`.
             values.retain(|(register, _)| !is_bus(register));
-            torque_is_off(client)?;
-            let mut changed = Vec::new();
-            with_gains(gains.as_deref(), client, |client, new| {
-                changed = set(&values, client)?;
-                if new && !json {
-                    say("the taxels' gains are others now: tare");
-                }
-                Ok(())
-            })?;
-            // The new gains stay with the new parameters, also if the save fails.
-            conclude(&changed, *save, client, json)
+            let set = set(&values, gains, client)?;
+            if set.before.gains != set.meant.gains && !json {
+                say("the taxels' gains are others now: tare");
+            }
+            conclude(&set, *save, client, json)
         }
         Command::Diff { file } => diff(file.as_deref(), client, json),
     }
@@ -141,38 +137,27 @@ fn read_all(client: &mut Client) -> Result<Vec<Value>, Error> {
     table::stored().map(read).collect()
 }
 
-/// Sets the taxels' gains, then does `set`, which gets whether they are new; puts them back if that fails.
-pub(super) fn with_gains(
-    gains: Option<&[Vec<u16>]>,
-    client: &mut Client,
-    set: impl FnOnce(&mut Client, bool) -> Result<(), Error>,
-) -> Result<(), Error> {
-    let before = gains.map_or(Ok(None), |gains| set_gains(gains, client))?;
-    set(client, before.is_some()).map_err(|why| match before.map(|before| set_gains(&before, client)) {
-        None => why,
-        Some(Ok(_)) => Error::Other(format!("{why}; the taxels' gains are put back")),
-        Some(Err(second)) => Error::Other(format!("{why}; and the taxels' gains could not be put back: {second}")),
-    })
-}
-
 /// Reports the changes, and saves them on request.
-fn conclude(changed: &[Changed], save_too: bool, client: &mut Client, json: bool) -> Result<(), Error> {
+fn conclude(set: &Set, save_too: bool, client: &mut Client, json: bool) -> Result<(), Error> {
+    let changed = || set.before.values.iter().zip(&set.meant.values).filter(|(from, to)| from != to);
     let lines: Vec<String> =
-        changed.iter().map(|(register, from, to)| format!("{}: {from} -> {to}", name(register))).collect();
-    let now: Vec<Value> = changed.iter().map(|(register, _, to)| (*register, *to)).collect();
+        changed().map(|((register, from), (_, to))| format!("{}: {from} -> {to}", name(register))).collect();
+    let now: Vec<Value> = changed().map(|(_, to)| *to).collect();
     let what = if lines.is_empty() { "nothing differs: nothing was changed".into() } else { lines.join("\n") };
     told(json, &now, &what);
     if save_too {
-        return save(client, json);
+        return save(&set.meant, client, json);
     }
-    if !json && !changed.is_empty() {
+    if !json && !lines.is_empty() {
         say("set until the next reset; `fingertip params save` keeps it");
     }
     Ok(())
 }
 
-pub(super) fn save(client: &mut Client, json: bool) -> Result<(), Error> {
-    let meant = read_all(client)?;
+/// Saves what the controller has. Fails where that is not what was meant: it restarted since.
+pub(super) fn save(meant: &Stored, client: &mut Client, json: bool) -> Result<(), Error> {
+    let lost = |why| Error::Other(format!("not saved: {why}"));
+    meant.check(client).map_err(lost)?;
     client.set(address::SAVE_PARAMETERS, 1)?;
     // The core halts while the flash is written, and may stay silent for that long.
     let timeout = std::mem::replace(&mut client.timeout, SAVE_WITHIN);
@@ -184,13 +169,10 @@ pub(super) fn save(client: &mut Client, json: bool) -> Result<(), Error> {
         }
     };
     client.timeout = timeout;
-    let saved = saved?;
-    // A controller that restarted has the values of the flash, and reports no difference.
-    if saved == SAME && read_all(client)? != meant {
-        return Err(format!("not saved: {RESTARTED}, and has what the flash holds. Set them again").into());
-    }
-    match saved {
+    match saved? {
         SAME => {
+            // A controller that restarted has the values of the flash, and reports no difference.
+            meant.check(client).map_err(lost)?;
             if !json {
                 say("saved: a reset keeps them");
             }
@@ -202,7 +184,7 @@ pub(super) fn save(client: &mut Client, json: bool) -> Result<(), Error> {
 }
 
 fn diff(file: Option<&Path>, client: &mut Client, json: bool) -> Result<(), Error> {
-    let (now, gains_now) = (read_all(client)?, read_gains(client)?);
+    let Stored { values: now, gains: gains_now } = Stored::read(client)?;
     let (other, other_gains, what) = match file {
         Some(path) => {
             let Backup { values, gains } = read_backup(path)?;
@@ -273,72 +255,126 @@ fn told(json: bool, values: &[Value], text: &str) {
     if json { say_json(&as_json(values)) } else { say(text) }
 }
 
-// Sets stored registers, all of them or none.
+// Sets what is stored, all of it or nothing.
 //
-// The parameters lie side by side, so they go out in one packet, which the controller takes whole or not at all. The
-// few others have a packet each: if one is refused, earlier changes are undone.
+// The gains have a packet, and the parameters another one: the controller takes each whole or not at all. The few other
+// registers have a packet each. If a packet is refused, the earlier ones are undone.
 
-/// A register, its old value, and its new one.
-pub(in crate::commands) type Changed = (&'static Register, i64, i64);
+/// All that outlives a reset, once it is saved.
+#[derive(Clone, PartialEq)]
+pub(super) struct Stored {
+    values: Vec<Value>,
+    gains: Vec<Vec<u16>>,
+}
 
-/// Sets parameters; returns those that changed. Where a value is wrong or torque is on, nothing was changed; where the
-/// controller refused, the error says what was changed nevertheless.
-pub(super) fn set(values: &[Value], client: &mut Client) -> Result<Vec<Changed>, Error> {
+impl Stored {
+    fn read(client: &mut Client) -> Result<Self, Error> {
+        Ok(Self { values: read_all(client)?, gains: read_gains(client)? })
+    }
+
+    /// Fails if the controller has something else.
+    pub fn check(&self, client: &mut Client) -> Result<(), Error> {
+        let now = client.again(Self::read)?;
+        let differs = self.values.iter().zip(&now.values).filter(|(meant, now)| meant != now);
+        let names = differs.map(|((register, _), _)| name(register));
+        let names: Vec<String> = names.chain((self.gains != now.gains).then(|| GAINS.into())).collect();
+        if names.is_empty() {
+            return Ok(());
+        }
+        Err(format!("{RESTARTED}, or was set by another host: {} changed. Set them again", names.join(", ")).into())
+    }
+
+    fn params(&self) -> Vec<u8> {
+        let params = self.values.iter().filter(|(register, _)| is_param(register));
+        params.flat_map(|(register, value)| table::encode(register, *value)).collect()
+    }
+}
+
+/// What was stored, and what is now.
+pub(super) struct Set {
+    before: Stored,
+    pub meant: Stored,
+}
+
+/// A packet that sets a part of what is stored.
+enum Packet {
+    Gains,
+    Params,
+    One(usize),
+}
+
+impl Packet {
+    fn send(&self, to: &Stored, client: &mut Client) -> Result<(), Error> {
+        match self {
+            Self::Gains => {
+                let bytes: Vec<u8> = to.gains.iter().flatten().flat_map(|gain| gain.to_le_bytes()).collect();
+                client.again(|client| client.write(address::GAINS, &bytes))
+            }
+            Self::Params => client.again(|client| client.write(address::PARAMS, &to.params())),
+            Self::One(at) => set_one(to.values[*at], client),
+        }
+    }
+
+    fn name(&self, of: &Stored) -> String {
+        match self {
+            Self::Gains => "the taxels' gains".into(),
+            Self::Params => "the parameters".into(),
+            Self::One(at) => name(of.values[*at].0),
+        }
+    }
+}
+
+/// Sets these values, and the taxels' gains if they are given. Where one is wrong or torque is on, nothing was changed; where
+/// the controller refused, the error says what was changed nevertheless.
+pub(super) fn set(values: &[Value], gains: Option<Vec<Vec<u16>>>, client: &mut Client) -> Result<Set, Error> {
     let wrong: Vec<String> = values.iter().filter_map(wrong).chain(twice(values)).collect();
     if !wrong.is_empty() {
         return Err(format!("{}; nothing was changed", wrong.join("; ")).into());
     }
-    let (params, others): (Vec<Value>, Vec<Value>) =
-        values.iter().copied().partition(|(register, _)| is_param(register));
-    let before = client.read(address::PARAMS, 4 * Params::COUNT as u16)?;
-    let block = table::Block { first: address::PARAMS, bytes: before.clone() };
-    let mut after = before.clone();
-    for (register, value) in &params {
-        let at = usize::from(register.address - address::PARAMS);
-        after[at..at + 4].copy_from_slice(&table::encode(register, *value));
+    let before = Stored::read(client)?;
+    let mut meant = before.clone();
+    for (register, value) in values {
+        let same = |(known, _): &&mut Value| known.address == register.address;
+        meant.values.iter_mut().filter(same).for_each(|(_, meant)| *meant = *value);
+    }
+    meant.gains = gains.unwrap_or(meant.gains);
+    let shape = |stored: &Stored| stored.gains.iter().map(Vec::len).collect::<Vec<_>>();
+    if shape(&meant) != shape(&before) {
+        let [rows, columns] = [before.gains.len(), before.gains.first().map_or(0, Vec::len)];
+        let why = format!("the array has {rows} rows of {columns} gains, the file others; nothing was changed");
+        return Err(why.into());
     }
     // Parameters that contradict each other are refused by the core's own check.
-    let config = Config::shipped(&of_bytes(&after));
+    let config = Config::shipped(&of_bytes(&meant.params()));
     let config = config.map_err(|why| format!("these do not go together: {why}; nothing was changed"))?;
     config.warnings(|warning| eprintln!("warning: {warning}"));
     torque_is_off(client)?;
-    for (_, id) in others.iter().filter(|(register, _)| register.address == address::ID) {
-        if *id != i64::from(client.id) && client.is_taken(*id as u8)? {
+    let changed = before.values.iter().zip(&meant.values).enumerate().filter(|(_, (from, to))| from != to);
+    let (params, mut others): (Vec<_>, Vec<_>) =
+        changed.map(|(at, (_, to))| (at, *to)).partition(|(_, (register, _))| is_param(register));
+    for (_, (_, id)) in others.iter().filter(|(_, (register, _))| register.address == address::ID) {
+        if client.is_taken(*id as u8)? {
             let why = "two with one ID cannot be told apart, nor set apart again";
             return Err(format!("another device has the ID {id}: {why}. Nothing was changed").into());
         }
     }
-    let mut changed: Vec<Changed> = params.iter().map(|(r, value)| (*r, block.number(r.address), *value)).collect();
-    changed.retain(|(_, from, to)| from != to);
-    if after != before {
-        let written = client.again(|client| client.write(address::PARAMS, &after));
-        written.map_err(|why| if matches!(why, Error::Refused(..)) { why } else { unsure(&why) })?;
-    }
     // Those of the bus come last: behind them the controller is found elsewhere.
-    let (bus, plain): (Vec<Value>, Vec<Value>) = others.into_iter().partition(|(register, _)| is_bus(register));
-    for (register, value) in plain.into_iter().chain(bus) {
-        let done = client.again(|client| client.number(register.address)).and_then(|from| {
-            if from == value {
-                return Ok(());
-            }
-            let done = set_one(register, value, client);
-            // A register whose answer was lost may be set all the same.
-            if !matches!(done, Err(Error::Refused(..))) {
-                changed.push((register, from, value));
-            }
-            done
-        });
-        if let Err(why) = done {
-            return Err(put_back(&before, &changed, client, &why));
+    others.sort_by_key(|(_, (register, _))| is_bus(register));
+    let gains = (meant.gains != before.gains).then_some(Packet::Gains);
+    let params = (!params.is_empty()).then_some(Packet::Params);
+    let others = others.into_iter().map(|(at, _)| Packet::One(at));
+    let packets: Vec<Packet> = gains.into_iter().chain(params).chain(others).collect();
+    for (at, packet) in packets.iter().enumerate() {
+        if let Err(why) = packet.send(&meant, client) {
+            // What a packet sets may be set also where its answer was lost.
+            let sent = if matches!(why, Error::Refused(..)) { at } else { at + 1 };
+            return Err(put_back(&before, &packets[..sent], client, &why));
         }
     }
-    for (register, _, to) in &changed {
-        let now = client.again(|client| client.number(register.address)).map_err(|why| unsure(&why))?;
-        if now != *to {
-            return Err(format!("{} was set to {to}, but reads {now}: the others are set", name(register)).into());
-        }
+    if !packets.is_empty() {
+        meant.check(client)?;
     }
-    Ok(changed)
+    Ok(Set { before, meant })
 }
 
 fn torque_is_off(client: &mut Client) -> Result<(), Error> {
@@ -348,12 +384,7 @@ fn torque_is_off(client: &mut Client) -> Result<(), Error> {
     Err("torque is on: parameters are set with torque off. Nothing was changed".into())
 }
 
-/// Error after a lost answer.
-fn unsure(why: &Error) -> Error {
-    Error::Other(format!("{why}. Whether they are set is not known: `fingertip params get` shows it"))
-}
-
-fn set_one(register: &'static Register, value: i64, client: &mut Client) -> Result<(), Error> {
+fn set_one((register, value): Value, client: &mut Client) -> Result<(), Error> {
     client.set(register.address, value)?;
     match register.address {
         address::ID => client.id = value as u8,
@@ -390,21 +421,14 @@ pub fn named(params: &Params) -> Map<String, serde_json::Value> {
     names.zip(params.to_array().map(serde_json::Value::from)).collect()
 }
 
-/// Undoes what was set, each register also after an error of another one; the error has the result.
-fn put_back(params: &[u8], changed: &[Changed], client: &mut Client, why: &Error) -> Error {
-    let mut failed: Vec<(String, Error)> = Vec::new();
-    if changed.iter().any(|(register, ..)| is_param(register))
-        && let Err(why) = client.again(|client| client.write(address::PARAMS, params))
-    {
-        failed.push(("the parameters".into(), why));
-    }
-    for (register, from, _) in changed.iter().rev().filter(|(register, ..)| !is_param(register)) {
-        if let Err(why) = set_one(register, *from, client) {
-            failed.push((name(register), why));
-        }
-    }
+/// Undoes what packets set, each of them also after an error of another one; the error has the result.
+fn put_back(before: &Stored, packets: &[Packet], client: &mut Client, why: &Error) -> Error {
+    let undo = |packet: &Packet| Some((packet.name(before), packet.send(before, client).err()?));
+    let failed: Vec<(String, Error)> = packets.iter().rev().filter_map(undo).collect();
     let Some((_, second)) = failed.first() else {
-        return Error::Other(format!("{why}; what was set before is put back: nothing was changed"));
+        let back = if packets.is_empty() { "" } else { "what was set before is put back: " };
+        let tare = if packets.iter().any(|packet| matches!(packet, Packet::Gains)) { "; tare again" } else { "" };
+        return Error::Other(format!("{why}; {back}nothing was changed{tare}"));
     };
     let left = failed.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
     Error::Other(format!("{why}; and putting back failed: {second}. A reset brings back the saved values of {left}"))
@@ -424,13 +448,8 @@ struct Backup {
 }
 
 /// Writes it, whole or not at all.
-fn write_backup(
-    path: &Path,
-    force: bool,
-    client: &mut Client,
-    values: &[Value],
-    gains: &[Vec<u16>],
-) -> Result<(), Error> {
+fn write_backup(path: &Path, force: bool, client: &mut Client, stored: &Stored) -> Result<(), Error> {
+    let Stored { values, gains } = stored;
     let information = client.number(address::MODEL_INFORMATION)?;
     let pong = client.ping()?;
     let mut text = format!(
@@ -510,22 +529,4 @@ pub(super) fn read_gains(client: &mut Client) -> Result<Vec<Vec<u16>>, Error> {
     let gains = client.block(address::GAINS, address::GAINS)?.numbers(address::GAINS);
     // The registers have 16 bits.
     Ok(gains.chunks(columns).map(|row| row.iter().map(|gain| *gain as u16).collect()).collect())
-}
-
-/// Sets them, all or none, with torque off. What they were, where that is something else: a tare is needed then.
-fn set_gains(gains: &[Vec<u16>], client: &mut Client) -> Result<Option<Vec<Vec<u16>>>, Error> {
-    let before = read_gains(client)?;
-    let shape = |rows: &[Vec<u16>]| rows.iter().map(Vec::len).collect::<Vec<_>>();
-    if shape(gains) != shape(&before) {
-        let [rows, columns] = [before.len(), before.first().map_or(0, Vec::len)];
-        return Err(
-            format!("the array has {rows} rows of {columns} gains, the file others; nothing was changed").into()
-        );
-    }
-    if before == gains {
-        return Ok(None);
-    }
-    let bytes: Vec<u8> = gains.iter().flatten().flat_map(|gain| gain.to_le_bytes()).collect();
-    client.again(|client| client.write(address::GAINS, &bytes))?;
-    Ok(Some(before))
 }

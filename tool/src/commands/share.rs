@@ -6,7 +6,7 @@
 //! Packets of the commander, and writes, go before reads of others: they wait for one exchange at most.
 
 use super::{Interrupt, aside, say, stop};
-use crate::client::{self, ID_MAX, Reach};
+use crate::client::{self, ID_MAX, Reach, TRIES};
 use crate::{Client, Error, table};
 use fingertip::link::packet::{BROADCAST, Event, HEADER, Packet, REPLY_MAX, Receiver, StatusError, instruction};
 use fingertip::shipped::address;
@@ -69,6 +69,8 @@ pub struct Args {
 struct Bus {
     client: Client,
     connections: BTreeMap<SocketAddr, Connection>,
+    /// Fingers that got goal 0 and are still to be stopped: why, and how often that is tried.
+    ending: BTreeMap<u8, (&'static str, usize)>,
     /// True if the last packet was urgent.
     urgent: bool,
 }
@@ -109,7 +111,8 @@ pub fn run(args: &Args, reach: &Reach, json: bool) -> Result<(), Error> {
         say(format_args!("shares {} at tcp:{address}; Ctrl-C ends it", client.port));
         say(format_args!("next, in other terminals: fingertip --port tcp:{address} view"));
     }
-    let bus = Arc::new(Mutex::new(Bus { client, connections: BTreeMap::new(), urgent: false }));
+    let bus =
+        Arc::new(Mutex::new(Bus { client, connections: BTreeMap::new(), ending: BTreeMap::new(), urgent: false }));
     let (lost, losses) = channel();
     let shared = Arc::clone(&bus);
     std::thread::spawn(move || {
@@ -125,13 +128,21 @@ pub fn run(args: &Args, reach: &Reach, json: bool) -> Result<(), Error> {
     });
     let mut ended = Ok(());
     while !interrupt.came() && ended.is_ok() {
-        if let Ok(why) = losses.recv_timeout(super::INTERRUPT_EVERY) {
+        // One try at a time: an absent one takes a time-out each, and packets of clients go between them.
+        let next = lock(&bus).ending.keys().next().copied();
+        if let Some(id) = next {
+            turn(&bus, true).end(id);
+        }
+        if let Ok(why) = losses.recv_timeout(if next.is_some() { Duration::ZERO } else { super::INTERRUPT_EVERY }) {
             ended = Err(why);
         }
     }
     let mut bus = turn(&bus, true);
     for from in bus.connections.keys().copied().collect::<Vec<_>>() {
         bus.end_command(from, "`fingertip share` ends");
+    }
+    while let Some(id) = bus.ending.keys().next().copied() {
+        bus.end(id);
     }
     // Until the process exits, no client may move what was stopped.
     std::mem::forget(bus);
@@ -187,11 +198,12 @@ fn converse(mut stream: TcpStream, bus: &Mutex<Bus>, lost: &Outbox<Error>) {
             let begin = inside.windows(HEADER.len()).rposition(|window| window == HEADER).unwrap_or_default();
             let bytes = std::mem::take(&mut raw).split_off(begin);
             let packet = receiver.packet();
-            if gone && !is_stop(&packet, &parts(&packet)) {
+            if packet.instruction == instruction::STATUS || gone && !is_stop(&packet, &parts(&packet)) {
                 continue;
             }
             let (reads, came) = (READS.contains(&packet.instruction), Instant::now());
             let mut free = turn(bus, commands || !reads);
+            free.settle(from, &packet);
             if reads && came.elapsed() > STALE * free.client.timeout {
                 continue;
             }
@@ -218,11 +230,8 @@ fn converse(mut stream: TcpStream, bus: &Mutex<Bus>, lost: &Outbox<Error>) {
 }
 
 impl Bus {
-    /// Passes a client's packet on, where it may, and returns the answers.
-    fn pass(&mut self, from: SocketAddr, packet: &Packet<'_>, raw: &[u8]) -> Result<Vec<u8>, Error> {
-        if packet.instruction == instruction::STATUS {
-            return Ok(Vec::new());
-        }
+    /// Ends the command of clients that left or are silent. Fingers that this packet reaches are stopped before it.
+    fn settle(&mut self, from: SocketAddr, packet: &Packet<'_>) {
         // Reads of others would feed the watchdogs of a silent client.
         let slack = self.client.timeout;
         let silent = |one: &Connection| {
@@ -236,6 +245,14 @@ impl Bus {
         for (other, why) in self.connections.iter().filter_map(ended).collect::<Vec<_>>() {
             self.end_command(other, why);
         }
+        // A read of all shows them as they are.
+        if packet.id != BROADCAST || !READS.contains(&packet.instruction) {
+            parts(packet).into_iter().flat_map(|part| part.ids).for_each(|id| self.end(id));
+        }
+    }
+
+    /// Passes a client's packet on, where it may, and returns the answers.
+    fn pass(&mut self, from: SocketAddr, packet: &Packet<'_>, raw: &[u8]) -> Result<Vec<u8>, Error> {
         let (commander, parts) = (self.commander(), parts(packet));
         let mut ids = parts.iter().flat_map(|part| part.ids.clone());
         let own = self.connections.entry(from).or_default();
@@ -258,7 +275,9 @@ impl Bus {
             };
             // A write to no device feeds the watchdogs. A stopped client keeps its other fingers alive by it.
             let refused = if parts.is_empty() { own.ids.is_empty() } else { stopped || parts.iter().any(fixed) };
-            if refused {
+            // All of these but the one that keeps ID and speed change the speed.
+            let resets = packet.instruction == instruction::FACTORY_RESET && packet.params != [2];
+            if refused || resets {
                 let refusal = client::packet(packet.id, instruction::STATUS, &[StatusError::Access as u8]);
                 return Ok(if packet.id == BROADCAST { Vec::new() } else { refusal.to_vec() });
             }
@@ -293,16 +312,13 @@ impl Bus {
         self.connections.iter().find(|(_, one)| !one.stopped && !one.ids.is_empty()).map(|(from, _)| *from)
     }
 
-    /// Ends the command of a client: what it left with torque on is released and stopped.
-    fn end_command(&mut self, from: SocketAddr, why: &str) {
+    /// Ends the command of a client: its fingers get goal 0 at once, and are to be stopped.
+    fn end_command(&mut self, from: SocketAddr, why: &'static str) {
         let Some(Connection { ids, watchdogs, .. }) = self.connections.get_mut(&from) else { return };
         watchdogs.clear();
         let ids = std::mem::take(ids);
         let next = self.commander().map(|next| &self.connections[&next].ids);
         let mut ids: Vec<u8> = ids.into_iter().filter(|id| next.is_none_or(|next| !next.contains(id))).collect();
-        self.client.fed = (why != SILENT).then(Instant::now);
-        let own = self.client.id;
-        // All fingers release at the same time. Then torque is turned off one finger at a time.
         let [low, high] = address::GOAL_FORCE_MN.to_le_bytes();
         for some in ids.chunks(GOALS) {
             let goals = some.iter().flat_map(|id| [*id, 0, 0, 0, 0]);
@@ -311,16 +327,26 @@ impl Bus {
         }
         // A client that wrote by broadcast: absent IDs would take a time-out each.
         if ids.len() > GOALS {
+            self.client.fed = (why != SILENT).then(Instant::now);
             let found = self.client.ping_all().unwrap_or_default();
+            self.client.fed = None;
             ids.retain(|id| found.iter().any(|pong| pong.id == *id));
         }
-        for id in ids {
-            self.client.id = id;
-            match stop(&mut self.client) {
-                Ok(true) => aside(format_args!("ID {id} was stopped: {why}")),
-                Ok(false) => {}
-                Err(error) => aside(format_args!("stopping ID {id} failed ({why}): {error}")),
+        self.ending.extend(ids.into_iter().map(|id| (id, (why, TRIES))));
+    }
+
+    /// Tries to stop a finger whose client's command ended; does nothing with another one.
+    fn end(&mut self, id: u8) {
+        let Some((why, tries)) = self.ending.remove(&id) else { return };
+        self.client.fed = (why != SILENT).then(Instant::now);
+        let own = std::mem::replace(&mut self.client.id, id);
+        match stop(&mut self.client) {
+            Ok(true) => aside(format_args!("ID {id} was stopped: {why}")),
+            Ok(false) => {}
+            Err(error) if error.is_noise() && tries > 1 => {
+                self.ending.insert(id, (why, tries - 1));
             }
+            Err(error) => aside(format_args!("stopping ID {id} failed ({why}): {error}")),
         }
         (self.client.id, self.client.fed) = (own, None);
     }
@@ -328,7 +354,7 @@ impl Bus {
 
 /// Stops a device that is driven. Returns whether it was.
 fn stop(client: &mut Client) -> Result<bool, Error> {
-    if client.again(Client::ping)?.is_fingertip() {
+    if client.ping()?.is_fingertip() {
         if stop::is_idle(client.again(|client| client.number(address::PRESENT_MODE))?) {
             return Ok(false);
         }

@@ -173,9 +173,13 @@ fn a_register_that_cannot_be_put_back_does_not_keep_the_others() {
     let begun = finger.heard();
     finger.done(&set);
     let packets = finger.heard() - begun;
+    let begun = finger.heard();
+    finger.done(&["params", "diff"]);
+    let reads = finger.heard() - begun;
     finger.done(&["params", "set", "return_delay_time=250", "fit_level=3"]);
-    // Lost: the packet that sets `fit_level`, before one read of each, and the packet that puts it back.
-    finger.command(&format!("deaf after {} for 2", packets - 3));
+    // Lost: the packet that sets `fit_level`, behind which all is read, and the packet that puts it back. Each command also
+    // begins with a Ping.
+    finger.command(&format!("deaf after {} for 2", packets - reads));
     finger.refuses(&set, &["putting back failed: set fit_level to 3", "saved values of fit_level\n"]);
     let now = finger.json(&["params", "get", "return_delay_time", "fit_level"]);
     assert_eq!(now, serde_json::json!({ "return_delay_time": 250, "fit_level": 3 }));

@@ -159,6 +159,46 @@ fn a_write_that_is_killed_leaves_old_or_new_parameters_and_is_completed() {
     assert_eq!((&parameters(&finger)["modulus_pa"], gains(&finger)), (&wanted["modulus_pa"], wanted["gains"].clone()));
 }
 
+/// A restart before every third packet of a write that is saved: flash has all of it or nothing, and a run that ends well has it.
+#[test]
+fn a_restart_amid_a_write_is_no_success_and_saves_no_half() {
+    let finger = Served::patient("wall");
+    let [session, old, new] = ["restarted", "old.toml", "new.toml"].map(|name| finger.file(name));
+    finger.done(&["params", "save"]);
+    finger.done(&["params", "backup", &old]);
+    let calibrate =
+        [&QUICK[..], &["--presses", "1", "--no-scale", "--session", &session, "--apply", "--save"]].concat();
+    finger.done(&calibrate);
+    finger.done(&["params", "backup", &new]);
+    let is = |file: &str| finger.json(&["params", "diff", file]) == json!({});
+    for arguments in [&calibrate[..], &["params", "restore", &new, "--save"]] {
+        let mut seen = [0; 3];
+        for packets in (0..).step_by(3) {
+            finger.done(&["params", "restore", &old, "--save"]);
+            finger.command(&format!("restart after {packets}"));
+            let (code, found, said) = output(&finger, arguments);
+            let restarted = finger.command("restarted") == "true";
+            finger.command(&format!("raw {REBOOT}"));
+            let (as_new, as_old) = (is(&new), is(&old));
+            assert!(as_new || as_old && code == Some(1), "{arguments:?}, {packets}: {said}");
+            assert!(as_new || found["saved"] != true, "{arguments:?}, {packets}: {found}");
+            seen[if code == Some(0) { 0 } else { 1 + usize::from(as_new) }] += 1;
+            if !restarted {
+                break;
+            }
+        }
+        assert!(seen[0] > 0 && seen[1] > 0, "{seen:?}");
+    }
+    // Nothing of an earlier run is left: without a scale the sensitivity is as it was.
+    let session = finger.file("twice");
+    let calibrate = [&QUICK[..], &["--presses", "1", "--session", &session, "--apply"]].concat();
+    finger.done(&["params", "restore", &old, "--save"]);
+    finger.done(&[&calibrate[..], &["--scale-n", "1", "--shown-n", "1.3"]].concat());
+    assert!(parameters(&finger)["codes_per_kpa_milli"] != 24_000);
+    finger.done(&[&calibrate[..], &["--no-scale"]].concat());
+    assert_eq!(parameters(&finger)["codes_per_kpa_milli"], 24_000);
+}
+
 #[test]
 fn a_wrong_answer_changes_nothing() {
     let finger = Served::patient("wall");

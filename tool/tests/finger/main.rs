@@ -177,7 +177,7 @@ fn a_backup_is_restored_whole() {
     let begun = finger.heard();
     finger.done(&["params", "restore", &file]);
     // A save that fails takes back neither gains nor parameters.
-    finger.command(&format!("deaf after {} for 1", finger.heard() - begun));
+    finger.command(&format!("deaf after {} for 3", finger.heard() - begun));
     fs::write(&file, with(20_000)).expect("a file");
     finger.refuses(&["--timeout-ms", "1000", "params", "restore", &file, "--save"], &["no answer"]);
     assert_eq!(finger.json(&["params", "diff"])["gains"]["now"][3][3], 20_000);

@@ -369,6 +369,25 @@ fn clients_that_ask_an_absent_id_do_not_starve_a_press() {
     press.set(address::GOAL_FORCE_MN, 900).expect("it still commands");
 }
 
+/// An unplugged hand: each of its fingers takes three time-outs of 2 s.
+#[test]
+fn absent_fingers_of_who_left_keep_nobody_from_the_bus() {
+    let shared = Shared::begin("wall");
+    assert!(shared.output(&["tare"]).status.success());
+    let (mut first, mut press) = (shared.client(), shared.client());
+    let goals: Vec<u8> = (1..60).flat_map(|id| [id, 1, 0, 0, 0]).collect();
+    sync_write(&mut first, address::GOAL_FORCE_MN, 4, &goals);
+    press.timeout = std::time::Duration::from_millis(5_500);
+    for (register, value) in [(address::TORQUE_ENABLE, 0), (address::TORQUE_ENABLE, 1), (address::GOAL_FORCE_MN, 1_000)]
+    {
+        press.set(register, value).expect("it obeys");
+    }
+    drop(first);
+    for goal_mn in [900, 800, 700] {
+        press.set(address::GOAL_FORCE_MN, goal_mn).expect("it still commands");
+    }
+}
+
 /// The broker stops the finger at its new ID, and does not wait for answers of the old one.
 #[test]
 fn an_id_that_a_client_set_is_followed() {
@@ -376,6 +395,10 @@ fn an_id_that_a_client_set_is_followed() {
     let mut client = shared.client();
     client.set(address::BUS_WATCHDOG, 25).expect("it obeys");
     client.set(address::ID, 7).expect("it obeys");
+    client.id = 7;
+    let reset = packet(7, instruction::FACTORY_RESET, &[1]);
+    let refusal = client.pass(&reset, Some(7), 1).expect("it answers");
+    assert_eq!(refusal[8], StatusError::Access as u8, "it would change the speed");
     let sent = shared.packets_at_its_end();
     assert!((2..8).contains(&sent), "{sent} packets");
 }

@@ -66,6 +66,7 @@ impl Procedure<'_> {
 
     /// Waits in the air with torque off, then tares.
     pub fn tare_after(&mut self, seconds: f64) -> Result<(), Error> {
+        self.ready()?;
         self.run.report(format_args!(
             "pause of {seconds} s in the air: after a press the sensor's creep needs that time to decay"
         ));
@@ -118,6 +119,7 @@ impl Procedure<'_> {
 
     /// Waits until the controller's chip has this temperature.
     pub fn warm(&mut self, chip_c: f64, within: Duration) -> Result<(), Error> {
+        self.ready()?;
         let (until, mut reported) = (Instant::now() + within, None);
         loop {
             let now_c = self.client.again(|client| client.number(address::CHIP_MC))? as f64 * 1e-3;

@@ -373,12 +373,13 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         }
     }
 
-    /// Checks a frame that is still being scanned; its later rows are older. Returns true if its array seems broken: the
-    /// caller must then short the motor. A taxel that fails just after it was read is seen a frame later; without this
-    /// check the motor would be driven until that frame's end. The step decides if it is a fault.
-    pub fn check_part(&mut self, frame: &Frame<ROWS, COLUMNS>) -> bool {
+    /// Checks the first `rows` of a frame that is still being scanned. Returns true if, with the later rows of the last
+    /// step, the array seems broken: the caller must then short the motor. A taxel that fails just after it was read is
+    /// seen a frame later; without this check the motor would be driven until that frame's end. The step decides if it is
+    /// a fault.
+    pub fn check_part(&mut self, frame: &Frame<ROWS, COLUMNS>, rows: usize) -> bool {
         let broken = self.activity.drives()
-            && self.array.bad_taxels(frame, &self.config) > self.config.params.bad_taxels_max.max(0) as u32;
+            && self.array.bad_taxels(frame, rows, &self.config) > self.config.params.bad_taxels_max.max(0) as u32;
         if broken {
             self.motion.drive.block();
             self.status.duty = Duty::ZERO;

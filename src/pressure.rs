@@ -263,16 +263,20 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         }
     }
 
-    /// Number of taxels that a frame shows as dead or saturated, without masked ones: [`Array::read`] without the
-    /// readings, and quicker.
-    pub fn bad_taxels(&self, frame: &Frame<ROWS, COLUMNS>, config: &Config) -> u32 {
+    /// Number of taxels that the first `new` rows of a frame show as dead or saturated, and that [`Array::read`] found in
+    /// the other rows, without masked ones.
+    pub fn bad_taxels(&self, frame: &Frame<ROWS, COLUMNS>, new: usize, config: &Config) -> u32 {
         let Codes { rows, undriven } = &frame.codes;
         let limits = CodeLimits::new(undriven, config);
         let mut count = 0;
-        for (codes, mask) in rows.iter().zip(&self.mask) {
+        for (codes, mask) in rows.iter().zip(&self.mask).take(new) {
             if limits.suspects(limits.largest([codes, undriven])) {
                 count += (bad_columns([codes, undriven], config) & !mask).count_ones();
             }
+        }
+        if self.picture.bad_count != 0 {
+            let others = self.picture.bad.iter().zip(&self.mask).skip(new);
+            count += others.map(|(bad, mask)| (bad & !mask).count_ones()).sum::<u32>();
         }
         count
     }

@@ -235,9 +235,9 @@ fn missed_frames_are_counted() {
 /// More dead taxels than allowed short a driven motor in the middle of a frame. The verdict is left to the step.
 #[test]
 fn a_part_of_a_frame_shorts_only_a_driven_motor_and_only_if_it_is_broken() {
-    let dead = |frame: &Frame, count: usize| {
+    let dead = |frame: &Frame, rows: std::ops::Range<usize>| {
         let mut frame = *frame;
-        (0..count).for_each(|place| frame.set_code(place, place, 0));
+        rows.for_each(|place| frame.set_code(place, place, 0));
         frame
     };
     let mut board = holding(1_000);
@@ -245,17 +245,22 @@ fn a_part_of_a_frame_shorts_only_a_driven_motor_and_only_if_it_is_broken() {
     assert!(before.duty.0 > 0);
     let allowed = board.pipeline().config().params.bad_taxels_max as usize;
     for count in [0, allowed] {
-        let frame = dead(board.frame(), count);
-        assert!(!board.pipeline().check_part(&frame), "{count} dead taxels");
+        let frame = dead(board.frame(), 0..count);
+        assert!(!board.pipeline().check_part(&frame, ROWS), "{count} dead taxels");
         assert_eq!(*board.status(), before, "{count} dead taxels");
     }
-    let frame = dead(board.frame(), allowed + 1);
-    assert!(board.pipeline().check_part(&frame));
+    // Those of the last step count in the rows that are still to come.
+    let last = dead(board.frame(), ROWS - allowed..ROWS);
+    let record = board.record();
+    board.pipeline().step(&last, &record.sense, &record.command);
+    let frame = dead(&last, 0..1);
+    assert!(!board.pipeline().check_part(&frame, 0));
+    assert!(board.pipeline().check_part(&frame, 1));
     let after = *board.status();
     assert_eq!((after.mode, after.fault, after.duty.0), (Mode::Force, None, 0));
     board.command().torque = false;
     assert_eq!(board.step().mode, Mode::Off);
-    assert!(!board.pipeline().check_part(&frame), "the bridge is off");
+    assert!(!board.pipeline().check_part(&frame, ROWS), "the bridge is off");
 }
 
 /// A fault brakes, that of the bridge itself puts it to sleep; off and tare brake while the tip moves, and open then.

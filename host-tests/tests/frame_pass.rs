@@ -87,7 +87,7 @@ proptest! {
 
     #[test]
     fn bad_taxels_are_those_of_the_definition(
-        codes in codes(12, 4095), calibration in calibration(), dead in prop_oneof![1..20, 1..1_001],
+        codes in codes(12, 4095), calibration in calibration(), dead in prop_oneof![1..20, 1..1_001], new in 0..=ROWS,
     ) {
         let (frame, config) = (codes.frame(), scanned(1_667, dead));
         let mut array = Array::new();
@@ -104,7 +104,7 @@ proptest! {
             }
         }
         prop_assert_eq!(u32::from(picture.bad_count), count);
-        prop_assert_eq!(array.bad_taxels(&frame, &config), count);
+        prop_assert_eq!(array.bad_taxels(&frame, new, &config), count);
         // What was bad in one frame is not in the next.
         prop_assert_eq!(array.read(&Codes { wild: vec![], ..codes }.frame(), &scanned(1_667, 1)).bad, masks);
     }
@@ -149,7 +149,7 @@ proptest! {
         array.read(&frame, &config);
         array.continue_tare();
         let count = array.read(&frame, &config).bad_count;
-        prop_assert_eq!(array.bad_taxels(&frame, &config), u32::from(count));
+        prop_assert_eq!(array.bad_taxels(&frame, ROWS, &config), u32::from(count));
     }
 }
 
@@ -171,7 +171,7 @@ fn a_taxel_is_bad_from_the_very_limit_on() {
             assert_eq!((picture.bad_count, picture.bad[4]), (bad, u32::from(bad) << column), "{code} in {column}");
             let peak = if bad == 0 { (code - levels[column]).max(40) } else { 0 };
             assert_eq!(picture.peak_codes, peak, "{code} in {column}");
-            assert_eq!(array.bad_taxels(&codes(code), &config), u32::from(bad));
+            assert_eq!(array.bad_taxels(&codes(code), ROWS, &config), u32::from(bad));
         }
     }
 }
@@ -236,7 +236,7 @@ fn a_masked_taxel_reads_as_nothing_and_is_no_fault() {
     mask[7] = 0x3ff;
     let array = |frame: &Frame| {
         let mut array = tared(&Calibration::new(&GAINS, &mask).unwrap(), &blank, &config);
-        (*array.read(frame, &config), array.bad_taxels(frame, &config))
+        (*array.read(frame, &config), array.bad_taxels(frame, ROWS, &config))
     };
     let (sound, _) = array(&pressed);
     assert_eq!((sound.taxels[4][5], sound.taxels[7], sound.bad, sound.bad_count), (0, [0; COLUMNS], mask, 0));

@@ -151,13 +151,16 @@ impl Bridge {
         let period = self.period_ticks;
         let low = ticks_low(duty, period);
         let (in1, in2) = if duty < Duty::ZERO { (low, 0) } else { (0, low) };
-        if !self.driving || at_once {
+        let at_once = at_once || !self.driving;
+        if at_once {
             // The compare values count before the outputs come on. An update event would do it too, but begin a period.
             set_preload(false);
         }
         pac::TIM1.ccr(0).write(|w| w.set_ccr(period - in1));
         pac::TIM1.ccr(1).write(|w| w.set_ccr(period - in2));
-        set_preload(true);
+        if at_once {
+            set_preload(true);
+        }
         if !self.driving {
             // Forget an old break.
             let mut cleared = SrAdv(u32::MAX);

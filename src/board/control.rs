@@ -149,8 +149,8 @@ impl ControlTask {
         if !super::scan::take_halfway() || self.discard_next {
             return;
         }
-        self.parts.scan.copy_so_far(&mut self.frame);
-        if self.parts.pipeline.check_part(&self.frame) {
+        let slots = self.parts.scan.copy_so_far(&mut self.frame);
+        if self.parts.pipeline.check_part(&self.frame, slots) {
             self.parts.bridge.apply(Requested::Brakes);
             self.keeper.end(Ended::Cut);
             self.publish();

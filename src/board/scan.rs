@@ -16,7 +16,7 @@ use embassy_stm32::peripherals::{ADC2, ADC3, DMA2_CH0, DMA2_CH1, DMA2_CH2, TIM8}
 use embassy_stm32::{Peri, interrupt, pac, rcc};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
-use fingertip::frame::BANKS;
+use fingertip::frame::{BANKS, Codes};
 use fingertip::scan::ScanTiming;
 use fingertip::shipped::{BANK_COLUMNS, CLOCKS, COLUMNS, Frame, ROWS, SLOTS};
 
@@ -155,33 +155,38 @@ impl Scan {
     /// wrote to this half meanwhile.
     pub fn copy(&mut self, completed: Completed, frame: &mut Frame) -> bool {
         let half = completed.sequence as usize & 1;
-        let arrived = bank_a_completed(half) && !overrun() && in_step();
+        let arrived = bank_a_completed(half) && !overrun() && Progress::now().in_step();
         // Every copy discards the early rows: a late copy of the frame before has overwritten them.
         let (sequence, copied) = core::mem::take(&mut self.early);
         let first = if sequence == completed.sequence { copied } else { 0 };
         copy_slots(half, first..SLOTS, frame);
         frame.sequence = completed.sequence;
-        let untouched = [STREAM_A, STREAM_B].into_iter().all(|stream| written_half(stream) != half);
+        let now = Progress::now();
+        let untouched = !now.halves().contains(&half);
         // Twice: for the last part of a slot, banks that are one slot behind seem to be in step.
-        let whole = arrived && untouched && in_step() && newest() == completed;
+        let whole = arrived && untouched && now.in_step() && newest() == completed;
         if !whole {
             health::note_broken(what_broke(half));
         }
         whole
     }
 
-    /// Replaces the first slots of `frame` by those that both banks have completed in the scan under way.
-    pub fn copy_so_far(&mut self, frame: &mut Frame) {
+    /// Replaces the first slots of `frame` by those that both banks have completed in the scan under way. Returns their
+    /// number.
+    pub fn copy_so_far(&mut self, frame: &mut Frame) -> usize {
         // First: a number that is too old lets the whole frame be copied again.
         let sequence = newest().sequence.wrapping_add(1);
-        let [half_a, half_b] = [STREAM_A, STREAM_B].map(written_half);
-        if half_a == half_b {
-            let stored = u16::min(stored(STREAM_A) % HALF_LEN, stored(STREAM_B) % HALF_LEN);
-            let slots = usize::from(stored) / BANK_COLUMNS;
-            copy_slots(half_a, 0..slots, frame);
-            // A frame's lowest bit is its half.
-            self.early = (sequence, if sequence as usize & 1 == half_a { slots } else { 0 });
+        let now = Progress::now();
+        let [half_a, half_b] = now.halves();
+        if half_a != half_b {
+            return 0;
         }
+        let stored = u32::min(now.stored[0] % HALF_LEN, now.stored[1] % HALF_LEN);
+        let slots = stored as usize / BANK_COLUMNS;
+        copy_slots(half_a, 0..slots, frame);
+        // A frame's lowest bit is its half.
+        self.early = (sequence, if sequence as usize & 1 == half_a { slots } else { 0 });
+        slots
     }
 }
 
@@ -194,7 +199,7 @@ fn what_broke(half: usize) -> Broken {
         Broken::Overrun
     } else if !bank_a_completed(half) {
         Broken::Bank
-    } else if !in_step() {
+    } else if !Progress::now().in_step() {
         Broken::OutOfStep
     } else {
         Broken::Overwritten
@@ -222,16 +227,27 @@ pub fn note_transfers() {
 #[inline(never)]
 fn copy_slots(half: usize, slots: Range<usize>, frame: &mut Frame) {
     let [bank_a, bank_b] = [&BUFFERS[0][half], &BUFFERS[1][half]];
-    for slot in slots {
-        let (Some(a), Some(b), Some(codes)) = (bank_a.get(slot), bank_b.get(slot), frame.codes.slot_mut(slot)) else {
-            break;
-        };
-        lanes::each_pair::<COLUMNS>(|at| {
-            let pair = [a[at].load(Ordering::Relaxed), b[at].load(Ordering::Relaxed)];
-            (codes[2 * at], codes[2 * at + 1]) = pair.into();
-        });
+    let Codes { rows, undriven } = &mut frame.codes;
+    let driven = slots.start..slots.end.min(ROWS);
+    if let (Some(a), Some(b), Some(rows)) =
+        (bank_a.get(driven.clone()), bank_b.get(driven.clone()), rows.get_mut(driven))
+    {
+        for ((a, b), row) in a.iter().zip(b).zip(rows) {
+            copy_slot([a, b], row);
+        }
+    }
+    if slots.end > ROWS {
+        copy_slot([&bank_a[ROWS], &bank_b[ROWS]], undriven);
     }
     fence(Ordering::Acquire);
+}
+
+#[inline(always)]
+fn copy_slot([a, b]: [&[AtomicU16; BANK_COLUMNS]; BANKS], codes: &mut [u16; COLUMNS]) {
+    lanes::each_pair::<COLUMNS>(|at| {
+        let pair = [a[at].load(Ordering::Relaxed), b[at].load(Ordering::Relaxed)];
+        (codes[2 * at], codes[2 * at + 1]) = pair.into();
+    });
 }
 
 #[embassy_stm32::interrupt]
@@ -251,7 +267,7 @@ fn DMA2_STREAM2() {
         return;
     }
     // Where both halves came before this ran, the newest is the one that is not being written.
-    let half = if first && second { 1 - written_half(STREAM_B) } else { usize::from(second) };
+    let half = if first && second { 1 - Progress::now().halves()[1] } else { usize::from(second) };
     pac::DMA2.ifcr(0).write(|w| {
         w.set_htif(STREAM_B, first);
         w.set_tcif(STREAM_B, second);
@@ -279,8 +295,8 @@ const CHANNEL_ADC2: u8 = 1;
 /// The converters of bank A and bank B.
 const SCANNING: [Adc; 2] = [pac::ADC3, pac::ADC2];
 
-const HALF_LEN: u16 = (SLOTS * BANK_COLUMNS) as u16;
-const BUFFER_LEN: u16 = 2 * HALF_LEN;
+const HALF_LEN: u32 = (SLOTS * BANK_COLUMNS) as u32;
+const BUFFER_LEN: u32 = 2 * HALF_LEN;
 
 /// Words that the slots write to the port's set/reset register. A slot sets its row and resets all others; the last
 /// slot resets all rows and sets the frame's trace pin.
@@ -316,7 +332,7 @@ fn start_stream(number: usize, channel: u8, from: u32, to: u32) {
     let stream = pac::DMA2.st(number);
     stream.par().write_value(from);
     stream.m0ar().write_value(to);
-    stream.ndtr().write(|w| w.set_ndt(BUFFER_LEN));
+    stream.ndtr().write(|w| w.set_ndt(BUFFER_LEN as u16));
     stream.cr().write(|w| {
         w.set_chsel(channel);
         w.set_dir(Dir::PERIPHERAL_TO_MEMORY);
@@ -379,27 +395,42 @@ fn start_timer() {
     timer.cr1().write(|w| w.set_cen(true));
 }
 
-/// Codes that a stream has stored in this round through both halves.
-fn stored(stream: usize) -> u16 {
-    BUFFER_LEN.wrapping_sub(pac::DMA2.st(stream).ndtr().read().ndt())
+/// Progress of the transfers at one time.
+struct Progress {
+    /// Slots whose row was driven before, in this frame and the one before.
+    slots_before: u32,
+    /// Codes that the streams of bank A and bank B have stored in this round through both halves.
+    stored: [u32; BANKS],
 }
 
-/// The half of the buffer that a stream writes to next.
-fn written_half(stream: usize) -> usize {
-    usize::from((stored(stream) / HALF_LEN) & 1)
-}
+impl Progress {
+    #[inline(always)]
+    fn now() -> Self {
+        let left = |stream| u32::from(pac::DMA2.st(stream).ndtr().read().ndt());
+        // The rows' count falls from the number of slots to 1. Its double keeps the difference above 0.
+        let slots_before = 2 * SLOTS as u32 - 1 - left(STREAM_ROWS);
+        let stored = |stream| BUFFER_LEN.wrapping_sub(left(stream));
+        Self { slots_before, stored: [stored(STREAM_A), stored(STREAM_B)] }
+    }
 
-/// Returns true if the codes belong to the rows under which they are stored.
-///
-/// While slot n of a frame is set, each bank has completed n slots of this frame, or n + 1. A lost trigger leaves the
-/// banks behind the rows permanently; only a restart of the scan aligns them again.
-fn in_step() -> bool {
-    // The rows' count falls from the number of slots to 1. Its double keeps the differences above 0.
-    let slots_before = 2 * SLOTS as u16 - 1 - pac::DMA2.st(STREAM_ROWS).ndtr().read().ndt();
-    let codes_before = slots_before * BANK_COLUMNS as u16;
-    [STREAM_A, STREAM_B]
-        .into_iter()
-        .all(|stream| (stored(stream) + BUFFER_LEN - codes_before) % HALF_LEN < 2 * BANK_COLUMNS as u16)
+    /// The half of the buffer that each bank's stream writes to next.
+    #[inline(always)]
+    fn halves(&self) -> [usize; BANKS] {
+        let half = |stored: u32| (stored / HALF_LEN) as usize & 1;
+        [half(self.stored[0]), half(self.stored[1])]
+    }
+
+    /// Returns true if the codes belong to the rows under which they are stored.
+    ///
+    /// While slot n of a frame is set, each bank has completed n slots of this frame, or n + 1. A lost trigger leaves the
+    /// banks behind the rows permanently; only a restart of the scan aligns them again.
+    #[inline(always)]
+    fn in_step(&self) -> bool {
+        // A buffer's length keeps the differences above 0.
+        let codes_before = self.slots_before * BANK_COLUMNS as u32;
+        let fits = |stored: u32| (stored + BUFFER_LEN - codes_before) % HALF_LEN < 2 * BANK_COLUMNS as u32;
+        fits(self.stored[0]) && fits(self.stored[1])
+    }
 }
 
 /// Returns true if the first bank's stream, which does not interrupt, has completed this half too.
@@ -410,5 +441,6 @@ fn bank_a_completed(half: usize) -> bool {
 
 /// A converter that was not read in time stops asking for DMA.
 fn overrun() -> bool {
-    SCANNING.into_iter().any(|adc| adc.sr().read().ovr())
+    let overrun = |adc: Adc| adc.sr().read().ovr();
+    overrun(SCANNING[0]) || overrun(SCANNING[1])
 }

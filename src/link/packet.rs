@@ -281,9 +281,11 @@ impl<'r> Sender<'r> {
     /// Adds a byte of the parameters, and stuffing if it is needed.
     pub fn push(&mut self, byte: u8) {
         self.raw(byte);
-        let stuffed = self.reply.get(STUFFED_FROM..).unwrap_or_default();
-        if stuffed.ends_with(&[0xFF, 0xFF, STUFFING]) {
-            self.raw(STUFFING);
+        if byte == STUFFING {
+            let stuffed = self.reply.get(STUFFED_FROM..).unwrap_or_default();
+            if stuffed.ends_with(&[0xFF, 0xFF, STUFFING]) {
+                self.raw(STUFFING);
+            }
         }
     }
 

@@ -99,10 +99,10 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> Exchange<'a, ROWS, COLUMNS> {
     fn commit(&mut self, mut staged: Staged<'_, ROWS, COLUMNS>) -> Result<(), StatusError> {
         staged.check(&self.state.settings)?;
         let (before, after) = (&self.state.settings.record, &staged.settings.record);
-        staged.actions.configure |= before.params != after.params;
-        staged.actions.calibrate |= before.gains != after.gains;
-        staged.actions.baud |= before.baud_code != after.baud_code;
         if before != after {
+            staged.actions.configure |= before.params != after.params;
+            staged.actions.calibrate |= before.gains != after.gains;
+            staged.actions.baud |= before.baud_code != after.baud_code;
             staged.settings.saved = Saved::Changed;
         }
         self.state.settings = staged.settings;

@@ -78,7 +78,7 @@ pub const FRAMES: [Step; 6] = [
         }
         m.array.tare().flatten().for_each(|tare| mix.add(*tare));
     }),
-    ("Array::bad_taxels", |m, _, mix| mix.add(m.array.bad_taxels(&m.frame, &m.config))),
+    ("Array::bad_taxels", |m, _, mix| mix.add(m.array.bad_taxels(&m.frame, ROWS, &m.config))),
     ("single::read", |m, s, mix| {
         let refined = match s.share_q32 >> 27 {
             0 => Refined::Full,

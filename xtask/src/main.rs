@@ -92,9 +92,6 @@ enum Command {
     /// Measure the flash image against its limits: flash, static RAM, share of each crate
     #[command(after_help = "Examples:\n  cargo xtask size")]
     Size,
-    /// Answer rows of CSV (a_mm, Y_kPa, d_mm, r_mm) on standard input by the contact model, in the core's fixed point
-    #[command(after_help = "Examples:\n  printf 'a_mm,Y_kPa,d_mm,r_mm\\n10,250,1,0\\n' | cargo xtask model")]
-    Model,
     /// Prove the contact model's error bounds over whole input ranges: some minutes on two cores
     #[command(
         disable_help_flag = true,
@@ -159,7 +156,6 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Timing(args) => timing::run(args, toolchain, console),
         Command::Study(args) => timing::study(args, toolchain, console),
         Command::Size => image::sizes(toolchain, console),
-        Command::Model => host::run_tool("model", &[], console),
         Command::Prove(args) => host::run_tool("prove", &args.words(), console),
         Command::Fit(args) => host::run_tool("fit", &args.words(), console),
         Command::Figures(args) => docs::figures(args, console),

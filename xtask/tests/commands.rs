@@ -10,7 +10,7 @@ fn folder(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     let _ = fs::remove_dir_all(&folder);
     fs::create_dir_all(folder.join("debug")).expect("a folder");
-    let bar = "    Building [=====>  ] 1/2: model(bin)";
+    let bar = "    Building [=====>  ] 1/2: fit(bin)";
     let artifact = r#"{"package_id":"path+file:///host-tests#0.1.0","fresh":false}"#;
     script(&folder.join("cargo"), &format!("touch {}/built; echo '{bar}' >&2; echo '{artifact}'", folder.display()));
     folder
@@ -30,10 +30,10 @@ fn xtask(folder: &Path, arguments: &[&str]) -> Output {
 #[test]
 fn progress_stays_out_of_the_results() {
     let folder = folder("progress");
-    script(&folder.join("debug/model"), "echo force_n; echo 1.5");
-    let output = xtask(&folder, &["model"]);
+    script(&folder.join("debug/fit"), "echo force_n; echo 1.5");
+    let output = xtask(&folder, &["fit"]);
     let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success() && said.contains("built    model: 2 crates"), "{said}");
+    assert!(output.status.success() && said.contains("built    fit: 2 crates"), "{said}");
     assert_eq!(String::from_utf8_lossy(&output.stdout), "force_n\n1.5\n");
 }
 

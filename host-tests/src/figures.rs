@@ -7,8 +7,7 @@ use fastrand::Rng;
 use fingertip::model::Tip;
 use fingertip::shipped::{COLUMNS, ROWS};
 use fingertip::units::{Kilopascals, Millimetres, Newtons};
-use output::heatmap::Pressures;
-use output::plot::{Curve, Curves, Map, PlotError, curves, maps};
+use output::plot::{Curve, Curves, Map, PlotError, Pressures, curves, maps};
 
 /// Distance from taxel to taxel: the largest contact shown, 14.3 mm across, fits the array.
 pub const PITCH_MM: f64 = 1.5;

@@ -2,7 +2,6 @@
 
 #![allow(missing_docs, reason = "parts of the project's own programs: a name that says all needs no comment")]
 
-pub mod heatmap;
 pub mod kept;
 pub mod plot;
 pub mod say;

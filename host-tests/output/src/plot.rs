@@ -3,12 +3,15 @@
 
 mod charts;
 
-use crate::heatmap::Pressures;
 pub use charts::{Panel, Sample, overview, steps};
 use core::f64::consts::TAU;
+use fingertip::shipped::{COLUMNS, ROWS};
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+/// Pressures of the array in kPa, `[row][column]`.
+pub type Pressures = [[f64; COLUMNS]; ROWS];
 
 /// A picture could not be drawn.
 #[derive(Clone, Debug, PartialEq, Eq)]

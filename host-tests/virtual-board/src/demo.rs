@@ -9,15 +9,12 @@ use crate::image::Flashable;
 use crate::scene::host::ID;
 use crate::scene::{Boards, simulate};
 use crate::{Error, Rig};
-use fingertip::pipeline::Status;
 use fingertip::shipped::address;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use output::{heatmap, say};
+use output::say;
 use serde::Serialize;
-use sim::demo::{self, Check, Forces, Run, Taxels, Trace, what};
+use sim::demo::{self, Check, Forces, Run, Trace, what};
 use sim::scene::Scene;
 use sim::watch::{Step, Summary, Watch};
-use std::io::IsTerminal;
 use std::path::Path;
 use std::time::Instant;
 
@@ -40,12 +37,11 @@ pub fn run(image: &Path, quick: bool) -> Result<(Figures, Run), Error> {
     let to = Counts::of(rig)?;
     let repeated = match repeat {
         Some(repeat) => {
-            screen.waiting("the same run once more, to compare the traces");
+            say::line("waiting for the same run once more, to compare the traces");
             Some(repeat.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?)
         }
         None => None,
     };
-    screen.finish();
     let run = screen.trace.finish()?;
     let mut figures = Figures::of(&run, [&from, &to], rig, &flash, summary, repeated)?;
     figures.wall_time_s = begun.elapsed().as_secs_f64();
@@ -171,53 +167,17 @@ impl Figures {
     }
 }
 
-/// The brightest colour: a little above the peak at 5 N.
-const FULL_KPA: f64 = 70.0;
-
-/// The array is drawn this often, in the scene's time.
-const DRAWN_MS: u64 = 50;
-
-/// Trace and display of the run: a progress bar on a terminal, plain lines otherwise.
+/// Trace of the run; reports each goal as it is set.
 pub struct Screen {
     trace: Trace,
     scene: Scene,
-    array: Taxels,
     /// Number of goals reported.
     told: usize,
-    drawn_ms: u64,
-    /// Progress bar; `None` without a terminal.
-    bar: Option<ProgressBar>,
 }
 
 impl Screen {
     pub fn new(scene: &Scene) -> Self {
-        let bar = std::io::stdout().is_terminal().then(|| {
-            let length_ms = (scene.duration_s * 1e3) as u64;
-            let bar = ProgressBar::with_draw_target(Some(length_ms), ProgressDrawTarget::stdout());
-            let style = ProgressStyle::with_template("{msg}\n{bar:60} {pos} of {len} ms, virtual");
-            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-            bar
-        });
-        Self { trace: Trace::new(scene), scene: scene.clone(), array: Taxels::of(scene), told: 0, drawn_ms: 0, bar }
-    }
-
-    /// Reports the reason of a wait.
-    pub fn waiting(&self, for_what: &str) {
-        self.say(format!("waiting for {for_what}"));
-    }
-
-    fn say(&self, line: String) {
-        match &self.bar {
-            Some(bar) => bar.println(line),
-            None => say::line(line),
-        }
-    }
-
-    /// Leaves the terminal as it was.
-    pub fn finish(&self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
-        }
+        Self { trace: Trace::new(scene), scene: scene.clone(), told: 0 }
     }
 }
 
@@ -229,34 +189,8 @@ impl Watch for Screen {
     fn step(&mut self, step: &Step) {
         self.trace.step(step);
         while let Some(event) = self.scene.script.get(self.told).filter(|event| event.at_s <= step.time_s) {
-            self.say(format!("{:7.3} s  goal: {}", event.at_s, what(event.goal_n)));
+            say::line(format!("{:7.3} s  goal: {}", event.at_s, what(event.goal_n)));
             self.told += 1;
         }
-        let now_ms = (step.time_s.max(0.0) * 1e3) as u64;
-        let Some(bar) = self.bar.as_ref().filter(|_| now_ms >= self.drawn_ms + DRAWN_MS) else { return };
-        self.drawn_ms = now_ms;
-        bar.set_position(now_ms);
-        bar.set_message(picture(&self.scene, &self.array, step, self.told));
     }
-}
-
-/// Heat map with the figures next to it.
-fn picture(scene: &Scene, array: &Taxels, step: &Step, told: usize) -> String {
-    let Status { mode, contact, .. } = step.status;
-    let goal_n = told.checked_sub(1).map_or(0.0, |last| scene.script[last].goal_n);
-    let number = |fixed: f64, unit: &str| format!("{fixed:6.3} {unit}");
-    let beside = [
-        String::new(),
-        format!("mode         {}", format!("{mode:?}").to_lowercase()),
-        format!("goal         {}", number(goal_n, "N")),
-        format!("force        {}", number(contact.force.0.to_num(), "N")),
-        format!("indentation  {}", number(contact.indentation.0.to_num(), "mm")),
-        format!("radius       {}", number(contact.radius.0.to_num(), "mm")),
-        format!("centre       {:6.3}, {:.3} mm", contact.centre_x.0, contact.centre_y.0),
-        String::new(),
-        heatmap::legend(FULL_KPA),
-    ];
-    let lines = heatmap::lines(&array.kilopascals(step.frame), FULL_KPA);
-    let both = lines.iter().zip(beside.iter().map(String::as_str).chain(std::iter::repeat("")));
-    both.map(|(cells, text)| format!("  {cells}   {text}\n")).collect()
 }

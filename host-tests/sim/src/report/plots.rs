@@ -3,8 +3,7 @@
 use crate::metrics::shown;
 use crate::report::trace::{Drawn, Instant, Kept, QUANTITIES, Row, Strip, Track, Tracks};
 use maud::{Markup, html};
-use output::heatmap::Pressures;
-use output::plot::{Curve, Curves, PlotError, curves};
+use output::plot::{Curve, Curves, PlotError, Pressures, curves};
 use serde::Serialize;
 
 /// Width and height of a plot without a script: its letters stay readable on a phone.

@@ -7,7 +7,7 @@ use fingertip::pipeline::Status;
 use fingertip::shipped::{COLUMNS, Frame, ROWS};
 use fingertip::state::{Fault, Limits, Mode};
 use fingertip::units::Newtons;
-use output::heatmap::Pressures;
+use output::plot::Pressures;
 use serde::Serialize;
 
 /// Number of stretches of time. Each keeps the least, the largest and the mean value.

@@ -9,7 +9,6 @@ use object::elf::{FileHeader32, PT_LOAD, SHF_ALLOC};
 use object::read::elf::{ElfFile, ProgramHeader};
 use object::{LittleEndian, Object, ObjectSection, ObjectSymbol, SectionFlags};
 use sha2::{Digest, Sha256};
-use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -147,8 +146,6 @@ pub const FLASH_MAX_BYTES: u64 = 128 << 10;
 pub const RAM_MAX_BYTES: u64 = 76 << 10;
 /// First address of the microcontroller's RAM.
 const RAM_BASE: u64 = 0x2000_0000;
-/// Lines of the table of crates.
-const CRATES_SHOWN: usize = 12;
 
 /// Sizes of an image.
 pub struct Sizes {
@@ -158,18 +155,6 @@ pub struct Sizes {
     pub ram: u64,
     /// Bytes reserved for the stack.
     pub stack: u64,
-    /// Name, address, bytes of flash and bytes of RAM of each section.
-    sections: Vec<(String, u64, u64, u64)>,
-    /// Bytes of flash and of RAM, by crate.
-    crates: BTreeMap<String, (u64, u64)>,
-}
-
-/// Builds the flash image and measures it.
-pub fn sizes(choice: Choice, console: &mut Console) -> Result<()> {
-    let image = firmware(choice, console)?;
-    let sizes = Sizes::of(&image)?;
-    console.print(&format!("{}\n\n{}\n{}", image.summary(), sizes.table(), sizes.verdict()));
-    sizes.check()
 }
 
 impl Sizes {
@@ -177,32 +162,18 @@ impl Sizes {
     pub fn of(image: &Image) -> Result<Self> {
         let data = fs::read(&image.elf)?;
         let file = object::File::parse(&*data)?;
-        let mut sections = Vec::new();
-        for section in file.sections() {
-            let SectionFlags::Elf { sh_flags } = section.flags() else { continue };
-            if sh_flags & u64::from(SHF_ALLOC) == 0 || section.size() == 0 {
-                continue;
-            }
-            let in_ram = section.address() >= RAM_BASE;
-            let stored = section.kind() != object::SectionKind::UninitializedData && section.file_range().is_some();
-            let bytes = |counts: bool| if counts { section.size() } else { 0 };
-            sections.push((section.name()?.to_owned(), section.address(), bytes(stored), bytes(in_ram)));
-        }
-        let mut crates = BTreeMap::<String, (u64, u64)>::new();
-        for symbol in file.symbols().filter(|symbol| symbol.size() > 0 && symbol.is_definition()) {
-            let (flash, ram) = crates.entry(crate_of(symbol.name()?)).or_default();
-            *if symbol.address() >= RAM_BASE { ram } else { flash } += symbol.size();
-        }
+        let in_ram = file.sections().filter(|section| {
+            let SectionFlags::Elf { sh_flags } = section.flags() else { return false };
+            sh_flags & u64::from(SHF_ALLOC) != 0 && section.address() >= RAM_BASE
+        });
         let address = |name: &str| {
             let symbol = file.symbol_by_name(name).with_context(|| format!("the image has no symbol {name}"));
             symbol.map(|symbol| symbol.address())
         };
         Ok(Self {
             flash: image.bytes.len() as u64,
-            ram: sections.iter().map(|(_, _, _, ram)| ram).sum(),
+            ram: in_ram.map(|section| section.size()).sum(),
             stack: address("_stack_start")?.saturating_sub(address("_stack_end")?),
-            sections,
-            crates,
         })
     }
 
@@ -230,30 +201,6 @@ impl Sizes {
             self.stack
         )
     }
-
-    /// Sections and crates, a line each.
-    fn table(&self) -> String {
-        let mut text = format!("{:<24} {:>10} {:>8} {:>8}\n", "section", "address", "flash", "RAM");
-        for (name, address, flash, ram) in &self.sections {
-            text += &format!("{name:<24} {address:#010x} {flash:>8} {ram:>8}\n");
-        }
-        let mut crates: Vec<_> = self.crates.iter().collect();
-        crates.sort_by_key(|(_, (flash, ram))| std::cmp::Reverse(flash + ram));
-        text += &format!("\n{:<35} {:>8} {:>8}\n", "crate (named symbols only)", "flash", "RAM");
-        for (name, (flash, ram)) in crates.into_iter().take(CRATES_SHOWN) {
-            text += &format!("{name:<35} {flash:>8} {ram:>8}\n");
-        }
-        text
-    }
-}
-
-/// The crate that a symbol comes from, by its name.
-fn crate_of(symbol: &str) -> String {
-    let Ok(name) = rustc_demangle::try_demangle(symbol) else { return "(no Rust name)".into() };
-    let name = format!("{name:#}");
-    // `<crate::Type as other::Trait>::method` belongs to the type's crate.
-    let path = name.trim_start_matches(['<', '&', '*', '(', '[']);
-    path.split([':', ' ', '<', '>']).next().unwrap_or(path).to_owned()
 }
 
 // The panic-free proof: an image of the control step alone, which a reachable panic keeps from linking.
@@ -343,15 +290,8 @@ mod tests {
     }
 
     #[test]
-    fn symbols_are_counted_for_the_crate_that_wrote_them() {
-        assert_eq!(crate_of("_ZN9fingertip8pipeline8Pipeline4step17h0123456789abcdefE"), "fingertip");
-        assert_eq!(crate_of("_RNvMs_NtCs1234_9fingertip8pipelineNtB4_8Pipeline4step"), "fingertip");
-        assert_eq!(crate_of("__aeabi_memcpy"), "(no Rust name)");
-    }
-
-    #[test]
     fn a_byte_beyond_a_limit_fails() {
-        let sizes = |flash, ram| Sizes { flash, ram, stack: 0, sections: Vec::new(), crates: BTreeMap::new() };
+        let sizes = |flash, ram| Sizes { flash, ram, stack: 0 };
         assert!(sizes(FLASH_MAX_BYTES, RAM_MAX_BYTES).check().is_ok());
         assert!(
             sizes(FLASH_MAX_BYTES + 1, 0).check().unwrap_err().to_string().contains("flash: 131073 bytes are 1 more")

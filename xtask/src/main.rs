@@ -89,9 +89,6 @@ enum Command {
     Timing(timing::Args),
     /// Measure what accuracy costs in time: every variant of every kernel, with tables and plots
     Study(timing::StudyArgs),
-    /// Measure the flash image against its limits: flash, static RAM, share of each crate
-    #[command(after_help = "Examples:\n  cargo xtask size")]
-    Size,
     /// Prove the contact model's error bounds over whole input ranges: some minutes on two cores
     #[command(
         disable_help_flag = true,
@@ -155,7 +152,6 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Cores => cores::run_all(toolchain, console),
         Command::Timing(args) => timing::run(args, toolchain, console),
         Command::Study(args) => timing::study(args, toolchain, console),
-        Command::Size => image::sizes(toolchain, console),
         Command::Prove(args) => host::run_tool("prove", &args.words(), console),
         Command::Fit(args) => host::run_tool("fit", &args.words(), console),
         Command::Figures(args) => docs::figures(args, console),
@@ -180,7 +176,7 @@ fn setup(choice: Choice, console: &mut Console) -> anyhow::Result<()> {
     docs::deny(console)?;
     console.run(console::cargo("fetch").arg("--locked"))?;
     console.say(
-        "All set up: demo, sim, sweep, population, cluster, sensor, test, build, qemu, timing, size, lint and docs work offline now.",
+        "All set up: demo, sim, sweep, population, cluster, sensor, test, build, qemu, timing, lint and docs work offline now.",
     );
     Ok(())
 }

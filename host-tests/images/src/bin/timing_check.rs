@@ -65,7 +65,7 @@ enum Second {
 use Second::{Input, Rounds};
 
 /// Kernels, each with its second argument and its last one.
-const KERNELS: [(Kernel, Second, usize); 25] = [
+const KERNELS: [(Kernel, Second, usize); 23] = [
     (AES_128_keyschedule, Input, 0),
     (AES_128_encrypt, Input, 0),
     (AES_128_encrypt_ctr, Input, BYTES),
@@ -89,21 +89,7 @@ const KERNELS: [(Kernel, Second, usize); 25] = [
     (CM4_DSPsBOX_AES_encrypt, Input, 14),
     (CM4_DSPsBOX_AES_decrypt, Input, 10),
     (CM4_DSPsBOX_AES_decrypt, Input, 14),
-    (nothing, Input, 0),
-    (spin, Input, 0),
 ];
-
-unsafe extern "C" fn nothing(_: Words, _: Words, _: Words, _: usize) {}
-
-/// Long enough to tell how fast the emulator is.
-unsafe extern "C" fn spin(data: Words, _: Words, _: Words, _: usize) {
-    for turn in 0..SPINS {
-        // SAFETY: the first word of the buffer that every kernel gets.
-        unsafe { data.write_volatile(data.read_volatile().wrapping_mul(turn | 1)) };
-    }
-}
-
-const SPINS: u32 = 1_000_000;
 
 static mut BUFFERS: [[u32; BYTES / 4 + 64]; 3] = [[0; BYTES / 4 + 64]; 3];
 

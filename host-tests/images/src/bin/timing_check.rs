@@ -6,9 +6,16 @@
 #![no_std]
 #![no_main]
 
+#[expect(dead_code, reason = "a kernel here takes its arguments in registers")]
+#[path = "../study/call.rs"]
+mod call;
+#[expect(dead_code, reason = "nothing is read here, and no line is written")]
+mod host;
+
+use call::{Registers, pass};
 use core::arch::{asm, global_asm};
-use core::panic::PanicInfo;
-use cortex_m_semihosting::{debug, nr, syscall1};
+use cortex_m_semihosting::debug;
+use host::{command_line, fail};
 
 global_asm!(
     include_str!("../../../../m4-timing/tests/kernels/aes-armcortexm/aes128.s"),
@@ -95,7 +102,7 @@ static mut BUFFERS: [[u32; BYTES / 4 + 64]; 3] = [[0; BYTES / 4 + 64]; 3];
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    if asked_for(b"unknown") {
+    if command_line(&mut [0; 256]) == b"unknown\0" {
         // SAFETY: no region measures this, and it would fault; it is refused before.
         unsafe { asm!(".inst.w 0xf3af8040", ".inst.w 0xee310b02", ".inst.w 0xf3af8041") };
     }
@@ -108,23 +115,8 @@ fn main() -> ! {
             Rounds(rounds) => *rounds as Words,
         };
         for _ in 0..PASSES {
-            // SAFETY: the kernels follow the calling convention and stay within their buffers.
-            unsafe {
-                asm!(
-                    ".inst.w 0xf3af8040",
-                    "mov r0, {first}",
-                    "blx {kernel}",
-                    ".inst.w 0xf3af8041",
-                    first = in(reg) state,
-                    kernel = in(reg) *kernel,
-                    inout("r0") number => _,
-                    inout("r1") second => _,
-                    inout("r2") to => _,
-                    inout("r3") *last => _,
-                    out("r12") _,
-                    out("lr") _,
-                );
-            }
+            let core = [state as u32, second as u32, to as u32, *last as u32];
+            pass(number, *kernel as *const (), &mut Registers { core, ..Registers::default() });
         }
     }
     loop {
@@ -132,17 +124,7 @@ fn main() -> ! {
     }
 }
 
-fn asked_for(word: &[u8]) -> bool {
-    let mut line = [0u8; 256];
-    let mut request = [line.as_mut_ptr() as usize, line.len()];
-    // SAFETY: the request names a buffer and its length, both valid until the call returns.
-    let error = unsafe { syscall1(nr::GET_CMDLINE, request.as_mut_ptr() as usize) };
-    error == 0 && line.split(|byte| *byte == 0).next() == Some(word)
-}
-
 #[panic_handler]
-fn panic(_: &PanicInfo) -> ! {
-    loop {
-        debug::exit(debug::EXIT_FAILURE);
-    }
+fn panic(_: &core::panic::PanicInfo) -> ! {
+    fail("panic")
 }

@@ -206,9 +206,6 @@ fn quotient_bits(signed: bool, numerator: u32, denominator: u32) -> u32 {
 /// Passes through each region, by its number: the figures of [`Measured`], in its order.
 pub type Regions = BTreeMap<u32, Vec<[u64; 5]>>;
 
-/// Names of the figures.
-const NAMES: [&str; 5] = ["instructions", "low", "estimate", "high", "flash"];
-
 /// A figure over the passes of a region.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 pub struct Summary {
@@ -234,6 +231,9 @@ impl Summary {
 
 #[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 pub struct Measured {
+    /// Name of the region; empty where it is not known.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub name: String,
     pub region: u32,
     pub passes: u64,
     /// Instructions executed, those whose condition did not hold too.
@@ -253,25 +253,23 @@ pub fn summaries(passes: &[[u64; 5]]) -> [Summary; 5] {
     std::array::from_fn(|figure| Summary::of(passes.iter().map(|pass| pass[figure]).collect()))
 }
 
-/// An object a line: the regions in order of their numbers, then the sums over all of them.
-pub fn json_lines(regions: &Regions) -> String {
-    let (mut text, mut totals) = (String::new(), [0; 5]);
-    for (region, passes) in regions {
-        let summaries = summaries(passes);
-        totals.iter_mut().zip(&summaries).for_each(|(total, summary)| *total += summary.total);
-        let ([instructions, low, estimate, high, flash], passes) = (summaries, passes.len() as u64);
-        let measured = Measured { region: *region, passes, instructions, low, estimate, high, flash };
-        text += &serde_json::to_string(&measured).unwrap_or_default();
-        text += "\n";
-    }
-    let sums: Vec<_> = NAMES.iter().zip(totals).map(|(name, total)| format!("\"{name}\":{total}")).collect();
-    text + &format!("{{\"total\":{{{}}}}}\n", sums.join(","))
+/// Figures of the regions, in order of their numbers.
+pub fn measured(regions: &Regions) -> Vec<Measured> {
+    let of = |(region, passes): (&u32, &Vec<[u64; 5]>)| {
+        let ([instructions, low, estimate, high, flash], passes) = (summaries(passes), passes.len() as u64);
+        Measured { name: String::new(), region: *region, passes, instructions, low, estimate, high, flash }
+    };
+    regions.iter().map(of).collect()
 }
 
-/// Reads what [`json_lines`] wrote: the regions, in order of their numbers. `None` where it is anything else.
+/// Writes an object a line.
+pub fn json_lines(measured: &[Measured]) -> String {
+    measured.iter().map(|measured| serde_json::to_string(measured).unwrap_or_default() + "\n").collect()
+}
+
+/// Reads what [`json_lines`] wrote. `None` where it is anything else.
 pub fn parse(text: &str) -> Option<Vec<Measured>> {
-    let (regions, total) = text.trim_end().rsplit_once('\n').unwrap_or(("", text.trim_end()));
-    total.starts_with("{\"total\":").then(|| regions.lines().map(|line| serde_json::from_str(line).ok()).collect())?
+    text.lines().map(|line| serde_json::from_str(line).ok()).collect()
 }
 
 #[cfg(test)]
@@ -287,9 +285,9 @@ mod tests {
     }
 
     #[test]
-    fn a_report_is_a_line_of_json_for_each_region_and_one_for_all_and_is_read_as_written() {
+    fn a_report_is_a_line_of_json_for_each_region_and_is_read_as_written() {
         let passes = |estimates: &[u64]| estimates.iter().map(|estimate| [4, 3, *estimate, 9, estimate + 1]).collect();
-        let text = json_lines(&BTreeMap::from([(7, passes(&[6, 5, 8])), (2, passes(&[5]))]));
+        let text = json_lines(&measured(&BTreeMap::from([(7, passes(&[6, 5, 8])), (2, passes(&[5]))])));
         assert_eq!(
             text.lines().next(),
             Some(concat!(
@@ -298,9 +296,6 @@ mod tests {
                 r#""high":{"total":9,"min":9,"median":9,"max":9},"flash":{"total":6,"min":6,"median":6,"max":6}}"#
             ))
         );
-        assert!(
-            text.ends_with("{\"total\":{\"instructions\":16,\"low\":12,\"estimate\":24,\"high\":36,\"flash\":28}}\n")
-        );
         let measured = parse(&text).expect("a report");
         assert_eq!(
             measured.iter().map(|measured| (measured.region, measured.passes)).collect::<Vec<_>>(),
@@ -308,8 +303,8 @@ mod tests {
         );
         assert_eq!(measured[1].estimate, Summary { total: 19, min: 5, median: 6, max: 8 });
         assert_eq!(measured[1].flash.max, 9);
-        assert_eq!(parse(&json_lines(&BTreeMap::new())), Some(vec![]));
-        assert_eq!(parse("{\"region\":1}\n{\"total\":{}}"), None);
-        assert_eq!(parse(""), None);
+        let named = [Measured { name: "a \"call\"".into(), ..Measured::default() }];
+        assert_eq!(parse(&json_lines(&named)).as_deref(), Some(&named[..]));
+        assert_eq!(parse("{\"region\":1}"), None);
     }
 }

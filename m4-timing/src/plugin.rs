@@ -256,7 +256,7 @@ extern "C" fn ended(_: Id, _: *mut c_void) {
             Err(refusal) => refuse(&refusal),
         };
         if let Some(path) = &plugin.out
-            && let Err(error) = fs::write(path, meter::json_lines(regions))
+            && let Err(error) = fs::write(path, meter::json_lines(&meter::measured(regions)))
         {
             fail(&format!("cannot write {}: {error}", path.display()));
         }

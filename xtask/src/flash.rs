@@ -285,7 +285,7 @@ fn estimates(toolchain: Toolchain, console: &mut Console) -> Result<PathBuf> {
     let call = run.regions.first().map_or(0, |region| region.flash.median);
     let mut text = String::new();
     for region in &run.regions {
-        text += &format!("{} {}\n", region.flash.median.saturating_sub(call), run.name(region.region));
+        text += &format!("{} {}\n", region.flash.median.saturating_sub(call), region.name);
     }
     fs::write(&file, text).with_context(|| format!("cannot write {}", host::shown(&file)))?;
     Ok(file)

@@ -6,7 +6,7 @@ use crate::host::{self, Program};
 use crate::toolchain::{self, Choice, Toolchain};
 use crate::{image, install};
 use anyhow::{Context, Result, bail};
-use m4_timing::meter::{Measured, parse};
+use m4_timing::meter::{Measured, json_lines, parse};
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -36,29 +36,8 @@ pub struct Args {
 pub struct Run {
     /// Standard output of the image.
     pub output: String,
-    /// The regions, in order of their numbers.
+    /// The regions, in order of their numbers, with the names of the lines `region NUMBER NAME` of the output.
     pub regions: Vec<Measured>,
-    /// The same as the plugin wrote it.
-    json_lines: String,
-}
-
-impl Run {
-    /// Name of a region from the line `region NUMBER NAME` of the output; its number without such a line.
-    pub fn name(&self, region: u32) -> String {
-        let start = format!("region {region} ");
-        let name = self.output.lines().find_map(|line| line.strip_prefix(&start));
-        name.map_or(format!("region {region}"), Into::into)
-    }
-
-    /// An object a line, as the plugin writes them, with the names.
-    pub fn json_lines(&self) -> String {
-        let mut text = String::new();
-        for (line, measured) in self.json_lines.lines().zip(&self.regions) {
-            let name = self.name(measured.region).replace(['"', '\\'], "'");
-            text += &format!("{{\"name\":\"{name}\",{}\n", line.trim_start_matches('{'));
-        }
-        text
-    }
 }
 
 /// Measures the loop's kernels or an image, or checks the model.
@@ -73,9 +52,11 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
         }
         None => kernels(choice, console)?,
     };
-    console.print(&table(&run));
+    console.print(&table(&run.regions));
     match &args.json {
-        Some(path) => fs::write(path, run.json_lines()).with_context(|| format!("cannot write {}", host::shown(path))),
+        Some(path) => {
+            fs::write(path, json_lines(&run.regions)).with_context(|| format!("cannot write {}", host::shown(path)))
+        }
         None => Ok(()),
     }
 }
@@ -119,11 +100,16 @@ pub fn measure(image: &Path, argument: Option<&Path>, console: &mut Console) -> 
         let errors = String::from_utf8_lossy(&ended.stderr);
         bail!("{}: {}\n{output}{errors}", ended.status, console::show(&command));
     }
-    let json_lines = fs::read_to_string(&file).with_context(|| format!("{} wrote no figures", host::shown(&file)))?;
+    let text = fs::read_to_string(&file).with_context(|| format!("{} wrote no figures", host::shown(&file)))?;
     // Only a copy of what is returned.
     let _ = fs::remove_file(&file);
-    let regions = parse(&json_lines).context("the plugin's figures cannot be read")?;
-    Ok(Run { output, regions, json_lines })
+    let mut regions = parse(&text).context("the plugin's figures cannot be read")?;
+    for measured in &mut regions {
+        let start = format!("region {} ", measured.region);
+        let name = output.lines().find_map(|line| line.strip_prefix(&start));
+        measured.name = name.map_or(format!("region {}", measured.region), Into::into);
+    }
+    Ok(Run { output, regions })
 }
 
 /// Makes sure of an emulator with the plugin interface.
@@ -156,22 +142,16 @@ fn plugin(console: &mut Console) -> Result<PathBuf> {
 }
 
 /// A line for each region: cycles of a pass.
-fn table(run: &Run) -> String {
+fn table(regions: &[Measured]) -> String {
     let mut text = format!(
         "{:<34}{:>8}{:>8}{:>8}{:>9}{:>8}{:>8}{:>10}\n",
         "cycles a pass, medians", "passes", "insn", "low", "estimate", "high", "flash", "flash max"
     );
-    for measured in &run.regions {
-        let Measured { region, passes, instructions, low, estimate, high, flash } = measured;
+    for measured in regions {
+        let Measured { name, passes, instructions, low, estimate, high, flash, .. } = measured;
         text += &format!(
-            "{:<34}{passes:>8}{:>8}{:>8}{:>9}{:>8}{:>8}{:>10}\n",
-            run.name(*region),
-            instructions.median,
-            low.median,
-            estimate.median,
-            high.median,
-            flash.median,
-            flash.max
+            "{name:<34}{passes:>8}{:>8}{:>8}{:>9}{:>8}{:>8}{:>10}\n",
+            instructions.median, low.median, estimate.median, high.median, flash.median, flash.max
         );
     }
     text

@@ -21,10 +21,11 @@ pub fn run(
     progress: &mut dyn FnMut(&str),
 ) -> Result<(Judgement, Rig), Error> {
     let mut rig = Rig::new(image, Plant::new(&Setup::default()), options)?;
-    let sha256 = Flashable::of(rig.image())?.sha256();
+    let flash = Flashable::of(rig.image())?;
+    flash.check_loaded(&mut rig)?;
     let report =
         listen(&mut Port { rig: &mut rig, heard: VecDeque::new() }, frames, progress).map_err(Error::Report)?;
-    Ok((judge(&report, Board::Emulated, sha256, estimates), rig))
+    Ok((judge(&report, Board::Emulated, flash.sha256(), estimates), rig))
 }
 
 /// The far end of the port; to read runs the board.

@@ -3,9 +3,9 @@
 //!
 //! A sequence with DMA is one event, at its last conversion: the inputs are sampled at each rank's own instant, and the
 //! words wait together for [`crate::streams`]. Nothing that the image can see depends on the words in between, and 110
-//! conversions a frame cost 22 events. In a scene they cost one, see [`crate::front_end::Scan`]. Not modelled: an injected
-//! group with a separate trigger, continuous and discontinuous mode, analogue watchdog, resolutions other than 12 bits;
-//! a request for one is reported as a gap.
+//! conversions a frame cost 22 events. In a scene they cost one, see [`crate::front_end::Scan`]. Not modelled: interrupts,
+//! several ranks without DMA, an injected group with a separate trigger, continuous and discontinuous mode, analogue
+//! watchdog, resolutions other than 12 bits; a request for one is reported as a gap.
 
 use crate::front_end::{Shared, Slot};
 use crate::timers::COMPARE_1;
@@ -19,8 +19,6 @@ use rigless::time::{EventId, VirtualNanos};
 
 /// `EXTSEL` of TIM8_CC1, 13.13.3.
 const TIM8_CC1: u64 = 13;
-/// The interrupt line of the converters, table 70.
-const GLOBAL: usize = 0;
 /// The row drives' port, and how many of its pins are rows.
 const ROW_PORT: (&str, usize) = ("GPIOB", 10);
 
@@ -29,7 +27,6 @@ const ROW_PORT: (&str, usize) = ("GPIOB", 10);
 struct Running {
     event: Option<EventId>,
     begun_ns: u64,
-    ranks: usize,
     /// Slot of a scene; `None` outside a scene.
     slot: Option<Slot>,
 }
@@ -42,9 +39,7 @@ pub struct Converter {
     clock_hz: u64,
     status: u64,
     running: Option<Running>,
-    rank: usize,
     injected: Injected,
-    interrupt: Level,
     /// True if the reference and the temperature sensor are on, by the register that the converters share.
     pub inside_on: bool,
 }
@@ -52,17 +47,7 @@ pub struct Converter {
 impl Converter {
     /// Out of reset, its inputs on a front end.
     pub fn new(nth: usize, front_end: Shared, clock_hz: u64) -> Self {
-        Self {
-            nth,
-            front_end,
-            clock_hz,
-            status: 0,
-            running: None,
-            rank: 0,
-            injected: Injected::default(),
-            interrupt: Level::Low,
-            inside_on: false,
-        }
+        Self { nth, front_end, clock_hz, status: 0, running: None, injected: Injected::default(), inside_on: false }
     }
 
     fn after(&self, begun_ns: u64, cycles: u64) -> u64 {
@@ -97,57 +82,47 @@ impl Converter {
             return;
         }
         let length = length(registers);
-        if self.rank >= length {
-            self.rank = 0;
+        if !by_dma && length > 1 {
+            context.tell("CR2", "a regular sequence of several ranks without DMA is not modelled");
         }
-        let ranks = if by_dma { length - self.rank } else { 1 };
-        let cycles: u64 = (self.rank..self.rank + ranks)
-            .map(|rank| sampling_cycles(registers, input(registers, rank)) + CONVERSION_CYCLES)
-            .sum();
+        let cycles: u64 =
+            (0..length).map(|rank| sampling_cycles(registers, input(registers, rank)) + CONVERSION_CYCLES).sum();
         let begun_ns = slot.map_or(context.now().0, |slot| slot.begun_ns);
         let done = VirtualNanos(self.after(begun_ns, cycles));
         let event = slot.is_none_or(|slot| slot.rows == 0).then(|| context.schedule(done));
         self.status = sr::STRT.set(self.status, 1);
-        self.running = Some(Running { event, begun_ns, ranks, slot });
+        self.running = Some(Running { event, begun_ns, slot });
     }
 
     fn finish(&mut self, running: Running, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
-        let mut cycles = 0;
+        let (mut cycles, length) = (0, length(registers));
         let mut samples = [(0, 0); RANKS];
-        for (place, sample) in samples.iter_mut().enumerate().take(running.ranks) {
-            let input = input(registers, self.rank + place);
+        for (rank, sample) in samples.iter_mut().enumerate().take(length) {
+            let input = input(registers, rank);
             cycles += sampling_cycles(registers, input);
             *sample = (input, self.after(running.begun_ns, cycles));
             cycles += CONVERSION_CYCLES;
         }
-        self.rank += running.ranks;
-        let complete = self.rank >= length(registers);
-        let control = registers.get(Register::Cr2);
-        let by_dma = cr2::DMA.is_set(control);
+        let by_dma = cr2::DMA.is_set(registers.get(Register::Cr2));
         let mut front_end = self.front_end.lock();
         if !by_dma {
             front_end.waiting[self.nth].clear();
         }
-        front_end.convert(self.nth, self.inside_on, running.slot, samples.iter().copied().take(running.ranks));
+        front_end.convert(self.nth, self.inside_on, running.slot, samples.iter().copied().take(length));
         if let Some(word) = front_end.waiting[self.nth].front() {
             registers.set(Register::Dr, u64::from(*word));
         }
-        if complete && self.nth == 1 {
+        if self.nth == 1 {
             front_end.sequence_done(context.now().0, running.slot);
         }
         drop(front_end);
-        if complete && cr1::JAUTO.is_set(registers.get(Register::Cr1)) {
+        if cr1::JAUTO.is_set(registers.get(Register::Cr1)) {
             self.inject(self.after(running.begun_ns, cycles), registers, context);
         }
-        if complete || cr2::EOCS.is_set(control) {
-            self.status = sr::EOC.set(self.status, 1);
-        }
+        self.status = sr::EOC.set(self.status, 1);
         if by_dma {
             // The streams take all that waits; the line falls by itself.
             context.request(DMA_REQUEST, Level::High);
-        }
-        if !complete && running.slot.is_none() {
-            self.begin(None, registers, context);
         }
     }
 
@@ -169,24 +144,11 @@ impl Converter {
         self.injected = Injected { words, done_ns: self.after(begun_ns, cycles) };
     }
 
-    fn refresh(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
-        registers.set(Register::Sr, self.status);
-        let enables = registers.get(Register::Cr1);
-        let interrupt = Level::from(
-            cr1::EOCIE.is_set(enables) && sr::EOC.is_set(self.status)
-                || cr1::OVRIE.is_set(enables) && sr::OVR.is_set(self.status),
-        );
-        if interrupt != self.interrupt {
-            self.interrupt = interrupt;
-            context.interrupt(GLOBAL, interrupt);
-        }
-    }
-
     fn triggered(&mut self, slot: Option<Slot>, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         let control = registers.get(Register::Cr2);
         if cr2::EXTEN.get(control) & 1 == 1 && cr2::EXTSEL.get(control) == TIM8_CC1 {
             self.begin(slot, registers, context);
-            self.refresh(registers, context);
+            registers.set(Register::Sr, self.status);
         }
     }
 
@@ -200,7 +162,7 @@ impl Converter {
         }
         registers.set(Register::Cr2, cr2::SWSTART.set(value, 0));
         if !cr2::ADON.is_set(value) {
-            (self.running, self.rank, self.injected) = (None, 0, Injected::default());
+            (self.running, self.injected) = (None, Injected::default());
             self.front_end.lock().waiting[self.nth].clear();
         } else if cr2::SWSTART.is_set(value) {
             self.begin(None, registers, context);
@@ -261,7 +223,7 @@ impl Device for Converter {
         if taken {
             let value = registers.get(register);
             self.status = sr::EOC.set(self.status, 0);
-            self.refresh(registers, context);
+            registers.set(Register::Sr, self.status);
             return (register == Register::Dr).then_some(value);
         }
         None
@@ -276,22 +238,27 @@ impl Device for Converter {
             Register::Cr1 => {
                 let control = registers.get(Register::Cr1);
                 if cr1::RES.get(control) != 0
+                    || cr1::EOCIE.is_set(control)
+                    || cr1::OVRIE.is_set(control)
                     || cr1::JEOCIE.is_set(control)
                     || cr1::DISCEN.is_set(control)
                     || cr1::AWDEN.is_set(control)
                 {
-                    context.tell("CR1", "resolutions but 12 bits, the injected group's interrupt, discontinuous mode and watchdog are not modelled");
+                    context.tell(
+                        "CR1",
+                        "resolutions but 12 bits, interrupts, discontinuous mode and watchdog are not modelled",
+                    );
                 }
             }
             _ => {}
         }
-        self.refresh(registers, context);
+        registers.set(Register::Sr, self.status);
     }
 
     fn on_event(&mut self, event: EventId, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         if let Some(running) = self.running.take_if(|running| running.event == Some(event)) {
             self.finish(running, registers, context);
-            self.refresh(registers, context);
+            registers.set(Register::Sr, self.status);
         }
     }
 

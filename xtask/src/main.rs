@@ -68,7 +68,11 @@ enum Command {
     )]
     Sensor(sim::Args),
     /// Serve a simulated finger in real time for any DYNAMIXEL client, behind a pseudo-terminal or a TCP port
-    Serve(sim::ServeArgs),
+    #[command(
+        disable_help_flag = true,
+        after_help = "Examples:\n  cargo xtask serve --pty /tmp/finger\n  cargo xtask serve raspberry --tcp 7000\n  cargo xtask serve --board virtual --pty /tmp/finger    (the flash image on the emulated board)\n  cargo xtask serve --help    (all that it takes)"
+    )]
+    Serve(sim::Args),
     /// Feed captures of boards through the core on this machine: it must answer as they did, to the bit
     Replay(sim::ReplayArgs),
     /// Run every test: core, host, panic-free proof, QEMU, virtual board, reports in a browser

@@ -60,7 +60,7 @@ fn every_command_has_examples_in_its_help() {
         let text = help(&["help", name]);
         assert!(text.contains("Examples:") || name == "help", "{name}: {text}");
     }
-    let serve = help(&["serve", "--help"]);
+    let serve = help(&["help", "serve"]);
     assert!(serve.contains("--board") && serve.contains("--pty"), "{serve}");
     assert!(!folder.join("built").exists());
 }

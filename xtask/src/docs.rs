@@ -94,23 +94,7 @@ pub fn renew(path: &str, text: &str, check: bool, stale: &mut Vec<String>, conso
     Ok(())
 }
 
-// The paper's figures.
-
-#[derive(clap::Args)]
-#[command(after_help = "Examples:\n  cargo xtask figures\n  cargo xtask figures --out /tmp/figures")]
-pub struct FiguresArgs {
-    /// Folder to draw them into
-    #[arg(long, value_name = "DIR", default_value = PICTURES)]
-    out: PathBuf,
-}
-
-/// Draws the figures.
-pub fn figures(args: &FiguresArgs, console: &mut Console) -> Result<()> {
-    let default = args.out == Path::new(PICTURES);
-    draw(&if default { host::root().join(PICTURES) } else { args.out.clone() }, console)
-}
-
-/// Draws the figures into a folder.
+/// Draws the paper's figures into a folder.
 fn draw(folder: &Path, console: &mut Console) -> Result<()> {
     let mut command = Program::tool("figures").build(console)?;
     console.run(command.arg(folder))

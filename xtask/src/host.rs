@@ -41,8 +41,6 @@ pub const SERVE: Program = Program { package: "serve", name: "serve", with: SHAR
 pub const BOARD: Program = Program { package: "virtual-board", name: "virtual-board", with: LEAST };
 /// The emulated board with all that it can.
 pub const SCENE_BOARD: Program = Program { with: SHARED, ..BOARD };
-/// `fingertip`, the host's program. It does not stream, so it is built without the runtime for that.
-pub const TOOL: Program = Program { package: "fingertip-cli", name: "fingertip", with: &[] };
 
 impl Program {
     /// One of the tools of `host-tests`.

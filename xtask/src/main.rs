@@ -73,8 +73,6 @@ enum Command {
         after_help = "Examples:\n  cargo xtask serve --pty /tmp/finger\n  cargo xtask serve raspberry --tcp 7000\n  cargo xtask serve --board virtual --pty /tmp/finger    (the flash image on the emulated board)\n  cargo xtask serve --help    (all that it takes)"
     )]
     Serve(sim::Args),
-    /// Feed captures of boards through the core on this machine: it must answer as they did, to the bit
-    Replay(sim::ReplayArgs),
     /// Run every test: core, host, panic-free proof, QEMU, virtual board, reports in a browser
     Test(test::Args),
     /// Build the flash image and print its path, size and SHA-256
@@ -105,8 +103,6 @@ enum Command {
         after_help = "Examples:\n  cargo xtask fit --quick\n  cargo xtask fit --check\n  cargo xtask fit --help    (all that it takes)"
     )]
     Fit(sim::Args),
-    /// Draw the paper's figures 7, 10 and 11 from the contact model, in the core's fixed point
-    Figures(docs::FiguresArgs),
     /// Prove the control step free of panics and of floating-point calls
     #[command(after_help = "Examples:\n  cargo xtask panic-free")]
     PanicFree,
@@ -121,9 +117,6 @@ enum Command {
     /// Try the examples for clusters here: Slurm's tasks, GNU parallel, the Kubernetes job's shell, DuckDB
     #[command(after_help = "Examples:\n  cargo xtask cluster")]
     Cluster,
-    /// Install everything that the other commands need, for use offline
-    #[command(after_help = "Examples:\n  cargo xtask setup")]
-    Setup,
 }
 
 fn main() -> ExitCode {
@@ -147,7 +140,6 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Budget(args) => sim::native("budget", args, console),
         Command::Sensor(args) => install::sensor(args, console),
         Command::Serve(args) => sim::serve(args, toolchain, console),
-        Command::Replay(args) => sim::replay(args, console),
         Command::Test(args) => test::run(args, toolchain),
         Command::Build => image::firmware(toolchain, console).map(|image| console.print(&image.summary())),
         Command::Flash(args) => flash::run(args, toolchain, console),
@@ -158,29 +150,10 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Study(args) => timing::study(args, toolchain, console),
         Command::Prove(args) => host::run_tool("prove", &args.words(), console),
         Command::Fit(args) => host::run_tool("fit", &args.words(), console),
-        Command::Figures(args) => docs::figures(args, console),
         Command::PanicFree => image::prove_panic_free(toolchain, console),
         Command::Lint => test::lint(toolchain),
         Command::Docs(args) => docs::run(args, toolchain, console),
         Command::Package => docs::package(console),
         Command::Cluster => cluster::run(console),
-        Command::Setup => setup(toolchain, console),
     }
-}
-
-/// Installs now what the commands would install at first use.
-fn setup(choice: Choice, console: &mut Console) -> anyhow::Result<()> {
-    toolchain::ensure(choice, console)?;
-    timing::ensure(console)?;
-    cores::ensure(console)?;
-    install::bus_python(console)?;
-    install::script("fit.py", console)?;
-    cluster::ensure(console)?;
-    install::browser(console)?;
-    docs::deny(console)?;
-    console.run(console::cargo("fetch").arg("--locked"))?;
-    console.say(
-        "All set up: demo, sim, sweep, population, cluster, sensor, test, build, qemu, timing, lint and docs work offline now.",
-    );
-    Ok(())
 }

@@ -1,4 +1,4 @@
-//! Simulated fingers: scenes, the demonstration, the bus server and replays.
+//! Simulated fingers: scenes, the demonstration and the bus server.
 
 use crate::console::{self, Console};
 use crate::toolchain::Choice;
@@ -103,19 +103,4 @@ pub fn serve(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     // The board takes no flag that selects it.
     let board = ["--board", "virtual", "--board=virtual"];
     start(command.args(args.arguments.iter().filter(|word| !board.contains(&word.as_str()))))
-}
-
-#[derive(clap::Args)]
-#[command(
-    after_help = "Examples:\n  cargo xtask replay\n  cargo xtask replay my/captures\n  cargo xtask replay press.mcap"
-)]
-pub struct ReplayArgs {
-    /// A folder with captures, or one of them; without it `captures/`
-    place: Option<PathBuf>,
-}
-
-/// Replays all captures in a folder: a line for each.
-pub fn replay(args: &ReplayArgs, console: &mut Console) -> Result<()> {
-    let place = args.place.clone().unwrap_or_else(|| host::root().join("captures"));
-    start(host::TOOL.build(console)?.arg("replay").arg(place))
 }

@@ -1,12 +1,11 @@
-//! Exit codes, progress lines and the emulator of the programs of this package.
+//! Exit codes and the emulator of the programs of this package.
 
 use std::error::Error;
-use std::fmt::Display;
-use std::io::{self, IsTerminal, Read, Write};
+use std::io::Read;
 use std::path::Path;
 use std::process::{Command, ExitCode, Stdio};
-use std::sync::{Mutex, mpsc};
-use std::time::{Duration, Instant};
+use std::sync::mpsc;
+use std::time::Duration;
 use std::{fs, thread};
 
 /// Prints the error, and returns the exit code.
@@ -16,36 +15,6 @@ pub fn ended(result: Result<(), String>) -> ExitCode {
         Err(error) => {
             eprintln!("error: {error}");
             ExitCode::FAILURE
-        }
-    }
-}
-
-/// Progress line of a program: on a terminal only, a log wants the results.
-pub struct Progress(Option<Mutex<Instant>>);
-
-impl Progress {
-    /// Progress that shows nothing yet.
-    pub fn begin() -> Self {
-        Self(io::stderr().is_terminal().then(|| Mutex::new(Instant::now())))
-    }
-
-    /// Shows a text, twice a second at most.
-    pub fn show(&self, text: impl Display) {
-        if let Some(shown) = &self.0
-            && let Ok(mut shown) = shown.try_lock()
-            && shown.elapsed() > Duration::from_millis(500)
-        {
-            *shown = Instant::now();
-            eprint!("\r{text}");
-            // Progress is a courtesy; a closed terminal is no reason to stop.
-            let _ = io::stderr().flush();
-        }
-    }
-
-    /// Ends the line with what takes it away.
-    pub fn end(&self, text: impl Display) {
-        if self.0.is_some() {
-            eprint!("{text}");
         }
     }
 }

@@ -3,7 +3,8 @@
 use clap::Parser;
 use fingertip::contact::FitLevel;
 use host_tests::fit_statistics::{CASES, PAGE, markdown};
-use host_tests::program::{Progress, ended};
+use host_tests::program::ended;
+use indicatif::ProgressBar;
 use std::process::ExitCode;
 
 /// Judges the contact's fit on thousands of pictures.
@@ -38,11 +39,11 @@ fn main() -> ExitCode {
 
 fn run(args: &Args) -> Result<(), String> {
     let cases = if args.quick { CASES / 20 } else { args.cases as usize };
-    let progress = Progress::begin();
+    let progress = ProgressBar::new_spinner();
     let tables = markdown(cases, args.fit_level.unwrap_or_default(), &|name, done| {
-        progress.show(format_args!("{name}: {done} of {cases}          "));
+        progress.set_message(format!("{name}: {done} of {cases}"));
     });
-    progress.end(format_args!("\r{:60}\r", ""));
+    progress.finish_and_clear();
     if args.write || args.check {
         return PAGE.renew(&tables, args.check);
     }

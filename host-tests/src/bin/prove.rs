@@ -4,10 +4,11 @@
 //! `--write` puts these figures into `docs/model.md`, `--check` fails where they are stale there.
 
 use clap::Parser;
+use indicatif::ProgressBar;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use host_tests::program::{Progress, ended};
+use host_tests::program::ended;
 use host_tests::prove::random::{self, reference_tip};
 use host_tests::prove::tally::{self, Tally};
 use host_tests::prove::{exact, reference};
@@ -82,9 +83,9 @@ fn main() -> ExitCode {
 /// Judges functions and prints how they did; the section's title and its tallies.
 fn judged(title: &str, judge: impl FnOnce(exact::Progress<'_>) -> Vec<Tally>) -> (String, Vec<Tally>) {
     println!("{title}");
-    let progress = Progress::begin();
-    let tallies = judge(&|done, of| progress.show(format_args!("  {done} of {of}   ")));
-    progress.end("\r");
+    let progress = ProgressBar::new_spinner();
+    let tallies = judge(&|done, of| progress.set_message(format!("{done} of {of}")));
+    progress.finish_and_clear();
     tallies.iter().for_each(|tally| println!("  {tally}"));
     (title.to_owned(), tallies)
 }

@@ -1,6 +1,7 @@
 //! Counting inputs and keeping the worst, over all cores.
 
 use crate::page::Page;
+use indicatif::HumanCount;
 use std::fmt;
 use std::fmt::Write as _;
 use std::ops::Range;
@@ -125,30 +126,18 @@ pub fn markdown(sections: &[(String, Vec<Tally>)]) -> String {
         for tally in tallies {
             let rounded = if tally.nearest == tally.inputs { "*" } else { "" };
             let (worst, claimed) = (number(tally.worst_ulp.abs()), number(tally.bound_ulp));
-            let _ = writeln!(text, "| {} | {} | {worst}{rounded} | {claimed} |", tally.name, thousands(tally.inputs));
+            let _ = writeln!(text, "| {} | {} | {worst}{rounded} | {claimed} |", tally.name, HumanCount(tally.inputs));
         }
     }
     let inputs = sections.iter().flat_map(|(_, tallies)| tallies).map(|tally| tally.inputs).sum();
-    let _ = writeln!(text, "\n{} results in all.", thousands(inputs));
+    let _ = writeln!(text, "\n{} results in all.", HumanCount(inputs));
     text
 }
 
 /// Whole units as they are, anything else to 4 digits after the point. Rounded up: a worst case must not look better
 /// than it is.
 fn number(ulp: f64) -> String {
-    if ulp == ulp.trunc() { thousands(ulp as u64) } else { format!("{:.4}", (ulp * 1e4).ceil() / 1e4) }
-}
-
-fn thousands(number: u64) -> String {
-    let digits = number.to_string();
-    let mut text = String::new();
-    for (place, digit) in digits.char_indices() {
-        if place > 0 && (digits.len() - place).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
+    if ulp == ulp.trunc() { HumanCount(ulp as u64).to_string() } else { format!("{:.4}", (ulp * 1e4).ceil() / 1e4) }
 }
 
 #[cfg(test)]

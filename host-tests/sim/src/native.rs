@@ -10,7 +10,7 @@ pub mod served;
 
 use crate::effects::link::{self, Stages as _};
 use crate::effects::sensor::{Readout, Stages as _};
-use crate::effects::{self, Family, Named, Parts, Set};
+use crate::effects::{Named, Parts, Set};
 use crate::host::{Host, Reading};
 use crate::mechanics::Bridge;
 use crate::mechanics::contact::Place;
@@ -27,7 +27,7 @@ use fingertip::frame::Sense;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{COLUMNS, Calibration, Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
 use fingertip::units::{Celsius, Duty};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 use twox_hash::xxhash3_128::Hasher;
 
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -108,53 +108,6 @@ struct Board<E: Set> {
     runs: bool,
     /// Gains and mask of the taxels of the first finger.
     calibration: Option<watch::Gains>,
-    times: StageTimes,
-}
-
-/// Wall time of the stages of a frame. One of [`TIMED`] frames is timed, as reading the clock takes time itself.
-#[derive(Clone, Copy, Debug, Default)]
-struct StageTimes {
-    frames: u64,
-    since: Option<Instant>,
-    spent: [Duration; 4],
-}
-
-/// Frames for each timed one.
-const TIMED: u64 = 64;
-/// Stages of a frame, and the families of the effects whose time is not counted with each: it has its own row.
-const STAGES: [(&str, &[Family]); 4] = [
-    ("motion", &[effects::CONTACT, effects::DRIVE]),
-    ("readout", &[effects::SENSOR]),
-    ("control step", &[]),
-    ("truth and metrics", &[]),
-];
-
-impl StageTimes {
-    fn begin(&mut self) {
-        self.frames += 1;
-        self.since = (self.frames % TIMED == 1).then(Instant::now);
-    }
-
-    /// Ends a stage: the next one begins.
-    fn end(&mut self, stage: usize) {
-        if let Some(since) = &mut self.since {
-            let now = Instant::now();
-            self.spent[stage] += now - *since;
-            *since = now;
-        }
-    }
-
-    /// Time of each stage without that of its effects.
-    fn costs(&self, effects: &[Cost]) -> Vec<Cost> {
-        let share = self.frames as f64 / self.frames.div_ceil(TIMED).max(1) as f64;
-        let of = |((name, families), spent): (&(&'static str, &[Family]), Duration)| {
-            let among =
-                |cost: &&Cost| families.iter().any(|family| family.effects.iter().any(|e| e.name == cost.effect));
-            let theirs_s: f64 = effects.iter().filter(among).map(|cost| cost.seconds).sum();
-            Cost { effect: name, evaluations: 0, seconds: (spent.as_secs_f64() * share - theirs_s).max(0.0) }
-        };
-        STAGES.iter().zip(self.spent).map(of).collect()
-    }
 }
 
 impl<E: Set> Board<E> {
@@ -208,7 +161,6 @@ impl<E: Set> Board<E> {
             digest: Digest::new(),
             runs: false,
             calibration: None,
-            times: StageTimes::default(),
         })
     }
 
@@ -216,13 +168,11 @@ impl<E: Set> Board<E> {
         self.tare(watch);
         let set_up_s = started.elapsed().as_secs_f64();
         self.run(scene, watch);
-        let ledger = self.costs(scene);
         Ok(Summary {
             virtual_s: self.time_s(),
             set_up_s,
             wall_s: started.elapsed().as_secs_f64() - set_up_s,
-            stages: self.times.costs(&ledger),
-            ledger,
+            ledger: self.costs(scene),
             digest: self.digest.hex(),
         })
     }
@@ -264,7 +214,6 @@ impl<E: Set> Board<E> {
 
     /// Scans one frame of each finger and takes its control step.
     fn frame(&mut self, watch: &mut dyn Watch) {
-        self.times.begin();
         self.scan();
         for finger in 0..self.units.len() {
             self.control(finger, watch);
@@ -293,9 +242,7 @@ impl<E: Set> Board<E> {
         }
         let sense = self.sense(finger, silent_ms);
         let unit = &mut self.units[finger];
-        self.times.end(1);
         let (duty, status) = unit.pipeline.step(&unit.frame, &sense, &unit.command);
-        self.times.end(2);
         unit.next = Bridge::of(status);
         if self.runs {
             unit.host.read(time_s, || Reading::of(status), &mut unit.link);
@@ -304,7 +251,6 @@ impl<E: Set> Board<E> {
         let truth = self.world.truth(finger, watch.wants_pressures(finger, time_s));
         let (frame, sense, command, status) = (&unit.frame, &sense, &unit.command, &status);
         watch.step(&Step { finger, time_s, frame, sense, command, status, truth: &truth });
-        self.times.end(3);
     }
 
     /// Returns the cost of each effect in the order of the scene, over all fingers and stages.
@@ -347,9 +293,7 @@ impl<E: Set> Board<E> {
             for part in 0..parts as usize {
                 self.world.advance(begun_s + part as f64 * part_s, part_s, &self.bridges);
             }
-            self.times.end(0);
             self.sample(from..from + count, slot_s);
-            self.times.end(1);
             from += count;
         }
     }

@@ -157,15 +157,13 @@ pub fn by_effect(scene: &Scene, all: &[Cost]) -> Vec<Cost> {
     scene.effects.iter().map(|named| of(named.effect.name)).collect()
 }
 
-/// Returns each effect with its calls, time and share of the run in percent, then the stages and the rest of the run.
+/// Returns each effect with its calls, time and share of the run in percent, then the rest of the run.
 pub fn ledger_rows(summary: &Summary) -> Vec<(&'static str, Option<u64>, f64, f64)> {
     let percent = |seconds: f64| if summary.wall_s > 0.0 { 100.0 * seconds / summary.wall_s } else { 0.0 };
     let effects = summary.ledger.iter();
     let effects = effects.map(|cost| (cost.effect, Some(cost.evaluations), cost.seconds, percent(cost.seconds)));
-    let stages = summary.stages.iter().map(|cost| (cost.effect, None, cost.seconds, percent(cost.seconds)));
-    let known = summary.ledger.iter().chain(&summary.stages);
-    let rest_s = (summary.wall_s - known.map(|cost| cost.seconds).sum::<f64>()).max(0.0);
-    effects.chain(stages).chain([("everything else", None, rest_s, percent(rest_s))]).collect()
+    let rest_s = (summary.wall_s - summary.ledger.iter().map(|cost| cost.seconds).sum::<f64>()).max(0.0);
+    effects.chain([("everything else", None, rest_s, percent(rest_s))]).collect()
 }
 
 /// Returns the ledger for scripts, without the rest of the run.

@@ -115,8 +115,6 @@ pub struct Summary {
     pub wall_s: f64,
     /// Cost of each effect, in the order of the scene.
     pub ledger: Vec<Cost>,
-    /// Wall time of each stage of a frame without its effects; empty if the board does not measure it.
-    pub stages: Vec<Cost>,
     /// XXH3 of 128 bits over every frame, sense, command, duty and status of the run, in order.
     pub digest: String,
 }

@@ -147,7 +147,6 @@ impl Boards {
             set_up_s: self.set_up.as_secs_f64(),
             wall_s: begun.elapsed().as_secs_f64(),
             ledger: sim::run::by_effect(scene, &costs),
-            stages: Vec::new(),
             digest: digests.join(" "),
         })
     }

@@ -1,7 +1,7 @@
 //! Native board: the core on the host in a closed loop with the world.
 //!
 //! A frame has [`SLOTS`] slots. Each row is sampled at its own time while the world moves, and the duty of a frame acts
-//! three slots after its end. Virtual time is exact, so a run is the same at any time of the day.
+//! three slots after its end. Virtual time is exact.
 
 pub mod bench;
 #[cfg(feature = "calibrated")]
@@ -46,7 +46,8 @@ pub fn board(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, RunError> 
 
 /// Runs a scene with the effects that it names.
 pub fn simulate(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, SimError> {
-    simulate_from(scene, Begun::default(), watch)
+    let started = Instant::now();
+    Board::<Named>::new(scene)?.whole(scene, started, watch)
 }
 
 /// Runs a scene as [`simulate`], with gains of the taxels of the first finger, Q14.
@@ -55,25 +56,10 @@ pub fn simulate_calibrated(
     gains: &fingertip::shipped::Gains,
     watch: &mut dyn Watch,
 ) -> Result<Summary, SimError> {
-    let mut board = Board::<Named>::new(scene, Begun::default())?;
+    let mut board = Board::<Named>::new(scene)?;
     board.units[0].pipeline.calibrate(&Calibration::of(gains));
     board.calibration = Some(watch::Gains { gains_q14: *gains.rows(), masks: [0; ROWS] });
     board.whole(scene, Instant::now(), watch)
-}
-
-/// Time at the start of a run.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Begun {
-    /// Clock of the board. It changes no result.
-    pub clock_s: f64,
-    /// Time of the scene once the fingers are tared: everything before it is left out.
-    pub scene_s: f64,
-}
-
-/// Runs a scene from another time on.
-pub fn simulate_from(scene: &Scene, begun: Begun, watch: &mut dyn Watch) -> Result<Summary, SimError> {
-    let started = Instant::now();
-    Board::<Named>::new(scene, begun)?.whole(scene, started, watch)
 }
 
 /// Controller of a finger, and everything between it and the world.
@@ -100,7 +86,6 @@ struct Board<E: Set> {
     params: fingertip::params::Params,
     clock: Clock,
     start: Clock,
-    begun: Begun,
     slot_s: f64,
     longest_s: f64,
     digest: Digest,
@@ -111,16 +96,15 @@ struct Board<E: Set> {
 }
 
 impl<E: Set> Board<E> {
-    fn new(scene: &Scene, begun: Begun) -> Result<Self, SimError> {
+    fn new(scene: &Scene) -> Result<Self, SimError> {
         let config = Config::shipped(&scene.params()).map_err(SimError::Controller)?;
         let fingers = 0..scene.table("hand").whole("fingers") as usize;
-        Self::of(scene, begun, &config, &scene.setup(), fingers.map(|finger| E::of(scene, finger)))
+        Self::of(scene, &config, &scene.setup(), fingers.map(|finger| E::of(scene, finger)))
     }
 
     /// Builds the board from these parts, a finger for each.
     fn of(
         scene: &Scene,
-        begun: Begun,
         config: &Config,
         setup: &Setup,
         fingers: impl Iterator<Item = Parts<E>>,
@@ -153,9 +137,8 @@ impl<E: Set> Board<E> {
             units,
             bridges,
             params: config.params,
-            clock: Clock::from_start(begun.clock_s),
+            clock: Clock::default(),
             start: Clock::default(),
-            begun,
             slot_s,
             longest_s,
             digest: Digest::new(),
@@ -184,7 +167,6 @@ impl<E: Set> Board<E> {
         let tare_frames = TARE_FRAMES + 2;
         self.start = self.clock;
         self.start.go_on(f64::from(tare_frames) * self.slot_s * SLOTS as f64);
-        self.start.go_back(self.begun.scene_s);
         for unit in &mut self.units {
             unit.command.tare_request = 1;
         }
@@ -192,7 +174,6 @@ impl<E: Set> Board<E> {
             self.frame(watch);
         }
         self.start = self.clock;
-        self.start.go_back(self.begun.scene_s);
     }
 
     fn run(&mut self, scene: &Scene, watch: &mut dyn Watch) {
@@ -363,10 +344,6 @@ impl Clock {
 
     pub fn go_on(&mut self, seconds: f64) {
         self.0 += units(seconds);
-    }
-
-    pub fn go_back(&mut self, seconds: f64) {
-        self.0 -= Self::from_start(seconds).0;
     }
 
     /// Returns the time from another instant to this one; negative if this one is earlier.

@@ -4,7 +4,7 @@
 
 use crate::effects::Set;
 use crate::mechanics::{Bridge, Finger};
-use crate::native::{Begun, Board, SimError, Unit};
+use crate::native::{Board, SimError, Unit};
 use crate::plant::{Faults, Reference};
 use crate::scene::{Scene, read};
 use crate::setup::Setup;
@@ -31,12 +31,12 @@ const REST_STEP_S: f64 = 0.02;
 impl<E: Set> Bench<E> {
     /// Creates the bench at rest, torque off, not tared.
     pub fn new(scene: &Scene) -> Result<Self, SimError> {
-        Ok(Self::around(Board::new(&scene.without_events(), Begun::default())?))
+        Ok(Self::around(Board::new(&scene.without_events())?))
     }
 
     /// Replaces the world around the finger. Controller, tip and array keep the memory of their effects.
     pub fn exchange(&mut self, scene: &Scene) -> Result<(), SimError> {
-        let mut before = core::mem::replace(&mut self.board, Board::new(&scene.without_events(), Begun::default())?);
+        let mut before = core::mem::replace(&mut self.board, Board::new(&scene.without_events())?);
         let now = &mut self.board;
         (now.clock, now.start, now.bridges) = (before.clock, before.start, before.bridges);
         let finger = &mut now.world.fingers_mut()[0];
@@ -220,7 +220,7 @@ impl Bench {
     pub fn of(setup: &Setup, config: &Config) -> Self {
         let scene = read("plant", SCENE, &[]).expect("the plant's scene is one");
         let parts = core::iter::once(Reference::parts(setup));
-        let board = Board::of(&scene, Begun::default(), config, setup, parts);
+        let board = Board::of(&scene, config, setup, parts);
         Self::around(board.unwrap_or_else(|error| panic!("{error}")))
     }
 

@@ -7,7 +7,7 @@
 
 use crate::effects::Set;
 use crate::mechanics::Bridge;
-use crate::native::{Begun, Board, SimError};
+use crate::native::{Board, SimError};
 use crate::scene::Scene;
 use crate::watch::Truth;
 use crate::world::World;
@@ -62,7 +62,7 @@ struct Device {
 impl<E: Set> Bus<E> {
     /// Powers the fingers on: torque off, not tared, nothing stored but the values of the scene.
     pub fn new(scene: &Scene) -> Result<Self, SimError> {
-        let board = Board::<E>::new(&scene.without_events(), Begun::default())?;
+        let board = Board::<E>::new(&scene.without_events())?;
         let device = |finger: usize| {
             let flash = Record { id: 1 + finger as u8, params: board.params, ..Record::DEFAULT };
             Device::new(flash, ResetCause::PowerOn, 0.0)

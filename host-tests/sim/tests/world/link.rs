@@ -1,14 +1,13 @@
 //! Each effect of clock, bus and host against its closed form, the host that repeats its command, and virtual time.
 
-use crate::{Last, parts, run, scene, world};
+use crate::{parts, run, scene, world};
 use fingertip::shipped::{COLUMNS, SLOTS};
 use sim::effects::link::Stages;
 use sim::effects::{Named, sensor::Stages as _, stream};
 use sim::host::Host;
 use sim::mechanics::Bridge;
-use sim::native::{Begun, Clock, simulate_from};
+use sim::native::Clock;
 use sim::scene::Scene;
-use sim::watch::{Step, Truth, Watch};
 use sim::world::World;
 
 fn long_scene(tables: &str) -> Scene {
@@ -166,52 +165,6 @@ fn a_step_that_is_no_whole_number_of_units_counts_as_the_nearest() {
     for (units, counted) in [(2.9, 3.0), (3.1, 3.0)] {
         assert_eq!(after(1_000, units / 21e15), after(1, 1_000.0 * counted / 21e15));
     }
-}
-
-#[test]
-fn a_run_is_the_same_at_any_hour() {
-    let scene =
-        scene("duration_s = 0.4\n[[script]]\nat_s = 0.01\ngoal_n = 1.0\n[effects.noise]\n[effects.relaxation]\n");
-    let run = |clock_s| simulate_from(&scene, Begun { clock_s, scene_s: 0.0 }, &mut Last::default()).unwrap();
-    assert_eq!(run(0.0).digest, run(DAY_S).digest);
-}
-
-/// Forces (N), places of the object (mm) and winding temperature (degC) at each step.
-#[derive(Default)]
-struct Truths(Vec<[f64; 5]>);
-
-impl Watch for Truths {
-    fn step(&mut self, step: &Step) {
-        let Truth { force_n, tangential_n, object_mm, winding_c, .. } = *step.truth;
-        self.0.push([force_n, tangential_n, object_mm[0], object_mm[1], winding_c]);
-    }
-}
-
-/// Effects that depend on the time.
-const BY_TIME: &str = "[effects.settling]\n[effects.creep]\n[effects.relaxation]\n[effects.thermal_derating]\n[effects.object_mass]\n\
-    [effects.tangential]\n[effects.dry_friction]\n";
-
-#[test]
-fn what_a_script_asks_for_after_a_day_goes_as_at_the_start() {
-    let truths = |scene_s: f64| {
-        let [first_s, second_s, end_s] = [0.01, 0.3, 0.5].map(|at_s| scene_s + at_s);
-        let text = format!(
-            "duration_s = {end_s:?}\n[object]\ndistance_mm = 2.0\n[[script]]\nat_s = {first_s:?}\ngoal_n = 1.0\n\
-             [[script]]\nat_s = {second_s:?}\ngoal_n = 2.0\n[hand]\nfingers = 2\nlift_mm = 2.0\nlift_at_s = {second_s:?}\nlift_s = 0.1\n{BY_TIME}"
-        );
-        let mut truths = Truths::default();
-        simulate_from(&scene(&text), Begun { clock_s: 0.0, scene_s }, &mut truths).unwrap();
-        truths.0
-    };
-    let (early, late) = (truths(0.0), truths(DAY_S));
-    assert_eq!(early.len(), late.len());
-    let worst = |of: usize| early.iter().zip(&late).map(|(a, b)| (a[of] - b[of]).abs()).fold(0.0, f64::max);
-    let most = |of: usize| early.iter().map(|truth| truth[of]).fold(0.0, f64::max);
-    println!("{:?} of {:?}", [0, 1, 2, 3, 4].map(worst), [0, 1, 2, 3, 4].map(most));
-    // Behind a day's seconds a number has 36 bits left, steps of 15 ps: the lifting hand goes 6e-10 mm in one, a
-    // thousand times.
-    assert!([1e-9, 1e-8, 1e-9, 1e-7, 1e-9].into_iter().enumerate().all(|(of, least)| worst(of) < least));
-    assert!(most(0) > 1.5 && most(3) > 1.5);
 }
 
 #[test]

@@ -4,8 +4,8 @@
 //! keeps the goals, the world at every frame, and the array at the end of each hold.
 
 use crate::mechanics::rotor::profile;
-use crate::metrics::{self, Meter, newtons};
-use crate::run::RunError;
+use crate::metrics::{self, Meter, newtons, shown};
+use crate::run::{RunError, asked};
 use crate::scene::{self, Scene, read};
 use crate::setup::Setup;
 use crate::watch::{Controller, Step, Watch};
@@ -376,9 +376,10 @@ fn steady_mn(goal_n: f64) -> f64 {
 pub fn table(checks: &[Check], forces: &Forces) -> String {
     let mut text = format!("{:<44} {:>12} {:<5} {:>16}\n", "", "measured", "", "bound");
     for check in checks {
-        let measured = check.measured.map_or_else(|| "never".to_owned(), number);
+        let measured = check.measured.map_or_else(|| "never".to_owned(), |value| shown(Some(value)));
         let verdict = if check.pass { "pass" } else { "FAIL" };
-        let _ = writeln!(text, "{:<44} {measured:>12} {:<5} {:>16}  {verdict}", check.name, check.unit, bound(check));
+        let bound = asked(check.at_least, check.at_most);
+        let _ = writeln!(text, "{:<44} {measured:>12} {:<5} {bound:>16}  {verdict}", check.name, check.unit);
     }
     let _ = writeln!(text);
     for step in &forces.steps {
@@ -392,21 +393,6 @@ pub fn table(checks: &[Check], forces: &Forces) -> String {
         );
     }
     text
-}
-
-fn bound(check: &Check) -> String {
-    match (check.at_least, check.at_most) {
-        (Some(least), Some(most)) => format!("{} to {}", number(least), number(most)),
-        (Some(least), None) => format!("at least {}", number(least)),
-        (None, Some(most)) => format!("at most {}", number(most)),
-        (None, None) => String::new(),
-    }
-}
-
-/// Rounds to three decimals.
-fn number(value: f64) -> String {
-    let rounded = (value * 1e3).round() / 1e3 + 0.0;
-    format!("{rounded}")
 }
 
 /// Time shown before and after the goal of a step.

@@ -17,12 +17,14 @@
 //! alike. So a finger that has advanced by x since its force settled reduces its goal by centre_n_per_mm x, and a
 //! finger that was pushed back increases its goal.
 
-use crate::effects::link::Stages;
 use crate::events::{self, Request};
 use crate::scene::tables::Values;
 use crate::scene::{Goal, Scene};
 use fingertip::pipeline::Status;
 use std::collections::VecDeque;
+
+/// Link of the host to the board: time of arrival for a time of sending, s; none if the packet is lost.
+pub type Pass<'a> = &'a mut dyn FnMut(f64) -> Option<f64>;
 
 #[derive(Clone, Debug, Default)]
 pub struct Host {
@@ -75,25 +77,25 @@ impl Host {
     }
 
     /// Returns the goal that has arrived at the controller by a time. Times never fall.
-    pub fn goal_n(&mut self, time_s: f64, stages: &mut impl Stages) -> f64 {
-        while self.arrival(time_s, stages).is_some() {}
+    pub fn goal_n(&mut self, time_s: f64, pass: Pass) -> f64 {
+        while self.arrival(time_s, pass).is_some() {}
         self.arrived_n
     }
 
     /// Reads the controller when a reading is due. The reading arrives later, or not at all. Times never fall.
-    pub fn read(&mut self, time_s: f64, reading: impl FnOnce() -> Reading, stages: &mut impl Stages) {
-        if let Some(asked_s) = self.ask(time_s, time_s, stages) {
+    pub fn read(&mut self, time_s: f64, reading: impl FnOnce() -> Reading, pass: Pass) {
+        if let Some(asked_s) = self.ask(time_s, time_s, pass) {
             self.hear(asked_s + READ_S, reading());
         }
     }
 
     /// Requests a reading that is due by a time, at `now_s` or when it is due, whichever is later. Returns the arrival
     /// of the request at the controller; none if nothing is due or the request is lost. Times never fall.
-    pub fn ask(&mut self, now_s: f64, until_s: f64, stages: &mut impl Stages) -> Option<f64> {
+    pub fn ask(&mut self, now_s: f64, until_s: f64, pass: Pass) -> Option<f64> {
         let reader = self.reader.as_mut().filter(|reader| reader.read_s <= until_s)?;
         let at_s = reader.read_s.max(now_s);
         reader.read_s = at_s + reader.period_s;
-        stages.pass(at_s)
+        pass(at_s)
     }
 
     /// Receives a reading. It is judged at this time.
@@ -104,8 +106,8 @@ impl Host {
     }
 
     /// Returns the next packet that arrives by a time, with its goal. Times never fall.
-    pub fn arrival(&mut self, time_s: f64, stages: &mut impl Stages) -> Option<(f64, f64)> {
-        self.judge(time_s, stages);
+    pub fn arrival(&mut self, time_s: f64, pass: Pass) -> Option<(f64, f64)> {
+        self.judge(time_s, pass);
         loop {
             let goal = self.script.get(self.next).filter(|goal| goal.at_s <= self.send_s);
             let at_s = goal.map_or(self.send_s, |goal| goal.at_s);
@@ -116,7 +118,7 @@ impl Host {
                 self.goal_n = goal.goal_n;
                 self.next += 1;
             }
-            self.send(at_s, stages);
+            self.send(at_s, pass);
         }
         let packet = self.flying.pop_front_if(|(at_s, _)| *at_s <= time_s)?;
         (self.arrived_s, self.arrived_n) = packet;
@@ -139,17 +141,17 @@ impl Host {
         ((time_s - self.arrived_s).max(0.0) * 1e3) as u16
     }
 
-    fn judge(&mut self, time_s: f64, stages: &mut impl Stages) {
+    fn judge(&mut self, time_s: f64, pass: Pass) {
         while let Some(reader) = &mut self.reader
             && let Some((at_s, reading)) = reader.answers.pop_front_if(|(at_s, _)| *at_s <= time_s)
         {
             if reader.grip.judge(self.goal_n, &reading) {
-                self.send(at_s, stages);
+                self.send(at_s, pass);
             }
         }
     }
 
-    fn send(&mut self, at_s: f64, stages: &mut impl Stages) {
+    fn send(&mut self, at_s: f64, pass: Pass) {
         self.sent += 1;
         // Counting repetitions avoids the drift of a sum of periods.
         if at_s != self.send_s {
@@ -159,7 +161,7 @@ impl Host {
         self.send_s = self.said_s + self.repeats as f64 * self.period_s;
         let goal_n = self.reader.as_ref().map_or(self.goal_n, |reader| reader.grip.goal_n(self.goal_n));
         let silent = self.silent(at_s);
-        match stages.pass(at_s).filter(|_| !silent) {
+        match pass(at_s).filter(|_| !silent) {
             Some(arrives_s) => {
                 let last_s = self.flying.back().map_or(arrives_s, |(at_s, _)| *at_s);
                 self.flying.push_back((arrives_s.max(last_s), goal_n));

@@ -8,7 +8,7 @@ pub mod bench;
 pub mod calibrated;
 pub mod served;
 
-use crate::effects::link::{self, Stages as _};
+use crate::effects::link;
 use crate::effects::sensor::{Readout, Stages as _};
 use crate::effects::{Named, Parts, Set};
 use crate::host::{Host, Reading};
@@ -214,7 +214,7 @@ impl<E: Set> Board<E> {
         unit.frame.sequence = unit.frame.sequence.wrapping_add(1);
         let mut silent_ms = 0;
         if self.runs {
-            let goal_n = unit.host.goal_n(time_s, &mut unit.link);
+            let goal_n = unit.host.goal_n(time_s, &mut |sent_s| unit.link.pass(sent_s));
             unit.command.goal = newtons((goal_n * 1e3 + 0.5).floor() as i32);
             silent_ms = unit.host.silent_ms(time_s);
             while let Some(request) = unit.host.request(time_s) {
@@ -226,7 +226,7 @@ impl<E: Set> Board<E> {
         let (duty, status) = unit.pipeline.step(&unit.frame, &sense, &unit.command);
         unit.next = Bridge::of(status);
         if self.runs {
-            unit.host.read(time_s, || Reading::of(status), &mut unit.link);
+            unit.host.read(time_s, || Reading::of(status), &mut |sent_s| unit.link.pass(sent_s));
         }
         self.digest.add(&unit.frame, &sense, &unit.command, duty, status);
         let truth = self.world.truth(finger, watch.wants_pressures(finger, time_s));
@@ -250,9 +250,7 @@ pub const DUTY_DELAY_SLOTS: usize = 3;
 impl<E: Set> Board<E> {
     /// Scans one frame of each finger while the world moves on.
     fn scan(&mut self) {
-        let time_s = self.time_s();
-        let second_s = self.units[0].link.second_s(time_s);
-        let slot_s = self.slot_s * second_s;
+        let slot_s = self.slot_s * self.units[0].link.second_s();
         for slot in [0..DUTY_DELAY_SLOTS, DUTY_DELAY_SLOTS..SLOTS] {
             if slot.start == DUTY_DELAY_SLOTS {
                 for (bridge, unit) in self.bridges.iter_mut().zip(&self.units) {

@@ -27,7 +27,7 @@ use fingertip::params::Params;
 use fingertip::shipped::{Config, Record, TARE_FRAMES, address};
 use host::{Host, Shown};
 use rigless::soc::Width;
-use sim::effects::link::{self, Stages as _};
+use sim::effects::link;
 use sim::effects::{Named, Set as _};
 use sim::scene::Scene;
 use sim::watch::{Controller, Summary, Watch};
@@ -110,7 +110,7 @@ impl Boards {
         loop {
             let time_s = self.clock.time_s(self.now_ns);
             if time_s < scene.duration_s {
-                let second_s = self.clock_link.second_s(time_s);
+                let second_s = self.clock_link.second_s();
                 self.clock.run_at(self.now_ns, second_s);
                 for (number, rig) in self.rigs.iter_mut().enumerate() {
                     let wants = watch.wants_pressures(number, time_s);

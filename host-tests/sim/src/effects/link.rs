@@ -8,33 +8,20 @@ use fingertip::link::packet::{CRC_START, HEADER, instruction, update_crc};
 /// Effect on packets from the host: time of arrival for a time of sending, s; none if the packet is lost.
 pub type Packets = dyn FnMut(f64) -> Option<f64> + Send;
 
-/// Stages as the board and the host call them: of the named effects, or none: `()`.
-pub trait Stages {
-    /// Duration of a second of the controller in the world.
-    fn second_s(&mut self, _time_s: f64) -> f64 {
-        1.0
-    }
-
-    /// Time of arrival of a packet; none if it is lost.
-    fn pass(&mut self, sent_s: f64) -> Option<f64> {
-        Some(sent_s)
-    }
-}
-
-impl Stages for () {}
-
 named! {
     clock: f64,
     packets: Packets,
 }
 
-impl Stages for Named {
+impl Named {
+    /// Duration of a second of the controller in the world.
     #[inline]
-    fn second_s(&mut self, _time_s: f64) -> f64 {
+    pub fn second_s(&mut self) -> f64 {
         self.clock.iter_mut().map(|effect| effect.call(|part| *part)).product()
     }
 
-    fn pass(&mut self, sent_s: f64) -> Option<f64> {
+    /// Time of arrival of a packet; none if it is lost.
+    pub fn pass(&mut self, sent_s: f64) -> Option<f64> {
         self.packets.iter_mut().try_fold(sent_s, |sent_s, effect| effect.call(|part| part(sent_s)))
     }
 }

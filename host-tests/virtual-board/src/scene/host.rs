@@ -224,7 +224,7 @@ impl Host {
 
     fn send(&mut self, now_ns: u64, next_ns: u64, wire: &mut Wire) {
         let until_s = self.clock.time_s(next_ns + GOAL_NS);
-        while let Some((arrives_s, goal_n)) = self.host.arrival(until_s, &mut self.link) {
+        while let Some((arrives_s, goal_n)) = self.host.arrival(until_s, &mut |sent_s| self.link.pass(sent_s)) {
             let goal_mn = (goal_n * 1e3 + 0.5).floor() as i32;
             self.write(self.clock.at_ns(arrives_s), now_ns, Write::Goal(goal_mn), wire);
         }
@@ -233,7 +233,7 @@ impl Host {
         }
         if now_ns >= self.start_ns {
             let (now_s, until_s) = (self.clock.time_s(now_ns), self.clock.time_s(next_ns));
-            if let Some(arrives_s) = self.host.ask(now_s, until_s, &mut self.link) {
+            if let Some(arrives_s) = self.host.ask(now_s, until_s, &mut |sent_s| self.link.pass(sent_s)) {
                 self.asks_ns.push_back(self.clock.at_ns(arrives_s));
             }
         }

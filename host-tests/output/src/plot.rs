@@ -4,6 +4,7 @@
 mod charts;
 
 pub use charts::{Panel, Sample, overview, steps};
+use core::error::Error;
 use core::f64::consts::TAU;
 use fingertip::shipped::{COLUMNS, ROWS};
 use plotters::coord::types::RangedCoordf64;
@@ -13,24 +14,10 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 /// Pressures of the array in kPa, `[row][column]`.
 pub type Pressures = [[f64; COLUMNS]; ROWS];
 
-/// A picture could not be drawn.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PlotError(String);
-
-impl core::fmt::Display for PlotError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "cannot draw: {}", self.0)
-    }
-}
-
-impl core::error::Error for PlotError {}
+/// Reason why a picture could not be drawn.
+pub type PlotError = Box<dyn Error + Send + Sync>;
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
-
-/// Any failure of the library, as ours.
-fn failed(error: impl core::fmt::Display) -> PlotError {
-    PlotError(error.to_string())
-}
 
 const FONT: &str = "sans-serif";
 const LABEL_PX: u32 = 13;
@@ -79,9 +66,9 @@ fn picture(size_px: (u32, u32), draw: impl FnOnce(&Area<'_>) -> Result<(), PlotE
     let mut svg = String::new();
     {
         let area = SVGBackend::with_string(&mut svg, size_px).into_drawing_area();
-        area.fill(&WHITE).map_err(failed)?;
+        area.fill(&WHITE)?;
         draw(&area)?;
-        area.present().map_err(failed)?;
+        area.present()?;
     }
     Ok(with_dark_scheme(&svg))
 }
@@ -139,7 +126,8 @@ impl Curve {
             Self::Dotted(points) => dashes(chart, points, [2, 3], BLACK.stroke_width(FINE)),
             Self::Circles(points) => {
                 let circles = points.iter().map(|point| Circle::new(*point, 4 * FINE, BLACK.stroke_width(FINE)));
-                chart.draw_series(circles).map(drop).map_err(failed)
+                chart.draw_series(circles)?;
+                Ok(())
             }
         }
     }
@@ -148,7 +136,8 @@ impl Curve {
 type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
 fn line(chart: &mut Chart<'_, '_>, points: &[(f64, f64)], style: ShapeStyle) -> Result<(), PlotError> {
-    chart.draw_series(LineSeries::new(points.iter().copied(), style)).map(drop).map_err(failed)
+    chart.draw_series(LineSeries::new(points.iter().copied(), style))?;
+    Ok(())
 }
 
 fn dashes(
@@ -158,7 +147,8 @@ fn dashes(
     style: ShapeStyle,
 ) -> Result<(), PlotError> {
     let line = DashedLineSeries::new(points.iter().copied(), dash * FINE, gap * FINE, style);
-    chart.draw_series(line).map(drop).map_err(failed)
+    chart.draw_series(line)?;
+    Ok(())
 }
 
 #[derive(Clone, Debug)]
@@ -180,14 +170,13 @@ impl Curves<'_> {
     fn draw(&self, area: &Area<'_>) -> Result<(), PlotError> {
         let ([left, right], [low, high]) = (self.x_range, self.y_range);
         // The margin below the title keeps it off the numbers of the axis.
-        let area = area.margin(6 * FINE, 0, 0, 0).titled(&self.title, (FONT, TITLE_PX * FINE)).map_err(failed)?;
+        let area = area.margin(6 * FINE, 0, 0, 0).titled(&self.title, (FONT, TITLE_PX * FINE))?;
         let mut chart = ChartBuilder::on(&area)
             .margin(8 * FINE)
             .margin_right(18 * FINE)
             .x_label_area_size(36 * FINE)
             .y_label_area_size(52 * FINE)
-            .build_cartesian_2d(left..right, low..high)
-            .map_err(failed)?;
+            .build_cartesian_2d(left..right, low..high)?;
         chart
             .configure_mesh()
             .light_line_style(TRANSPARENT)
@@ -201,8 +190,7 @@ impl Curves<'_> {
             .y_label_formatter(&number)
             .y_labels(6)
             .x_labels(10)
-            .draw()
-            .map_err(failed)?;
+            .draw()?;
         self.curves.iter().try_for_each(|curve| curve.draw(&mut chart))
     }
 }
@@ -210,7 +198,7 @@ impl Curves<'_> {
 /// Panels side by side, each of a size.
 pub fn curves(panels: &[Curves<'_>], panel_px: (u32, u32)) -> Result<String, PlotError> {
     if panels.is_empty() {
-        return Err(PlotError("there is no panel".into()));
+        return Err("cannot draw: there is no panel".into());
     }
     fine_picture((panel_px.0 * panels.len() as u32, panel_px.1), |area| {
         let areas = area.split_evenly((1, panels.len()));
@@ -241,7 +229,7 @@ const DOTS: u32 = 60;
 /// Maps side by side, with the scale of their colours.
 pub fn maps(maps: &[Map], pitch_mm: f64) -> Result<String, PlotError> {
     if maps.is_empty() {
-        return Err(PlotError("there is no map".into()));
+        return Err("cannot draw: there is no map".into());
     }
     let peak_kpa = maps.iter().flat_map(|map| map.pressures_kpa.iter().flatten()).copied().fold(1.0, f64::max);
     let full_kpa = (peak_kpa / 10.0).ceil() * 10.0;
@@ -262,8 +250,7 @@ fn draw_map(map: &Map, pitch_mm: f64, full_kpa: f64, area: &Area<'_>) -> Result<
         .caption(&map.title, (FONT, TITLE_PX))
         .x_label_area_size(36)
         .y_label_area_size(44)
-        .build_cartesian_2d(-half_mm..half_mm, -half_mm..half_mm)
-        .map_err(failed)?;
+        .build_cartesian_2d(-half_mm..half_mm, -half_mm..half_mm)?;
     let squares = map.pressures_kpa.iter().enumerate().flat_map(|(row, line)| {
         line.iter().enumerate().map(move |(column, kpa)| {
             let corner = |place: usize| place as f64 * pitch_mm - half_mm;
@@ -271,7 +258,7 @@ fn draw_map(map: &Map, pitch_mm: f64, full_kpa: f64, area: &Area<'_>) -> Result<
             Rectangle::new(corners, ink(kpa / full_kpa).filled())
         })
     });
-    chart.draw_series(squares).map_err(failed)?;
+    chart.draw_series(squares)?;
     if map.radius_mm > 0.0 {
         let dot = |n: u32| {
             let angle = TAU * f64::from(n) / f64::from(DOTS);
@@ -279,7 +266,7 @@ fn draw_map(map: &Map, pitch_mm: f64, full_kpa: f64, area: &Area<'_>) -> Result<
             (x + map.radius_mm * angle.cos(), y + map.radius_mm * angle.sin())
         };
         let inside = (0..DOTS).map(dot).filter(|(x, y)| x.abs() <= half_mm && y.abs() <= half_mm);
-        chart.draw_series(inside.map(|at| Circle::new(at, 1, BLACK.filled()))).map_err(failed)?;
+        chart.draw_series(inside.map(|at| Circle::new(at, 1, BLACK.filled())))?;
     }
     chart
         .configure_mesh()
@@ -291,8 +278,8 @@ fn draw_map(map: &Map, pitch_mm: f64, full_kpa: f64, area: &Area<'_>) -> Result<
         .y_label_formatter(&number)
         .x_labels(5)
         .y_labels(5)
-        .draw()
-        .map_err(failed)
+        .draw()?;
+    Ok(())
 }
 
 fn draw_scale(full_kpa: f64, area: &Area<'_>) -> Result<(), PlotError> {
@@ -302,14 +289,13 @@ fn draw_scale(full_kpa: f64, area: &Area<'_>) -> Result<(), PlotError> {
         .caption("kPa", (FONT, LABEL_PX))
         .x_label_area_size(36)
         .y_label_area_size(44)
-        .build_cartesian_2d(0.0..1.0, 0.0..full_kpa)
-        .map_err(failed)?;
+        .build_cartesian_2d(0.0..1.0, 0.0..full_kpa)?;
     let step = |n: u32| {
         let share = |n: u32| f64::from(n) / f64::from(SCALE_STEPS);
         let corners = [(0.0, share(n) * full_kpa), (1.0, share(n + 1) * full_kpa)];
         Rectangle::new(corners, ink(share(n)).filled())
     };
-    chart.draw_series((0..SCALE_STEPS).map(step)).map_err(failed)?;
+    chart.draw_series((0..SCALE_STEPS).map(step))?;
     chart
         .configure_mesh()
         .disable_mesh()
@@ -318,8 +304,8 @@ fn draw_scale(full_kpa: f64, area: &Area<'_>) -> Result<(), PlotError> {
         .x_labels(0)
         .y_labels(6)
         .y_label_formatter(&number)
-        .draw()
-        .map_err(failed)
+        .draw()?;
+    Ok(())
 }
 
 /// The ink for the largest pressure, more transparent for less.
@@ -385,8 +371,7 @@ pub fn front(front: &Front<'_>) -> Result<String, PlotError> {
             .caption(title, (FONT, TITLE_PX))
             .x_label_area_size(42)
             .y_label_area_size(66)
-            .build_cartesian_2d((x_low..x_high).log_scale(), (y_low..y_high).log_scale())
-            .map_err(failed)?;
+            .build_cartesian_2d((x_low..x_high).log_scale(), (y_low..y_high).log_scale())?;
         chart
             .configure_mesh()
             .light_line_style(TRANSPARENT)
@@ -396,12 +381,11 @@ pub fn front(front: &Front<'_>) -> Result<String, PlotError> {
             .y_desc(*y)
             .x_label_formatter(&power)
             .y_label_formatter(&|value| if has_zero && *value < 2.0 * y_low { "0".into() } else { power(value) })
-            .draw()
-            .map_err(failed)?;
+            .draw()?;
         let place = |dot: &Dot| (dot.x.max(x_low), dot.y.max(y_low));
         let stairs = stairs(dots, place);
         let line: Vec<_> = stairs.iter().map(|at| chart.backend_coord(at)).collect();
-        chart.draw_series(LineSeries::new(stairs, INK.stroke_width(1))).map_err(failed)?;
+        chart.draw_series(LineSeries::new(stairs, INK.stroke_width(1)))?;
         let places: Vec<_> = dots.iter().map(|dot| chart.backend_coord(&place(dot))).collect();
         let corners = [chart.backend_coord(&(x_low, y_high)), chart.backend_coord(&(x_high, y_low))];
         draw_dots(area, dots, &places, &line, corners)
@@ -412,7 +396,7 @@ pub fn front(front: &Front<'_>) -> Result<String, PlotError> {
 fn range(values: impl Iterator<Item = f64>) -> Result<(f64, f64), PlotError> {
     let (low, high) = values.fold((f64::INFINITY, 0.0_f64), |(low, high), value| (low.min(value), high.max(value)));
     if low > high {
-        return Err(PlotError("there is no point".into()));
+        return Err("cannot draw: there is no point".into());
     }
     Ok((0.2 * low, 4.0 * high))
 }
@@ -504,32 +488,32 @@ fn draw_dots(
         let found = [(&others[..], Some(&leaders[..])), (&[], Some(&leaders)), (&[], None)]
             .into_iter()
             .find_map(|(others, lines)| free_place(at, half, &taken, lines, others, &frame));
-        let (far, middle) = found.ok_or_else(|| PlotError(format!("no room for the label {}", dot.label)))?;
+        let (far, middle) = found.ok_or_else(|| format!("cannot draw: no room for the label {}", dot.label))?;
         let label = Box4::around(middle.0, middle.1, half.0, half.1);
         if far > FAR_PX {
             let end = label.nearest(at);
             let line = vec![places[n], (end.0 as i32, end.1 as i32)];
-            area.draw(&PathElement::new(line, BLACK.mix(0.5).stroke_width(1))).map_err(failed)?;
+            area.draw(&PathElement::new(line, BLACK.mix(0.5).stroke_width(1)))?;
             leaders.push((at, end));
         }
         if dot.own {
             let Box4([left, up, right, down]) = label;
             let corners = [(left as i32, up as i32), (right as i32, down as i32)];
-            area.draw(&Rectangle::new(corners, BLACK.stroke_width(1))).map_err(failed)?;
+            area.draw(&Rectangle::new(corners, BLACK.stroke_width(1)))?;
         }
         let text = Text::new(dot.label.clone(), (middle.0 as i32, middle.1 as i32), style.clone());
-        area.draw(&text).map_err(failed)?;
+        area.draw(&text)?;
         taken.push(label);
     }
     for (dot, (x, y)) in dots.iter().zip(places) {
         let fill = if dot.best { INK.filled() } else { WHITE.filled() };
         if dot.own {
             let corners = [(x - 5, y - 5), (x + 5, y + 5)];
-            area.draw(&Rectangle::new(corners, fill)).map_err(failed)?;
-            area.draw(&Rectangle::new(corners, INK.stroke_width(2))).map_err(failed)?;
+            area.draw(&Rectangle::new(corners, fill))?;
+            area.draw(&Rectangle::new(corners, INK.stroke_width(2)))?;
         } else {
-            area.draw(&Circle::new((*x, *y), 4, fill)).map_err(failed)?;
-            area.draw(&Circle::new((*x, *y), 4, INK.stroke_width(1))).map_err(failed)?;
+            area.draw(&Circle::new((*x, *y), 4, fill))?;
+            area.draw(&Circle::new((*x, *y), 4, INK.stroke_width(1)))?;
         }
     }
     Ok(())

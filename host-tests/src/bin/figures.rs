@@ -3,7 +3,7 @@
 use host_tests::figures;
 use std::{env, error::Error, fs, path::PathBuf};
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
     let folder = PathBuf::from(env::args_os().nth(1).ok_or("usage: figures FOLDER")?);
     fs::create_dir_all(&folder)?;
     for (name, svg) in figures::all()? {

@@ -1,6 +1,6 @@
 //! Charts over time: the whole run, and each change of the goal at a larger scale.
 
-use super::{Area, Curve, Curves, FINE, FONT, LABEL_PX, PlotError, failed, fine_picture};
+use super::{Area, Curve, Curves, FINE, FONT, LABEL_PX, PlotError, fine_picture};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
@@ -40,7 +40,7 @@ pub struct Panel<'a> {
 
 /// Force against goal, indentation and duty over the whole run.
 pub fn overview(trace: &[Sample]) -> Result<String, PlotError> {
-    let end_s = trace.last().ok_or_else(|| PlotError("the trace is empty".into()))?.time_s;
+    let end_s = trace.last().ok_or("cannot draw: the trace is empty")?.time_s;
     let points = |value: fn(&Sample) -> f64| thinned(trace.iter().map(|s| (s.time_s, value(s))).collect());
     let (force, goal) = (points(|s| s.true_force_n), steps_of(trace, |s| (s.time_s, s.goal_n)));
     let top_n = top(force.iter().chain(&goal).map(|(_, n)| *n));
@@ -79,7 +79,7 @@ pub fn overview(trace: &[Sample]) -> Result<String, PlotError> {
 /// Each change of the goal at a larger scale, two panels side by side.
 pub fn steps(panels: &[Panel<'_>]) -> Result<String, PlotError> {
     if panels.iter().any(|panel| panel.samples.is_empty()) {
-        return Err(PlotError("a panel has no samples".into()));
+        return Err("cannot draw: a panel has no samples".into());
     }
     let rows = panels.len() / 2 + 1;
     fine_picture((STEPS_WIDTH_PX, 230 * rows as u32), |area| {
@@ -94,7 +94,7 @@ pub fn steps(panels: &[Panel<'_>]) -> Result<String, PlotError> {
 /// Legend of the panels' lines.
 fn draw_key(area: &Area<'_>) -> Result<(), PlotError> {
     let chart = ChartBuilder::on(area).margin(20 * FINE).build_cartesian_2d(0.0..1.0, 0.0..6.0);
-    let mut chart = chart.map_err(failed)?;
+    let mut chart = chart?;
     for curve in [
         Curve::Solid(vec![(0.08, 5.0), (0.22, 5.0)]),
         Curve::Dashed(vec![(0.08, 4.0), (0.22, 4.0)]),
@@ -105,7 +105,7 @@ fn draw_key(area: &Area<'_>) -> Result<(), PlotError> {
     for (y, text) in [(5.0, "contact force"), (4.0, "goal"), (3.0, "earliest arrival that"), (2.4, "the motor allows")]
     {
         let style = TextStyle::from((FONT, LABEL_PX * FINE)).pos(Pos::new(HPos::Left, VPos::Center));
-        chart.draw_series([Text::new(text, (0.3, y), style)]).map_err(failed)?;
+        chart.draw_series([Text::new(text, (0.3, y), style)])?;
     }
     Ok(())
 }

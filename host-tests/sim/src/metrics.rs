@@ -14,6 +14,7 @@ use crate::scene::Bound;
 use crate::watch::{Controller, Step, Watch};
 use Worst::{FirstFault, Largest, Least, Sum};
 use fingertip::state::Limits;
+use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
 
 /// Most fingers of a scene.
@@ -80,7 +81,7 @@ impl Meter {
             }
         }
         let within = |value: f64| bound.min.is_none_or(|min| value >= min) && max.is_none_or(|max| value <= max);
-        Verdict { bound: bound.clone(), value, max, held: value.is_some_and(within) }
+        Verdict { metric: bound.metric.clone(), value, min: bound.min, max, held: value.is_some_and(within) }
     }
 
     fn by_goal(&self, metric: &str) -> Vec<AtGoal> {
@@ -146,14 +147,31 @@ impl Measured {
     }
 }
 
-#[derive(Clone, Debug, PartialEq)]
+/// Comparison of a metric with its bound.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
-    pub bound: Bound,
-    /// Result. A metric without a value breaks its bound.
+    pub metric: String,
+    /// Result: for a metric with a value for each goal, the worst against its limit. A metric without a value breaks
+    /// its bound.
     pub value: Option<f64>,
+    pub min: Option<f64>,
     /// Largest allowed value: for a bound that grows with the goal, that of the worst goal.
     pub max: Option<f64>,
     pub held: bool,
+}
+
+impl Verdict {
+    /// Distance beyond the bound as a share of the bound, negative within it; -1 for a count that is 0 as required.
+    pub fn excess(&self) -> f64 {
+        let Some(value) = self.value else { return if self.held { -1.0 } else { f64::INFINITY } };
+        let sides = [self.max.map(|max| value - max), self.min.map(|min| min - value)];
+        let over = sides.into_iter().flatten().fold(f64::NEG_INFINITY, f64::max);
+        match self.max.or(self.min).map_or(0.0, f64::abs) {
+            allowed if allowed > 0.0 => over / allowed,
+            _ if self.held => -1.0,
+            _ => over,
+        }
+    }
 }
 
 /// Returns the table as Markdown.

@@ -167,8 +167,8 @@ fn table_of_bounds(verdicts: &[&Verdict]) -> Markup {
                 th.number scope="col" { "measured" } th scope="col" { "" }
             } }
             tbody { @for verdict in verdicts { tr {
-                td { code { (verdict.bound.metric) } }
-                td.asked { (asked(verdict.bound.min, verdict.max)) }
+                td { code { (verdict.metric) } }
+                td.asked { (asked(verdict.min, verdict.max)) }
                 td.number { (shown(verdict.value)) }
                 td { @if verdict.held { span.held { "held" } } @else { span.broken { "broken" } } }
             } } }
@@ -225,8 +225,7 @@ fn table_of(report: &Report, metrics: &[&Metric]) -> Markup {
     let measured = &report.outcome.measured;
     let fingers = report.trace.fingers.len();
     let columns = if fingers > 1 { 0..fingers } else { 0..0 };
-    let is_broken =
-        |name: &str| report.outcome.verdicts.iter().any(|verdict| verdict.bound.metric == name && !verdict.held);
+    let is_broken = |name: &str| report.outcome.verdicts.iter().any(|verdict| verdict.metric == name && !verdict.held);
     let value = |name: &str| {
         html! {
             @if is_broken(name) { span.broken { (shown(measured.get(name))) } } @else { (shown(measured.get(name))) }
@@ -294,7 +293,7 @@ struct Group {
 /// Returns all metrics. Groups with a broken bound are first.
 fn groups(verdicts: &[Verdict]) -> [Group; GROUPS.len()] {
     // A verdict may name the metric of one finger.
-    let is_of = |verdict: &Verdict, metric: &Metric| verdict.bound.metric.rsplit('.').next() == Some(metric.name);
+    let is_of = |verdict: &Verdict, metric: &Metric| verdict.metric.rsplit('.').next() == Some(metric.name);
     let group = |title| {
         let metrics: Vec<&Metric> = METRICS.iter().filter(|metric| metric.group == title).collect();
         let is_broken = |verdict: &&Verdict| !verdict.held && metrics.iter().any(|metric| is_of(verdict, metric));
@@ -398,11 +397,9 @@ impl Over {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Bound;
 
     fn bound(metric: &str, held: bool) -> Verdict {
-        let bound = Bound { metric: metric.into(), min: None, max: Some(1.0), max_per_goal_n: None };
-        Verdict { bound, value: Some(2.0), max: Some(1.0), held }
+        Verdict { metric: metric.into(), value: Some(2.0), min: None, max: Some(1.0), held }
     }
 
     #[test]

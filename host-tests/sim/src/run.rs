@@ -1,8 +1,6 @@
 //! Run of a scene with its watchers, its results, and the cost and benefit of each effect.
 
 use crate::metrics::{Hold, Measured, Meter, Verdict, shown};
-#[cfg(feature = "files")]
-use crate::population::report::Promise;
 use crate::scene::Scene;
 use crate::watch::{Controller, Cost, Step, Summary, Watch};
 #[cfg(feature = "files")]
@@ -55,7 +53,7 @@ impl Outcome {
             "digest": self.summary.digest,
             "passed": self.passed(),
             "metrics": self.measured.json(),
-            "bounds": self.verdicts.iter().map(Promise::of).collect::<Vec<_>>(),
+            "bounds": self.verdicts,
             "ledger": ledger_json(&self.summary),
             "without": ablated.collect::<Vec<_>>(),
         })
@@ -67,7 +65,7 @@ impl Outcome {
         let mut text = String::new();
         let width = self.measured.0.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
         for (name, value) in &self.measured.0 {
-            let _ = writeln!(text, "  {name:width$}  {:>10}{}", shown(*value), self.bound_of(name));
+            let _ = writeln!(text, "  {name:width$}  {:>10}{}", shown(*value), self.bound_of(name, *value));
         }
         let _ = writeln!(text, "\n{}", ledger_text(&self.summary));
         let ratio = if *wall_s > 0.0 { virtual_s / wall_s } else { f64::INFINITY };
@@ -78,7 +76,7 @@ impl Outcome {
         let _ = writeln!(text, "digest {digest}");
         let broken: Vec<_> = self.verdicts.iter().filter(|verdict| !verdict.held).collect();
         for verdict in &broken {
-            let (metric, asked) = (&verdict.bound.metric, asked(verdict.bound.min, verdict.max));
+            let (metric, asked) = (&verdict.metric, asked(verdict.min, verdict.max));
             let _ = writeln!(text, "BROKEN {metric}: {}, {asked} asked", shown(verdict.value));
         }
         let held = self.verdicts.len() - broken.len();
@@ -86,12 +84,12 @@ impl Outcome {
         text
     }
 
-    fn bound_of(&self, name: &str) -> String {
-        let verdict = self.verdicts.iter().find(|verdict| verdict.bound.metric == name);
+    fn bound_of(&self, name: &str, value: Option<f64>) -> String {
+        let verdict = self.verdicts.iter().find(|verdict| verdict.metric == name);
         verdict.map_or(String::new(), |verdict| {
-            let asked = asked(verdict.bound.min, verdict.max);
+            let asked = asked(verdict.min, verdict.max);
             // The goal that is closest to its limit may not be the one with the largest value.
-            let at_goal = verdict.bound.max_per_goal_n.map(|_| format!("{}, ", shown(verdict.value)));
+            let at_goal = (verdict.value != value).then(|| format!("{}, ", shown(verdict.value)));
             format!("  {}{asked} asked: {}", at_goal.unwrap_or_default(), if verdict.held { "held" } else { "BROKEN" })
         })
     }

@@ -178,7 +178,7 @@ fn broken(name: &str) -> Vec<String> {
     let outcome = outcome.unwrap_or_else(|error| panic!("{name}: {error}"));
     println!("{name}: {:.2} times real time", outcome.summary.virtual_s / outcome.summary.wall_s);
     let verdicts = outcome.verdicts.iter().filter(|verdict| !verdict.held);
-    verdicts.map(|verdict| format!("{name}: {:?} is {:?}", verdict.bound, verdict.value)).collect()
+    verdicts.map(|verdict| format!("{name}: {verdict:?}")).collect()
 }
 
 /// Scenes of the usual size: all effects at once, a free object lifted by two fingers, a fast approach, a slip.

@@ -41,40 +41,11 @@ pub struct Ran {
     pub seed: u64,
     pub inside: bool,
     pub drawn: Map<String, Value>,
-    pub promises: Vec<Promise>,
+    pub promises: Vec<Verdict>,
     pub holds: Vec<Hold>,
     /// All metrics; null if the run has none.
     pub metrics: Map<String, Value>,
     pub digest: String,
-}
-
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Promise {
-    pub metric: String,
-    /// Measured value: for a metric with a value for each goal, the worst against its limit.
-    pub value: Option<f64>,
-    pub min: Option<f64>,
-    pub max: Option<f64>,
-    pub held: bool,
-}
-
-impl Promise {
-    pub fn of(verdict: &Verdict) -> Self {
-        let Verdict { bound, value, max, held } = verdict.clone();
-        Self { metric: bound.metric, value, min: bound.min, max, held }
-    }
-
-    /// Distance beyond the bound as a share of the bound, negative within it; -1 for a count that is 0 as required.
-    pub fn excess(&self) -> f64 {
-        let Some(value) = self.value else { return if self.held { -1.0 } else { f64::INFINITY } };
-        let sides = [self.max.map(|max| value - max), self.min.map(|min| min - value)];
-        let over = sides.into_iter().flatten().fold(f64::NEG_INFINITY, f64::max);
-        match self.max.or(self.min).map_or(0.0, f64::abs) {
-            allowed if allowed > 0.0 => over / allowed,
-            _ if self.held => -1.0,
-            _ => over,
-        }
-    }
 }
 
 impl Ran {
@@ -84,19 +55,19 @@ impl Ran {
             seed: finger.scene.seed,
             inside: outcome.passed(),
             drawn: finger.drawn.iter().map(|(name, value)| (name.clone(), json!(value))).collect(),
-            promises: outcome.verdicts.iter().map(Promise::of).collect(),
+            promises: outcome.verdicts.clone(),
             holds: outcome.holds.clone(),
             metrics: outcome.measured.json(),
             digest: outcome.summary.digest.clone(),
         }
     }
 
-    pub fn broken(&self) -> impl Iterator<Item = &Promise> {
+    pub fn broken(&self) -> impl Iterator<Item = &Verdict> {
         self.promises.iter().filter(|promise| !promise.held)
     }
 
     /// Promise that is broken by most, or else the nearest to its bound.
-    pub fn nearest(&self) -> Option<&Promise> {
+    pub fn nearest(&self) -> Option<&Verdict> {
         self.promises.iter().max_by(|a, b| a.excess().total_cmp(&b.excess()))
     }
 
@@ -212,7 +183,7 @@ impl Report {
 
     /// All fingers, the worst first: those that broke a promise, then those nearest to a bound.
     pub fn worst(&self) -> Vec<&Ran> {
-        let excess = |ran: &Ran| ran.nearest().map_or(-1.0, Promise::excess);
+        let excess = |ran: &Ran| ran.nearest().map_or(-1.0, Verdict::excess);
         let mut fingers: Vec<&Ran> = self.fingers.iter().collect();
         fingers.sort_by(|a, b| excess(b).total_cmp(&excess(a)).then(a.finger.cmp(&b.finger)));
         fingers
@@ -285,7 +256,7 @@ pub fn text(report: &Report) -> String {
 
 /// Describes a finger in one line: the promises that it broke, else the promise with the smallest margin.
 pub fn judged(ran: &Ran) -> String {
-    let promise = |Promise { metric, value, min, max, .. }: &Promise| {
+    let promise = |Verdict { metric, value, min, max, .. }: &Verdict| {
         format!("{metric} {} ({})", shown(*value), asked(*min, *max))
     };
     let about = match ran.nearest().filter(|_| ran.inside) {

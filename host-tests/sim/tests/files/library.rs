@@ -5,7 +5,7 @@ use output::plot;
 use sim::demo::{self, Forces, Run, Taxels, Trace, draw, missed, table};
 use sim::metrics::Verdict;
 use sim::run::run;
-use sim::scene::{self, Bound};
+use sim::scene;
 use sim::watch::{Step, Watch};
 use sim::{cores, effects, native, simulate};
 use std::collections::BTreeSet;
@@ -17,7 +17,7 @@ fn broken(name: &str, seed: Option<u64>) -> Vec<String> {
     let outcome = run(&scene, &native::board, &mut []).expect("it runs");
     let verdicts = outcome.verdicts.iter().filter(|verdict| !verdict.held);
     let unbounded = (!two_sided).then(|| format!("{name}: nothing is bounded on both sides"));
-    let broken = verdicts.map(|verdict| format!("{name}: {:?} is {:?}", verdict.bound, verdict.value));
+    let broken = verdicts.map(|verdict| format!("{name}: {verdict:?}"));
     broken.chain(unbounded).collect()
 }
 
@@ -69,7 +69,7 @@ const BREAKERS: &[Breakers] = &[
 /// and a finger that stopped with a fault breaks only that it must not.
 fn unbroken(name: &str, keys: &[&str]) -> BTreeSet<(String, &'static str)> {
     let sides = |verdict: &Verdict| {
-        let Verdict { bound: Bound { metric, min, .. }, value, max, .. } = verdict;
+        let Verdict { metric, value, min, max, .. } = verdict;
         let held = [
             (min.is_some(), "min", value.is_some_and(|value| min.is_some_and(|min| value < min))),
             (max.is_some(), "max", value.is_some_and(|value| max.is_some_and(|max| value > max))),

@@ -67,7 +67,7 @@ fn broken(change: impl Fn(&mut Made)) -> BTreeSet<String> {
         observe(&mut meter, 0, time_s, &command, &status, &truth);
     }
     let verdicts = meter.verdicts(&meter.measured(), &bounds).into_iter();
-    verdicts.filter(|verdict| !verdict.held).map(|verdict| verdict.bound.metric).collect()
+    verdicts.filter(|verdict| !verdict.held).map(|verdict| verdict.metric).collect()
 }
 
 /// A finger that keeps all promises by a little, and one that breaks these by a little.

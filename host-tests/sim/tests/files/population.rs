@@ -2,9 +2,9 @@
 //! distribution of draws, and populations that extend another one.
 
 use crate::{CRC, folder, scene};
+use sim::metrics::Verdict;
 use sim::native;
 use sim::population::budget::{Budget, CAUSES, GOALS_N};
-use sim::population::report::Promise;
 use sim::population::{self, Drawn, Population, Report, fingers, load, write_worst};
 use sim::sweep::Shard;
 use std::fs;
@@ -73,7 +73,7 @@ fn the_worst_run_again_as_they_did() {
     // Those that broke a promise come first; the others are as near to a bound as they come, and say so.
     let worst = report.worst();
     assert!(worst.is_sorted_by_key(|ran| ran.inside));
-    let nearest: Vec<f64> = worst.iter().filter_map(|ran| ran.nearest()).map(Promise::excess).collect();
+    let nearest: Vec<f64> = worst.iter().filter_map(|ran| ran.nearest()).map(Verdict::excess).collect();
     assert!(
         nearest.len() == FINGERS && nearest.is_sorted_by(|a, b| a >= b) && nearest[FINGERS - 1] < 0.0,
         "{nearest:?}"

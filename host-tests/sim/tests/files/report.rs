@@ -201,7 +201,7 @@ fn what_is_broken_comes_first_and_the_rest_is_folded() {
     let mut ran = traced(&scene);
     let held = Verdict { held: true, ..ran.1.verdicts[0].clone() };
     let mut broken = Verdict { held: false, ..held.clone() };
-    broken.bound.metric = "energy_j".into();
+    broken.metric = "energy_j".into();
     ran.1.verdicts = vec![held, broken];
     let page = written(&scene, &ran, &[], None);
     let at = |part: &str| page.find(part).unwrap_or_else(|| panic!("no {part}"));

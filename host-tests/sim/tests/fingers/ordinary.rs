@@ -56,7 +56,7 @@ impl Ran {
     /// Checks that every promise is kept, but for these metrics.
     fn keeps_all_but(self, spared: &[&str]) -> Self {
         let broken = self.outcome.verdicts.iter().filter(|verdict| !verdict.held);
-        let broken: Vec<_> = broken.filter(|verdict| !spared.contains(&verdict.bound.metric.as_str())).collect();
+        let broken: Vec<_> = broken.filter(|verdict| !spared.contains(&verdict.metric.as_str())).collect();
         assert!(broken.is_empty(), "{broken:#?}\n{}", self.finger);
         self
     }

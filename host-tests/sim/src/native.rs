@@ -17,7 +17,7 @@ use crate::mechanics::contact::Place;
 use crate::run::{RunError, by_effect};
 use crate::scene::Scene;
 use crate::setup::Setup;
-use crate::watch::{self, Controller, Cost, Step, Summary, Watch};
+use crate::watch::{Controller, Cost, Step, Summary, Watch};
 use crate::world::{Surroundings, World};
 use core::ops::Range;
 use fingertip::command::Command;
@@ -58,7 +58,7 @@ pub fn simulate_calibrated(
 ) -> Result<Summary, SimError> {
     let mut board = Board::<Named>::new(scene)?;
     board.units[0].pipeline.calibrate(&Calibration::of(gains));
-    board.calibration = Some(watch::Gains { gains_q14: *gains.rows(), masks: [0; ROWS] });
+    board.calibration = Some(*gains.rows());
     board.whole(scene, Instant::now(), watch)
 }
 
@@ -91,8 +91,8 @@ struct Board<E: Set> {
     digest: Digest,
     /// True once the finger is tared: from then on the host sends.
     runs: bool,
-    /// Gains and mask of the taxels of the first finger.
-    calibration: Option<watch::Gains>,
+    /// Gain of each taxel of the first finger, Q14.
+    calibration: Option<[[u16; COLUMNS]; ROWS]>,
 }
 
 impl<E: Set> Board<E> {

@@ -7,24 +7,14 @@ use fingertip::frame::Sense;
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{COLUMNS, Frame, ROWS};
-use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// Settings of a controller when a run begins. With all [`Step`]s they are sufficient for a replay.
 #[derive(Clone, Debug)]
 pub struct Controller {
     pub params: Params,
-    /// Gains and mask of the taxels, if any.
-    pub calibration: Option<Gains>,
-}
-
-/// Contents of a calibration; see `fingertip::shipped::Calibration::new`.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Gains {
-    /// Gain of each taxel, Q14.
-    pub gains_q14: [[u16; COLUMNS]; ROWS],
-    /// Masked columns of each row, a bit each.
-    pub masks: [u32; ROWS],
+    /// Gain of each taxel, Q14, if the finger is calibrated.
+    pub calibration: Option<[[u16; COLUMNS]; ROWS]>,
 }
 
 /// Control step of one finger: inputs, outputs and truth.

@@ -164,7 +164,7 @@ pub fn scene(seed: u64, centre_x_mm: f64, effects: &str) -> sim::scene::Scene {
         "about = \"a finger\"\nseed = {seed}\nduration_s = 1.0\n[object]\ndistance_mm = 5.0\n\
         centre_x_mm = {centre_x_mm:?}\n{effects}[[script]]\nat_s = 0.0\ngoal_n = 0.0\n"
     );
-    read("t.toml", &text, &[]).unwrap_or_else(|error| panic!("{error}"))
+    read("t.toml", &text).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// Finger with noise, friction and uneven gains, and with this hysteresis and creep, tared.

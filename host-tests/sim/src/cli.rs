@@ -6,7 +6,7 @@ use crate::report::{Over, Report, Trace, page};
 use crate::run::{Run, RunError, ablate, ablation_text, run};
 use crate::scene::{self, Scene, read};
 use crate::watch::{Agreement, Path, Watch};
-use crate::{explain, metrics, native};
+use crate::{explain, native};
 use clap::{Parser, ValueEnum};
 use output::{kept, say};
 use std::path::{self, PathBuf};
@@ -88,7 +88,7 @@ impl Args {
 pub fn load(scene: &str, set: &[String], seed: Option<u64>) -> Result<Scene, String> {
     let (path, mut source) = scene::library_text(scene)?;
     let file = path.to_string_lossy();
-    let read = |source: &str| read(&file, source, &metrics::names()).map_err(|errors| errors.to_string());
+    let read = |source: &str| read(&file, source).map_err(|errors| errors.to_string());
     let seed = seed.map(|seed| format!("seed={seed}"));
     let assignments: Vec<&String> = set.iter().chain(&seed).collect();
     if assignments.is_empty() {

@@ -4,7 +4,7 @@
 //! keeps the goals, the world at every frame, and the array at the end of each hold.
 
 use crate::mechanics::rotor::profile;
-use crate::metrics::{self, Meter, newtons, shown};
+use crate::metrics::{Meter, newtons, shown};
 use crate::run::{RunError, asked};
 use crate::scene::{self, Scene, read};
 use crate::setup::Setup;
@@ -66,7 +66,7 @@ pub type DemoError = RunError;
 /// Returns the scene. The quick one holds the same goals for a shorter time.
 pub fn scene(quick: bool) -> Result<Scene, DemoError> {
     let (path, text) = scene::library_text(SCENE)?;
-    let mut scene = read(&path.to_string_lossy(), &text, &metrics::names())?;
+    let mut scene = read(&path.to_string_lossy(), &text)?;
     if quick {
         scene.duration_s = 0.0;
         for (place, event) in scene.script.iter_mut().enumerate() {

@@ -41,7 +41,7 @@ pub fn list() -> Result<String, Box<dyn std::error::Error + Send + Sync>> {
     let mut text = String::new();
     for name in names {
         let (path, scene) = scene::library_text(&name)?;
-        let about = read(&path.to_string_lossy(), &scene, &metrics::names())?.about;
+        let about = read(&path.to_string_lossy(), &scene)?.about;
         let _ = writeln!(text, "{name:width$}  {about}");
     }
     Ok(text)

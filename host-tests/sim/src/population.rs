@@ -14,13 +14,13 @@ pub use read::{folder, load, read};
 pub use report::Report;
 
 use crate::cli::verdict;
+use crate::cores;
 use crate::effects::stream;
 use crate::part::{Part, cannot_write, make_folder};
 use crate::population::report::{Ran, judged};
 use crate::run::{Run, RunError, run};
 use crate::scene::{self, Scene, SceneErrors, set};
 use crate::sweep::{Shard, progress};
-use crate::{cores, metrics};
 use clap::{Parser, Subcommand, ValueEnum};
 use draw::Draw;
 use fastrand::Rng;
@@ -139,7 +139,7 @@ impl Population {
             all.sort_by(|(a_s, _), (b_s, _)| a_s.total_cmp(b_s));
             text.extend(all.into_iter().map(|(_, event)| event));
         }
-        let mut scene = scene::read(&self.file, &text, &metrics::names())?;
+        let mut scene = scene::read(&self.file, &text)?;
         scene.seed = stream(seed, "seed", number) >> 1;
         scene.name = format!("finger-{}", number + 1);
         Ok(Finger { drawn, scene })

@@ -217,39 +217,6 @@ pub fn set(text: &str, path: &str, value: &str) -> Result<String, String> {
     Ok(document.to_string())
 }
 
-/// Writes the scene as a text with every key and without comments, which reads as the same scene.
-pub fn write(scene: &Scene) -> String {
-    let (about, duration_s) = (Value::Text(scene.about.clone()), Value::Number(scene.duration_s));
-    let mut text = format!("about = {about}\nduration_s = {duration_s}\nseed = {}\n", scene.seed);
-    for (name, values) in &scene.tables {
-        section(&mut text, &format!("[{name}]"), values);
-    }
-    for goal in &scene.script {
-        let [at_s, goal_n] = [goal.at_s, goal.goal_n].map(Value::Number);
-        text += &format!("\n[[script]]\nat_s = {at_s}\ngoal_n = {goal_n}\n");
-    }
-    for event in &scene.events {
-        section(&mut text, "[[event]]", &event.values);
-    }
-    for named in &scene.effects {
-        section(&mut text, &format!("[effects.{}]", named.effect.name), &named.values);
-    }
-    for bound in &scene.bounds {
-        text += &format!("\n[[expect]]\nmetric = {}\n", Value::Text(bound.metric.clone()));
-        for (name, side) in [("min", bound.min), ("max", bound.max), ("max_per_goal_n", bound.max_per_goal_n)] {
-            text += &side.map_or(String::new(), |side| format!("{name} = {}\n", Value::Number(side)));
-        }
-    }
-    text
-}
-
-fn section(text: &mut String, head: &str, values: &Values) {
-    *text += &format!("\n{head}\n");
-    for (name, value) in values.iter() {
-        *text += &format!("{name} = {value}\n");
-    }
-}
-
 /// Writes the table of an effect with the values at which it changes nothing. Other keys have their defaults.
 pub fn zero(effect: &Description) -> String {
     let mut text = format!("[effects.{}]\n", effect.name);

@@ -439,7 +439,7 @@ mod tests {
             (noise("0"), false),
         ] {
             let text = format!("about = \"a test\"\nduration_s = 1.0\n{table}");
-            assert_eq!(is_random(&crate::scene::read("test.toml", &text, &[]).unwrap()), random, "{table}");
+            assert_eq!(is_random(&crate::scene::read("test.toml", &text).unwrap()), random, "{table}");
         }
     }
 

@@ -1,10 +1,10 @@
 //! Scenes with the flash image: it does what the native board does, and what is made of a run holds.
 
 use crate::common::{image, scratch};
+use sim::cores;
 use sim::demo::{draw, missed, table};
 use sim::scene::{self, Scene, read};
 use sim::watch::{Agreement, BEYOND_MM, BEYOND_N, Controller, Path, Step, Summary, Watch};
-use sim::{cores, metrics};
 use virtual_board::demo;
 use virtual_board::scene::simulate;
 
@@ -18,7 +18,7 @@ const STEPS: &str = "about = \"steps\"\nduration_s = 0.8\n[object]\ndistance_mm 
                      [[event]]\nkind = \"tare\"\nat_s = 0.7\n";
 
 fn scene(text: &str) -> Scene {
-    read("test.toml", text, &metrics::names()).unwrap_or_else(|errors| panic!("{errors}"))
+    read("test.toml", text).unwrap_or_else(|errors| panic!("{errors}"))
 }
 
 #[derive(Debug, Default)]

@@ -84,7 +84,7 @@ impl Draw {
              [effects.relaxation]\nshare = {relaxation:?}\ntau_s = {relaxation_s:?}\n\
              [effects.broken_taxels]\ndead = [{dead}]\n{extra}"
         );
-        read("press.toml", &text, &[]).unwrap_or_else(|error| panic!("{error}\n{text}"))
+        read("press.toml", &text).unwrap_or_else(|error| panic!("{error}\n{text}"))
     }
 }
 

@@ -218,7 +218,7 @@ const SCENE: &str = "about = \"the plant\"\nduration_s = 1.0\n[world]\nstep_us =
 impl Bench {
     /// Creates the finger of the plant under a controller: at rest, torque off, not tared.
     pub fn of(setup: &Setup, config: &Config) -> Self {
-        let scene = read("plant", SCENE, &[]).expect("the plant's scene is one");
+        let scene = read("plant", SCENE).expect("the plant's scene is one");
         let parts = core::iter::once(Reference::parts(setup));
         let board = Board::of(&scene, config, setup, parts);
         Self::around(board.unwrap_or_else(|error| panic!("{error}")))

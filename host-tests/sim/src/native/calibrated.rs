@@ -11,7 +11,7 @@ use crate::native::bench::Bench;
 use crate::native::simulate_calibrated;
 use crate::population::load;
 use crate::run::RunError;
-use crate::scene::{Scene, read, set, write};
+use crate::scene::{Scene, read, set};
 use crate::watch::{Summary, Watch};
 use fastrand::Rng;
 use fingertip::config::newtons;
@@ -169,11 +169,10 @@ pub fn plate(scene: &Scene, place: Place) -> Result<Scene, RunError> {
     )
 }
 
-/// Returns a scene with other values, each by its path.
+/// Returns a scene with other values in its text, each by its path. The seed of a drawn finger is not in its text.
 pub fn changed(scene: &Scene, changes: &[(&str, String)]) -> Result<Scene, RunError> {
-    let bare = Scene { bounds: Vec::new(), ..scene.clone() };
-    let text = changes.iter().try_fold(write(&bare), |text, (path, value)| set(&text, path, value))?;
-    Ok(Scene { bounds: scene.bounds.clone(), ..read("finger.toml", &text, &[])? })
+    let text = changes.iter().try_fold(scene.text.clone(), |text, (path, value)| set(&text, path, value))?;
+    Ok(Scene { seed: scene.seed, ..read("finger.toml", &text)? })
 }
 
 /// Holds a force, starting from any state. Returns the means of the true force and of the reading over the end, N.

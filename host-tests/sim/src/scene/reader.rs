@@ -12,11 +12,11 @@ use std::ops::Range;
 use std::path::Path;
 use toml_edit::{Document, Item, TableLike, TomlError};
 
-/// Reads a scene. Errors name the file `file`; `[[expect]]` may name `metrics`.
-pub fn read(file: &str, text: &str, metrics: &[&str]) -> Result<Scene, SceneErrors> {
+/// Reads a scene. Errors name the file `file`.
+pub fn read(file: &str, text: &str) -> Result<Scene, SceneErrors> {
     let mut reader = Reader { file, text, errors: Vec::new() };
     let scene = match Document::parse(text) {
-        Ok(document) => reader.scene(document.as_table(), metrics),
+        Ok(document) => reader.scene(document.as_table()),
         Err(error) => {
             reader.errors.push(not_toml(file, text, &error));
             None
@@ -56,7 +56,7 @@ impl Reader<'_> {
     }
 
     /// Returns none if a required part is missing. Its error is among the others.
-    fn scene(&mut self, root: &dyn TableLike, metrics: &[&str]) -> Option<Scene> {
+    fn scene(&mut self, root: &dyn TableLike) -> Option<Scene> {
         let tables = || TABLES.iter().map(|table| table.name).chain(MANY).chain(["effects"]);
         let known = |name: &str| ROOT.keys.iter().any(|key| key.name == name) || tables().any(|table| table == name);
         for (name, item) in root.iter().filter(|(name, _)| !known(name)) {
@@ -72,7 +72,7 @@ impl Reader<'_> {
         let script = self.script(root, duration_s);
         let effects = self.effects(root);
         let events = self.events(root, duration_s, &effects);
-        let bounds = self.bounds(root, metrics);
+        let bounds = self.bounds(root);
         let head = head?;
         let stem = Path::new(self.file).file_stem().map_or("".into(), |stem| stem.to_string_lossy());
         let scene = Scene {
@@ -203,7 +203,8 @@ impl Reader<'_> {
         named
     }
 
-    fn bounds(&mut self, root: &dyn TableLike, metrics: &[&str]) -> Vec<Bound> {
+    fn bounds(&mut self, root: &dyn TableLike) -> Vec<Bound> {
+        let metrics = metrics::names();
         let mut bounds: Vec<Bound> = Vec::new();
         for (given, place) in self.many(&EXPECT, root) {
             let Some(values) = self.values(&EXPECT, given, place.clone(), false) else { continue };

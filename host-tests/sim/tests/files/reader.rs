@@ -7,7 +7,7 @@ use sim::cli::load;
 use sim::events::{EVENT, KINDS};
 use sim::scene::tables::{EXPECT, Key, Kind, ROOT, SCRIPT, TABLES};
 use sim::scene::{self, Scene, SceneErrors, read, set};
-use sim::{effects, metrics, population};
+use sim::{effects, population};
 use std::collections::BTreeSet;
 
 /// Names and texts of the library.
@@ -17,30 +17,12 @@ fn library() -> Vec<(String, String)> {
 }
 
 fn read_it(text: &str) -> Result<Scene, SceneErrors> {
-    read("my.toml", text, &metrics::names())
+    read("my.toml", text)
 }
 
 /// Scene of a text, preceded by the keys that every scene needs.
 fn scene(text: &str) -> Scene {
     read_it(&format!("about = \"\"\nduration_s = 1\n{text}")).unwrap_or_else(|errors| panic!("{errors}"))
-}
-
-#[test]
-fn every_scene_reads_and_writes_the_same() {
-    let event = "about = \"\"\nduration_s = 1\n[[event]]\nkind = \"encoder_slip\"\nat_s = 0.5\nby_counts = -4\n";
-    for (name, text) in library().into_iter().chain([("event".into(), event.into())]) {
-        let once = read_it(&text).unwrap_or_else(|errors| panic!("{name}: {errors}"));
-        let written = scene::write(&once);
-        let again = read_it(&written).unwrap_or_else(|errors| panic!("{name}: {errors}"));
-        assert_eq!(scene::write(&again), written);
-        let named = |scene: &Scene| {
-            scene.effects.iter().map(|named| (named.effect.name, named.values.clone())).collect::<Vec<_>>()
-        };
-        assert_eq!(named(&again), named(&once));
-        assert_eq!((again.tables, again.script), (once.tables, once.script));
-        assert_eq!((again.events, again.bounds), (once.events, once.bounds));
-        assert_eq!((again.seed, again.duration_s, again.about), (once.seed, once.duration_s, once.about));
-    }
 }
 
 #[test]
@@ -246,9 +228,8 @@ fn check(list: &str, head: &str, read: impl Fn(&str) -> Result<(), String>) {
 
 #[test]
 fn mistakes_in_scenes() {
-    let names = metrics::names();
     check(include_str!("mistakes_in_scenes.txt"), "about = \"a test\"\nduration_s = 1\n", |text| {
-        scene::read("my.toml", text, &names).map(drop).map_err(|errors| errors.to_string())
+        scene::read("my.toml", text).map(drop).map_err(|errors| errors.to_string())
     });
 }
 
@@ -263,7 +244,7 @@ fn mistakes_in_populations() {
 fn all_mistakes_come_at_once_in_the_order_of_the_text() {
     let text =
         "about = 3\nseeds = 4\n[tip]\nradius_mm = 100\n[effects.noise]\nrms = 1\n[[expect]]\nmetric = \"x\"\nmin = 1\n";
-    let errors = scene::read("my.toml", text, &metrics::names()).expect_err("six mistakes").0;
+    let errors = scene::read("my.toml", text).expect_err("six mistakes").0;
     let places: Vec<_> = errors.iter().map(|error| (error.line, error.column)).collect();
     // `duration_s` is missing: reported at the beginning.
     assert_eq!(places, [(1, 1), (1, 9), (2, 1), (4, 13), (6, 1), (8, 10)]);

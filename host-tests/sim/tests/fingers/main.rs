@@ -40,7 +40,7 @@ fn most_n(goal_n: f64) -> f64 {
 /// Reads a scene from the tables of one finger.
 fn scene(tables: &str) -> Scene {
     let text = format!("about = \"a finger\"\nduration_s = 1.0\n{tables}\n[[script]]\nat_s = 0.0\ngoal_n = 0.0\n");
-    read("test.toml", &text, &[]).unwrap_or_else(|errors| panic!("{errors}\n{text}"))
+    read("test.toml", &text).unwrap_or_else(|errors| panic!("{errors}\n{text}"))
 }
 
 /// A finger that is tared; its torque is on from the next frame.

@@ -31,7 +31,7 @@ fn envelope() -> &'static [Bound] {
 fn asks(script: &[(f64, f64)], duration_s: f64, tables: &str) -> Ran {
     let goals = script.iter().map(|(at_s, goal_n)| format!("[[script]]\nat_s = {at_s:?}\ngoal_n = {goal_n:?}\n"));
     let finger = format!("about = \"\"\nduration_s = {duration_s:?}\n{tables}\n{}", goals.collect::<String>());
-    let mut scene = read("test.toml", &finger, &[]).unwrap_or_else(|errors| panic!("{errors}\n{finger}"));
+    let mut scene = read("test.toml", &finger).unwrap_or_else(|errors| panic!("{errors}\n{finger}"));
     scene.bounds = envelope().to_vec();
     let mut last = Last::default();
     let outcome = run(&scene, &native::board, &mut [&mut last]).expect("it runs");

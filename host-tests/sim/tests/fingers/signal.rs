@@ -14,7 +14,7 @@ use sim::native::{self, simulate_calibrated};
 use sim::run::{Run, run};
 use sim::scene::{self, Goal, Scene, read};
 use sim::watch::Watch;
-use sim::{cores, metrics, population};
+use sim::{cores, population};
 
 /// Largest true force of a run in which all codes keep their last values, or go back to those of the tare as when the
 /// connector is unplugged: during a hold, or some time before the touch.
@@ -91,8 +91,7 @@ fn at_rest(scene: &Scene, what: &str) -> [Case; 2] {
 #[test]
 fn a_flickering_taxel_does_not_shake_the_motor() {
     let (path, text) = scene::library_text("raspberry").unwrap_or_else(|error| panic!("{error}"));
-    let names = metrics::names();
-    let raspberry = read(&path.to_string_lossy(), &text, &names).unwrap_or_else(|errors| panic!("{errors}"));
+    let raspberry = read(&path.to_string_lossy(), &text).unwrap_or_else(|errors| panic!("{errors}"));
     let mut cases = Vec::new();
     for seed in [1, 33, 72] {
         let scene = Scene { seed, duration_s: 3.0, bounds: Vec::new(), ..raspberry.clone() };
@@ -163,7 +162,7 @@ fn controller((permille, time_ms): (i32, i32)) -> String {
 fn changed(seed: u64, changes: &[(&str, &str)], controller: &str) -> Scene {
     let (path, text) = scene::library_text("worn_sensor").expect("it is there");
     let text = format!("seed = {seed}\n{}\n[controller]\n{controller}", replaced(&text, changes));
-    read(&path.to_string_lossy(), &text, &metrics::names()).unwrap_or_else(|errors| panic!("{errors}"))
+    read(&path.to_string_lossy(), &text).unwrap_or_else(|errors| panic!("{errors}"))
 }
 
 /// A metric of the force's error, mN, of a finger without faults.

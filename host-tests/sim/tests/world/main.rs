@@ -189,7 +189,7 @@ fn every_effect_by_its_default_runs_to_the_end_and_alike_each_time() {
 
 /// Reads a scene from its text without `about`.
 fn scene(text: &str) -> Scene {
-    read("test.toml", &format!("about = \"a test\"\n{text}"), &[]).unwrap_or_else(|error| panic!("{error}"))
+    read("test.toml", &format!("about = \"a test\"\n{text}")).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// The effects of these tables.

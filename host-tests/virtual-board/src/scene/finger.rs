@@ -406,7 +406,7 @@ mod tests {
 
     fn two() -> Vec<Joint> {
         let text = "about = \"two\"\nduration_s = 1.0\n[hand]\nfingers = 2\n";
-        let scene = sim::scene::read("test.toml", text, &[]).unwrap_or_else(|errors| panic!("{errors}"));
+        let scene = sim::scene::read("test.toml", text).unwrap_or_else(|errors| panic!("{errors}"));
         let effects = (0..2).map(|finger| Named::of(&scene, finger));
         let effects = effects.map(|Parts { drive, contact, .. }| (drive, contact)).collect();
         let world = World::new(&scene.setup(), &Surroundings::of(&scene), effects);

@@ -21,7 +21,7 @@ use std::process::ExitCode;
 )]
 pub struct Args {
     /// The scene: a file, or a name out of the library
-    #[arg(required_unless_present_any = ["list", "keys", "replay"])]
+    #[arg(required_unless_present_any = ["list", "replay"])]
     pub scene: Option<String>,
     /// Platform of the controller: the same core on the host, or the flash image on the emulated microcontroller
     #[arg(long, value_enum, default_value_t = Board::Native)]
@@ -48,17 +48,14 @@ pub struct Args {
     #[arg(long)]
     pub ablate: bool,
     /// Replays a recording through the core, which must give the same bits
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["scene", "ablate", "list", "explain", "keys"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["scene", "ablate", "list", "explain"])]
     pub replay: Option<PathBuf>,
     /// Shows the library's scenes
-    #[arg(long, conflicts_with_all = ["scene", "explain", "keys"])]
+    #[arg(long, conflicts_with_all = ["scene", "explain"])]
     pub list: bool,
     /// Shows which effects the scene names, and what each adds
-    #[arg(long, conflicts_with = "keys")]
+    #[arg(long)]
     pub explain: bool,
-    /// Shows every key that a scene may have
-    #[arg(long, conflicts_with = "scene")]
-    pub keys: bool,
 }
 
 /// Board that runs the controller.
@@ -75,7 +72,7 @@ pub enum Board {
 impl Args {
     /// True if a scene runs and is not only shown or replayed.
     pub fn runs(&self) -> bool {
-        !self.list && !self.keys && !self.explain && self.replay.is_none()
+        !self.list && !self.explain && self.replay.is_none()
     }
 
     /// Returns the scene of the arguments, changed as requested and checked. The error is for people.
@@ -111,9 +108,6 @@ pub fn load(scene: &str, set: &[String], seed: Option<u64>) -> Result<Scene, Str
 pub fn answer(args: &Args, board: Run) -> ExitCode {
     let done = if args.list {
         explain::list().map(say::text).map(|()| true)
-    } else if args.keys {
-        say::text(explain::keys());
-        Ok(true)
     } else if args.explain {
         args.scene().map(|scene| say::text(explain::scene(&scene))).map(|()| true).map_err(Into::into)
     } else if let Some(path) = &args.replay {

@@ -1,4 +1,4 @@
-//! Descriptions of a scene, of all keys, and the reference page.
+//! Descriptions of a scene, and the reference page.
 
 use crate::effects::{self, CONTACT, DRIVE, Description, LINK, SENSOR};
 use crate::events::{EVENT, KINDS, own_keys};
@@ -45,30 +45,6 @@ pub fn list() -> Result<String, Box<dyn std::error::Error + Send + Sync>> {
         let _ = writeln!(text, "{name:width$}  {about}");
     }
     Ok(text)
-}
-
-/// Lists every key, for a terminal.
-pub fn keys() -> String {
-    let mut text = String::new();
-    for table in [&ROOT].into_iter().chain(TABLES).chain([&SCRIPT, &EVENT, &EXPECT]) {
-        keys_of(&mut text, &table.title(), table.about, table.keys);
-    }
-    for kind in &KINDS {
-        keys_of(&mut text, &kind.title(), kind.about, own_keys(kind));
-    }
-    for effect in effects::all() {
-        keys_of(&mut text, &format!("[effects.{}]", effect.name), effect.about, effect.keys);
-    }
-    text
-}
-
-fn keys_of(text: &mut String, title: &str, about: &str, keys: &[Key]) {
-    let _ = writeln!(text, "{}  # {about}", title);
-    for key in keys {
-        let _ = writeln!(text, "  {}: {}", key.name, key.allowed());
-        let _ = writeln!(text, "      {}", key.about.trim());
-    }
-    text.push('\n');
 }
 
 /// Returns the reference page, `docs/scenes.md`.

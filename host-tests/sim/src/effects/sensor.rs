@@ -19,24 +19,14 @@ use floating::Floating;
 /// A number for each column.
 pub type Row = [f64; COLUMNS];
 
-/// Effect on the pressures on the taxels of a row, kPa.
-pub trait Pressure: Send {
-    /// Changes the pressures of a row that is sampled at this time. Times never fall.
-    fn apply(&mut self, row: usize, time_s: f64, kpa: &mut Row);
+/// Effect on the pressures on the taxels of a row, kPa: row, time of its sample (never before the last one) and
+/// pressures.
+pub type Pressure = dyn FnMut(usize, f64, &mut Row) + Send;
 
-    /// Temperature of the microcontroller, degrees Celsius, if the effect has one.
-    fn chip_c(&self, _time_s: f64) -> Option<f64> {
-        None
-    }
-}
+/// Temperature of the microcontroller at a time, degrees Celsius.
+pub type Chip = dyn Fn(f64) -> f64 + Send;
 
-impl<F: FnMut(usize, f64, &mut Row) + Send> Pressure for F {
-    fn apply(&mut self, row: usize, time_s: f64, kpa: &mut Row) {
-        self(row, time_s, kpa);
-    }
-}
-
-/// Effect on the conductances of the taxels of a row, S: row, time and conductances as in [`Pressure::apply`].
+/// Effect on the conductances of the taxels of a row, S: row, time and conductances as in [`Pressure`].
 pub type Conductance = dyn FnMut(usize, f64, &mut Row) + Send;
 
 /// Effect on the conductances that the columns see of the driven row, S: row, conductances of all taxels at the last
@@ -82,7 +72,8 @@ pub fn repeats(named: &NamedEffect) -> bool {
 }
 
 named! {
-    pressure: dyn Pressure,
+    pressure: Pressure,
+    chip: Chip,
     conductance: Conductance,
     network: Network,
     volts: Volts,
@@ -95,11 +86,11 @@ impl Stages for Named {
     }
 
     fn chip_c(&self, time_s: f64) -> Option<f64> {
-        self.pressure.iter().find_map(|effect| effect.part().chip_c(time_s))
+        self.chip.first().map(|effect| effect.part()(time_s))
     }
 
     fn pressure(&mut self, row: usize, time_s: f64, kpa: &mut Row) {
-        self.pressure.iter_mut().for_each(|effect| effect.call(|part| part.apply(row, time_s, kpa)));
+        self.pressure.iter_mut().for_each(|effect| effect.call(|part| part(row, time_s, kpa)));
     }
 
     fn conductance(&mut self, row: usize, time_s: f64, siemens: &mut Row) {
@@ -218,7 +209,7 @@ pub const EFFECTS: &[Description] = &[
         build: |build, parts| {
             let half = build.number("width_percent") / 200.0;
             let mut held_kpa = [Row::default(); ROWS];
-            parts.sensor.pressure.push(build.part(Box::new(move |row: usize, _: f64, kpa: &mut Row| {
+            parts.sensor.pressure.push(build.part(Box::new(move |row, _, kpa| {
                 for (held, kpa) in held_kpa[row].iter_mut().zip(kpa) {
                     // Not clamp(): it panics at a negative pressure, which swaps the bounds.
                     *held = held.max(*kpa * (1.0 - half)).min(*kpa * (1.0 + half));
@@ -243,7 +234,7 @@ pub const EFFECTS: &[Description] = &[
             let share = build.number("rate_percent_per_decade") / 100.0;
             let (mut sampled_s, mut crept_kpa) = ([None; ROWS], [[[0.0; COLUMNS]; TERMS]; ROWS]);
             let (mut last_s, mut shares) = (0.0, [0.0; TERMS]);
-            parts.sensor.pressure.push(build.part(Box::new(move |row: usize, time_s: f64, kpa: &mut Row| {
+            parts.sensor.pressure.push(build.part(Box::new(move |row, time_s, kpa| {
                 let step_s = sampled_s[row].replace(time_s).map_or(0.0, |before_s: f64| (time_s - before_s).max(0.0));
                 if step_s != last_s {
                     (last_s, shares) = (step_s, TAUS_S.map(|tau_s| gone(step_s / tau_s)));
@@ -276,7 +267,7 @@ pub const EFFECTS: &[Description] = &[
             let share = build.number("rms_percent") / 100.0;
             let gains: [Row; ROWS] =
                 [(); ROWS].map(|()| Row::default().map(|_| (1.0 + share * normal_within_3(&mut rng)).max(0.0)));
-            parts.sensor.pressure.push(build.part(Box::new(move |row: usize, _: f64, kpa: &mut Row| {
+            parts.sensor.pressure.push(build.part(Box::new(move |row, _, kpa| {
                 kpa.iter_mut().zip(gains[row]).for_each(|(kpa, gain)| *kpa *= gain);
             })))
         },
@@ -307,18 +298,21 @@ pub const EFFECTS: &[Description] = &[
         ],
         zero: &[("warming_k", 0.0)],
         build: |build, parts| {
-            let number = |name| build.number(name);
-            parts.sensor.pressure.push(build.part(Box::new(TemperatureDrift {
-                warming_k: number("warming_k"),
-                time_constant_s: number("time_constant_s"),
-                gain_per_k: number("gain_percent_per_k") / 100.0,
-                zero_kpa_per_k: number("zero_kpa_per_k"),
-                chip_k: number("warming_k") * number("chip_share"),
-                chip_time_constant_s: match number("chip_time_constant_s") {
-                    0.0 => number("time_constant_s"),
-                    own => own,
-                },
-            })))
+            let [warming_k, time_constant_s, zero_kpa_per_k, chip_share] =
+                ["warming_k", "time_constant_s", "zero_kpa_per_k", "chip_share"].map(|name| build.number(name));
+            let gain_per_k = build.number("gain_percent_per_k") / 100.0;
+            let chip_k = warming_k * chip_share;
+            let chip_time_constant_s = match build.number("chip_time_constant_s") {
+                0.0 => time_constant_s,
+                own => own,
+            };
+            parts.sensor.pressure.push(build.part(Box::new(move |_, time_s, kpa| {
+                let warmer_k = warming_k * gone(time_s.max(0.0) / time_constant_s);
+                let (gain, zero_kpa) = (1.0 + gain_per_k * warmer_k, zero_kpa_per_k * warmer_k);
+                kpa.iter_mut().for_each(|kpa| *kpa = *kpa * gain + zero_kpa);
+            })));
+            let chip_c = move |time_s: f64| 25.0 + chip_k * gone(time_s.max(0.0) / chip_time_constant_s);
+            parts.sensor.chip.push(build.part(Box::new(chip_c)));
         },
     },
     Description {
@@ -548,27 +542,6 @@ fn gone(x: f64) -> f64 {
         ..1e-4 => series(&SHARES[7..]),
         ..0.125 => series(&SHARES),
         _ => 1.0 - decay(x),
-    }
-}
-
-struct TemperatureDrift {
-    warming_k: f64,
-    time_constant_s: f64,
-    gain_per_k: f64,
-    zero_kpa_per_k: f64,
-    chip_k: f64,
-    chip_time_constant_s: f64,
-}
-
-impl Pressure for TemperatureDrift {
-    fn chip_c(&self, time_s: f64) -> Option<f64> {
-        Some(25.0 + self.chip_k * gone(time_s.max(0.0) / self.chip_time_constant_s))
-    }
-
-    fn apply(&mut self, _row: usize, time_s: f64, kpa: &mut Row) {
-        let warmer_k = self.warming_k * gone(time_s.max(0.0) / self.time_constant_s);
-        let (gain, zero_kpa) = (1.0 + self.gain_per_k * warmer_k, self.zero_kpa_per_k * warmer_k);
-        kpa.iter_mut().for_each(|kpa| *kpa = *kpa * gain + zero_kpa);
     }
 }
 

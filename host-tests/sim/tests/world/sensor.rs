@@ -69,11 +69,13 @@ fn without_magnitude_no_bit_changes() {
     let all: String = effects::all().filter(|effect| names().contains(&effect.name)).map(sim::scene::zero).collect();
     let mut zero = stages(&all, 1);
     assert_eq!(scan(&mut zero, 1000, 1), plain);
-    for cost in zero.costs() {
+    // The chip's temperature is not part of a scan.
+    let costs: Vec<_> = zero.costs().filter(|cost| cost.evaluations > 0).collect();
+    for cost in &costs {
         let a_frame = cost.evaluations as usize / 1000;
         assert!(a_frame == ROWS || a_frame == SLOTS, "{} is called {a_frame} times a frame", cost.effect);
     }
-    assert_eq!(zero.costs().count(), names().len());
+    assert_eq!(costs.len(), names().len());
 }
 
 #[test]

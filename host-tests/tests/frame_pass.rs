@@ -203,7 +203,7 @@ pub fn frames() -> [Frame; 2] {
     let mut world = Plant::new(&Setup::default());
     let mut frames = [Frame::EMPTY; 2];
     world.fill_frame(&mut frames[1]);
-    world.place(world.setup().wall.distance_mm + 1.5);
+    world.place(world.finger().setup.wall.distance_mm + 1.5);
     world.fill_frame(&mut frames[0]);
     frames
 }

@@ -32,7 +32,7 @@ impl Bench {
     }
 
     fn press(&mut self, indentation_mm: f64) -> Contact {
-        self.world.place(self.world.setup().wall.distance_mm + indentation_mm);
+        self.world.place(self.world.finger().setup.wall.distance_mm + indentation_mm);
         self.read()
     }
 }

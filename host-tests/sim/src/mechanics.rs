@@ -65,26 +65,29 @@ const TOLERANCE: f64 = 1e-15;
 pub struct Finger<D> {
     pub contact: Contact,
     pub drive: D,
-    setup: Setup,
+    /// Setup; the surface of the object may be moved.
+    pub setup: Setup,
     rotor: Rotor,
     mm_per_rad: f64,
-    now: Motion,
+    /// State of the motion. A finger of the same setup continues from it to the bit.
+    pub now: Motion,
     friction: Friction,
-    slipped_counts: i32,
-    fallen_v: Option<f64>,
+    /// Counts by which the encoder has slipped.
+    pub slipped_counts: i32,
+    /// Voltage to which the supply has dropped.
+    pub fallen_v: Option<f64>,
 }
 
-/// State of the motion. A finger of the same setup continues from it to the bit.
 #[derive(Clone, Copy, Debug)]
 pub struct Motion {
     /// Shaft before and after the last step.
     before: Shaft,
-    shaft: Shaft,
+    pub shaft: Shaft,
     rad_per_s2: f64,
     winding_a: f64,
-    tip_mm: f64,
+    pub tip_mm: f64,
     bridge: Bridge,
-    circuit: Circuit,
+    pub circuit: Circuit,
     dt_s: f64,
 }
 
@@ -129,10 +132,6 @@ impl<D: drive::Stages> Finger<D> {
             slipped_counts: 0,
             fallen_v: None,
         }
-    }
-
-    pub fn setup(&self) -> &Setup {
-        &self.setup
     }
 
     /// Effective mass of the finger at the tip.
@@ -208,14 +207,6 @@ impl<D: drive::Stages> Finger<D> {
         }
     }
 
-    pub fn motion(&self) -> Motion {
-        self.now
-    }
-
-    pub fn resume(&mut self, motion: &Motion) {
-        self.now = *motion;
-    }
-
     /// True if the shaft did not move in the last step.
     pub fn rests(&self) -> bool {
         self.now.before == self.now.shaft && self.now.shaft.speed_rad_per_s == 0.0
@@ -226,16 +217,6 @@ impl<D: drive::Stages> Finger<D> {
         self.now.shaft = Shaft { angle_rad: travel_mm / self.mm_per_rad, speed_rad_per_s: 0.0 };
         (self.now.before, self.now.rad_per_s2, self.now.winding_a, self.now.tip_mm) =
             (self.now.shaft, 0.0, 0.0, travel_mm);
-    }
-
-    /// Puts the surface of the object where the tip meets it at this travel.
-    pub fn place_object(&mut self, distance_mm: f64) {
-        self.setup.wall.distance_mm = distance_mm;
-    }
-
-    /// Sets the counts by which the encoder has slipped, and the voltage to which the supply has dropped.
-    pub fn happen(&mut self, slipped_counts: i32, fallen_v: Option<f64>) {
-        (self.slipped_counts, self.fallen_v) = (slipped_counts, fallen_v);
     }
 
     /// Force at the tip that dry friction and the gear hold without the motor, N.
@@ -280,14 +261,6 @@ impl<D: drive::Stages> Finger<D> {
         if self.drive.none() { count } else { self.drive.count(count) }
     }
 
-    pub fn tip_mm(&self) -> f64 {
-        self.now.tip_mm
-    }
-
-    pub fn shaft(&self) -> Shaft {
-        self.now.shaft
-    }
-
     /// Speed of the tip while the gear drives it.
     pub fn speed_mm_per_s(&self) -> f64 {
         self.now.shaft.speed_rad_per_s * self.mm_per_rad
@@ -303,11 +276,6 @@ impl<D: drive::Stages> Finger<D> {
 
     pub fn supply_v(&self) -> f64 {
         self.now.circuit.source_v - self.now.circuit.source_ohm * self.now.circuit.duty * self.current_a()
-    }
-
-    /// Share of the supply at the motor in the last step.
-    pub fn duty(&self) -> f64 {
-        self.now.circuit.duty
     }
 
     /// Kinetic energy, and energy of the effects on the drive, mJ.

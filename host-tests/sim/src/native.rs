@@ -237,7 +237,7 @@ impl<E: Set> Board<E> {
     /// Returns the cost of each effect in the order of the scene, over all fingers and stages.
     fn costs(&self, scene: &Scene) -> Vec<Cost> {
         let mut all = Vec::new();
-        for (unit, finger) in self.units.iter().zip(self.world.fingers()) {
+        for (unit, finger) in self.units.iter().zip(&self.world.fingers) {
             all.extend(E::costs(&unit.sensor, &finger.contact.effects, &finger.drive, &unit.link));
         }
         by_effect(scene, &all)

@@ -8,7 +8,6 @@ pub use crate::setup::Setup;
 use crate::effects::drive::{self, Circuit, Friction};
 use crate::effects::sensor::{self, Readout, Settling};
 use crate::effects::{Parts, Set, contact, link};
-use crate::mechanics::rotor::Shaft;
 use crate::mechanics::{Bridge, Finger, decay};
 use crate::scene::Scene;
 use crate::setup::Array;
@@ -33,21 +32,12 @@ impl Plant {
         Self { faults: Faults::default(), world, sensor, readout }
     }
 
-    fn finger(&self) -> &Finger<Drive> {
-        &self.world.fingers()[0]
+    pub fn finger(&self) -> &Finger<Drive> {
+        &self.world.fingers[0]
     }
 
-    fn finger_mut(&mut self) -> &mut Finger<Drive> {
-        &mut self.world.fingers_mut()[0]
-    }
-
-    pub fn setup(&self) -> &Setup {
-        self.finger().setup()
-    }
-
-    /// Puts the object where the tip meets it at this travel.
-    pub fn place_object(&mut self, distance_mm: f64) {
-        self.finger_mut().place_object(distance_mm);
+    pub fn finger_mut(&mut self) -> &mut Finger<Drive> {
+        &mut self.world.fingers[0]
     }
 
     /// Advances by one step with a constant bridge. The tests cover steps of 10 us.
@@ -64,35 +54,17 @@ impl Plant {
         self.advance(0.0, Bridge::Coast);
     }
 
-    /// Angle and speed of the motor.
-    pub fn shaft(&self) -> Shaft {
-        self.finger().shaft()
-    }
-
     pub fn travel_mm(&self) -> f64 {
-        self.finger().tip_mm()
-    }
-
-    pub fn speed_mm_per_s(&self) -> f64 {
-        self.finger().speed_mm_per_s()
+        self.finger().now.tip_mm
     }
 
     /// Indentation of the tip; 0 without contact.
     pub fn indentation_mm(&self) -> f64 {
-        (self.travel_mm() - self.setup().wall.distance_mm).max(0.0)
+        (self.travel_mm() - self.finger().setup.wall.distance_mm).max(0.0)
     }
 
     pub fn force_n(&self) -> f64 {
         self.world.force_n(0)
-    }
-
-    /// Current in the winding, averaged over the PWM.
-    pub fn current_a(&self) -> f64 {
-        self.finger().current_a()
-    }
-
-    pub fn supply_v(&self) -> f64 {
-        self.finger().supply_v()
     }
 
     /// Count of the timer in encoder mode, unwrapped.
@@ -115,7 +87,7 @@ impl Plant {
 
     /// Settled voltages of all columns while these rows are driven.
     pub fn settled_volts(&mut self, driven: &[bool; ROWS]) -> [f64; COLUMNS] {
-        let (array, faults) = (self.setup().array, self.faults.array);
+        let (array, faults) = (self.finger().setup.array, self.faults.array);
         if faults.saturated {
             return [array.reference_v; COLUMNS];
         }
@@ -140,7 +112,7 @@ impl Plant {
 
     /// Codes of a slot, sampled [`crate::setup::Array::sample_after_s`] after its edge.
     pub fn slot_codes(&mut self, slot: usize) -> [u16; COLUMNS] {
-        let array = self.setup().array;
+        let array = self.finger().setup.array;
         let [before, end] = [(slot + SLOTS - 1) % SLOTS, slot].map(|slot| self.settled_volts(&driven_in(slot)));
         let left = decay(array.sample_after_s / array.settle_tau_s);
         core::array::from_fn(|column| array.code(end[column] + left * (before[column] - end[column])))
@@ -154,9 +126,9 @@ fn driven_in(slot: usize) -> [bool; ROWS] {
 
 impl Clone for Plant {
     fn clone(&self) -> Self {
-        let (mut plant, finger) = (Self::new(self.setup()), self.finger());
+        let (mut plant, finger) = (Self::new(&self.finger().setup), self.finger());
         plant.faults = self.faults;
-        plant.finger_mut().resume(&finger.motion());
+        plant.finger_mut().now = finger.now;
         plant.finger_mut().drive.counts = finger.drive.counts;
         plant
     }

@@ -183,8 +183,10 @@ pub struct Agreement {
     first: Path,
     noisy: bool,
     steps: u64,
-    difference: [Largest; 2],
-    beyond: [Largest; 2],
+    /// Largest difference of the force, N, and of the travel, mm.
+    pub difference: [Largest; 2],
+    /// Largest distance of the second board from the tube, N and mm.
+    pub beyond: [Largest; 2],
 }
 
 impl Agreement {
@@ -199,16 +201,6 @@ impl Agreement {
     pub fn held(&self) -> bool {
         let [(force_n, _), (travel_mm, _)] = self.beyond;
         self.noisy || self.steps > 0 && force_n <= BEYOND_N && travel_mm <= BEYOND_MM
-    }
-
-    /// Largest difference of the force, N, and of the travel, mm.
-    pub fn differences(&self) -> [f64; 2] {
-        self.difference.map(|(largest, _)| largest)
-    }
-
-    /// Largest distance of the second board from the tube, N and mm.
-    pub fn beyond(&self) -> [f64; 2] {
-        self.beyond.map(|(largest, _)| largest)
     }
 }
 

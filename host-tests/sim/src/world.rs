@@ -26,11 +26,11 @@ const GONE_MM: f64 = 1e3;
 const PUT_BACK_MM_PER_S: f64 = 20.0;
 
 pub struct World<E: Set> {
-    fingers: Vec<Finger<E::Drive>>,
+    pub fingers: Vec<Finger<E::Drive>>,
     around: Surroundings,
     /// Mass of the object; none if it is fixed.
     mass_kg: Option<f64>,
-    body: Body,
+    pub body: Body,
     body_before: Body,
     dt_s: f64,
     happened: Happened,
@@ -66,7 +66,7 @@ impl<E: Set> World<E> {
     /// Refuses a step that is too long for the steepest contact.
     pub fn check_step(&self, step_s: f64) -> Result<(), SimError> {
         for finger in &self.fingers {
-            let n_per_mm = finger.contact.steepest_n_per_mm(Tip::DEEPEST * finger.setup().tip.radius_mm);
+            let n_per_mm = finger.contact.steepest_n_per_mm(Tip::DEEPEST * finger.setup.tip.radius_mm);
             // An object between two fingers is pushed back by both.
             let lightness = 1.0 / finger.mass_kg() + self.mass_kg.map_or(0.0, |kg| 2.0 / kg);
             let potential = finger.drive.steepest_nm_per_rad() / finger.inertia_kg_m2();
@@ -79,18 +79,6 @@ impl<E: Set> World<E> {
             }
         }
         Ok(())
-    }
-
-    pub fn fingers(&self) -> &[Finger<E::Drive>] {
-        &self.fingers
-    }
-
-    pub fn fingers_mut(&mut self) -> &mut [Finger<E::Drive>] {
-        &mut self.fingers
-    }
-
-    pub fn body(&self) -> &Body {
-        &self.body
     }
 
     /// Advances by one step from a time with constant bridges, one for each finger.
@@ -120,7 +108,7 @@ impl<E: Set> World<E> {
     fn happen(&mut self, time_s: f64) {
         let mut now = Happened::at(&self.around.events, time_s);
         for finger in &mut self.fingers {
-            finger.happen(now.slipped_counts, now.supply_v);
+            (finger.slipped_counts, finger.fallen_v) = (now.slipped_counts, now.supply_v);
         }
         if self.mass_kg.is_none() {
             self.body.place_mm[0] = now.object_mm;
@@ -154,7 +142,7 @@ impl<E: Set> World<E> {
     /// Advances each finger against a fixed object.
     fn advance_fingers(&mut self, time_s: f64) {
         for (index, finger) in self.fingers.iter_mut().enumerate() {
-            let [from, to] = [&self.body_before, &self.body].map(|body| surface_mm(finger.setup(), index, body));
+            let [from, to] = [&self.body_before, &self.body].map(|body| surface_mm(&finger.setup, index, body));
             let end =
                 finger.solve(|contact: &Contact, from_mm, to_mm| contact.law().mean_n(from_mm - from, to_mm - to));
             finger.finish(&end, to);
@@ -173,7 +161,7 @@ impl<E: Set> World<E> {
                 let drawn_s = overlap_s([time_s, until_s], [grip.drift_from_s, f64::INFINITY]);
                 let lifted_mm = self.around.hand_mm(until_s) - self.around.hand_mm(time_s);
                 let way_mm = grip.drift_mm_per_s * drawn_s - lifted_mm;
-                let surface_mm = surface_mm(finger.setup(), index, &self.body);
+                let surface_mm = surface_mm(&finger.setup, index, &self.body);
                 let force_n = finger.contact.law().force_n(finger.flank_mm() - surface_mm);
                 (_, finger.contact.along) = finger.contact.along.moved(&grip, force_n, way_mm, self.dt_s);
             }
@@ -194,7 +182,7 @@ impl<E: Set> World<E> {
         for _ in 0..ROUNDS {
             let (mut force_n, mut changed_mm) = ([0.0; 2], 0.0_f64);
             for (index, finger) in self.fingers.iter_mut().enumerate() {
-                let [from, to] = [&body, &next].map(|body| surface_mm(finger.setup(), index, body));
+                let [from, to] = [&body, &next].map(|body| surface_mm(&finger.setup, index, body));
                 let law = finger.contact.law();
                 let mean_n = law.mean_n(finger.flank_mm() - from, flanks[index] - to);
                 force_n[0] += side(index) * mean_n;
@@ -221,14 +209,14 @@ impl<E: Set> World<E> {
         }
         self.body = next;
         for (index, (finger, end)) in self.fingers.iter_mut().zip(ends.iter().flatten()).enumerate() {
-            finger.finish(end, surface_mm(finger.setup(), index, &next));
+            finger.finish(end, surface_mm(&finger.setup, index, &next));
             finger.contact.along = along[index].unwrap_or(finger.contact.along);
         }
     }
 
     fn overlap_mm(&self, index: usize) -> f64 {
         let finger = &self.fingers[index];
-        finger.flank_mm() - surface_mm(finger.setup(), index, &self.body)
+        finger.flank_mm() - surface_mm(&finger.setup, index, &self.body)
     }
 
     /// Energy of the contact of a finger, mJ: elastic and along the surface.
@@ -258,7 +246,7 @@ impl<E: Set> World<E> {
     pub fn truth(&mut self, index: usize, pressures: bool) -> Truth {
         let force_n = self.force_n(index);
         let finger = &self.fingers[index];
-        let wall = &finger.setup().wall;
+        let wall = &finger.setup.wall;
         let along = &finger.contact.along;
         let depth_mm = finger.contact.law().depth_mm(self.overlap_mm(index)).max(0.0);
         let [x, y] = finger.contact.centre_mm(depth_mm);
@@ -266,11 +254,11 @@ impl<E: Set> World<E> {
             force_n,
             indentation_mm: depth_mm,
             centre_mm: [wall.centre_x_mm + x, wall.centre_y_mm + y],
-            travel_mm: finger.tip_mm(),
+            travel_mm: finger.now.tip_mm,
             speed_mm_per_s: finger.speed_mm_per_s(),
             current_a: finger.current_a(),
             supply_v: finger.supply_v(),
-            duty: finger.duty(),
+            duty: finger.now.circuit.duty,
             winding_c: 25.0,
             tangential_n: -finger.contact.n_per_mm_along * along.stretch_mm,
             slip_mm: along.slip_mm,
@@ -312,7 +300,7 @@ impl<E: Set> World<E> {
             body.place_mm[0] = before.place_mm[0] + since_s * (v0 + 0.5 * (v1 - v0) * t);
         }
         let finger = &self.fingers[index];
-        finger.contact.place(finger.flank_within_mm(since_s) - surface_mm(finger.setup(), index, &body))
+        finger.contact.place(finger.flank_within_mm(since_s) - surface_mm(&finger.setup, index, &body))
     }
 
     /// Mean pressures on a row for a contact.
@@ -338,7 +326,7 @@ impl<E: Set> World<E> {
             body.place_mm[0] += off_s * (v1 + 0.5 * (v1 - v0) * off_s / self.dt_s);
         }
         let finger = &self.fingers[index];
-        let place = finger.contact.place(finger.flank_ahead_mm(off_s) - surface_mm(finger.setup(), index, &body));
+        let place = finger.contact.place(finger.flank_ahead_mm(off_s) - surface_mm(&finger.setup, index, &body));
         self.placed_kpa(index, &place, row)
     }
 }

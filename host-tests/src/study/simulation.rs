@@ -62,7 +62,7 @@ fn plant(state: &mut State, dt_s: f64, bridge: Bridge) {
 
 fn euler(state: &mut State, dt_s: f64, bridge: Bridge) {
     let Bridge::Driven { duty } = bridge else { return };
-    let Setup { tip, wall, motor, transmission, supply, .. } = state.world.setup();
+    let Setup { tip, wall, motor, transmission, supply, .. } = &state.world.finger().setup;
     let mm_per_rad = transmission.drum_radius_mm / transmission.ratio;
     let depth = (state.angle_rad * mm_per_rad - wall.distance_mm).max(0.0);
     let load = tip.force_n(depth) * mm_per_rad * 1e-3;

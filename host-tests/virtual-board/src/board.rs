@@ -147,7 +147,7 @@ impl Surroundings {
 
     pub fn supply_v(&self) -> f64 {
         match self {
-            Self::Plant(world) => world.supply_v(),
+            Self::Plant(world) => world.finger().supply_v(),
             Self::Scene(finger) => finger.supply_v(),
         }
     }
@@ -170,7 +170,7 @@ impl Surroundings {
 
     pub fn reference_v(&self) -> f64 {
         match self {
-            Self::Plant(world) => world.setup().array.reference_v,
+            Self::Plant(world) => world.finger().setup.array.reference_v,
             Self::Scene(finger) => finger.reference_v(),
         }
     }

@@ -290,6 +290,6 @@ fn column_volts(
         _ => settled.insert((newest, settles(drive), settles(before))),
     };
     let since_s = (at_ns - drive.since_ns.min(at_ns)) as f64 * 1e-9;
-    let left = decay(since_s / world.setup().array.settle_tau_s);
+    let left = decay(since_s / world.finger().setup.array.settle_tau_s);
     end[column] + left * (start[column] - end[column])
 }

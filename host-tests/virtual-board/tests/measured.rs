@@ -66,7 +66,7 @@ pub fn a_press_completes_and_the_modulus_is_solved(rig: &mut Rig) {
     measure(rig, Task::Press);
     let press = record::press(&fetch(rig), &Params::DEFAULT).expect("a press");
     let kpa = solve::modulus(&[press]).expect("a modulus").kpa;
-    let true_kpa = rig.world(|world| world.setup().tip.modulus_kpa).expect("it runs");
+    let true_kpa = rig.world(|world| world.finger().setup.tip.modulus_kpa).expect("it runs");
     println!("modulus {kpa} kPa, true {true_kpa}");
     assert!((kpa / true_kpa - 1.0).abs() < 0.03, "{kpa}");
     // The finger holds forces afterwards.

@@ -88,9 +88,9 @@ fn both_boards_do_the_same_and_one_that_does_otherwise_is_noticed() {
     println!("{same}\n{:.3} times real time", summary.virtual_s / summary.wall_s);
     assert!(same.held(), "{same}");
     // Two boards that do not differ at all would be one board compared with itself.
-    let [force_n, travel_mm] = same.differences();
+    let [(force_n, _), (travel_mm, _)] = same.difference;
     assert!(force_n > 1e-4 && travel_mm > 1e-5, "{same}");
-    let [force_n, travel_mm] = other.beyond();
+    let [(force_n, _), (travel_mm, _)] = other.beyond;
     assert!(!other.held() && (force_n > BEYOND_N || travel_mm > BEYOND_MM), "{other}");
     assert!(kept.force_n == 0.0 && kept.times_s.last().is_some_and(|time_s| *time_s > 0.79), "{kept:?}");
 }

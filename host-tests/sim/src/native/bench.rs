@@ -39,9 +39,9 @@ impl<E: Set> Bench<E> {
         let mut before = core::mem::replace(&mut self.board, Board::new(&scene.without_events())?);
         let now = &mut self.board;
         (now.clock, now.start, now.bridges) = (before.clock, before.start, before.bridges);
-        let finger = &mut now.world.fingers_mut()[0];
-        let finger_before = &mut before.world.fingers_mut()[0];
-        finger.resume(&finger_before.motion());
+        let finger = &mut now.world.fingers[0];
+        let finger_before = &mut before.world.fingers[0];
+        finger.now = finger_before.now;
         finger.contact.effects.remember(&mut finger_before.contact.effects);
         if let (Some(now), Some(before)) = (now.units.first_mut(), before.units.into_iter().next()) {
             (now.pipeline, now.frame, now.command) = (before.pipeline, before.frame, before.command);
@@ -54,8 +54,9 @@ impl<E: Set> Bench<E> {
     pub fn fork(&self, scene: &Scene) -> Result<Self, SimError> {
         let mut fork = Self::new(scene)?;
         let (from, to) = (&self.board, &mut fork.board);
-        to.world.fingers_mut()[0].resume(&from.world.fingers()[0].motion());
-        to.world.fingers_mut()[0].place_object(from.world.fingers()[0].setup().wall.distance_mm);
+        let (finger, finger_before) = (&mut to.world.fingers[0], &from.world.fingers[0]);
+        finger.now = finger_before.now;
+        finger.setup.wall.distance_mm = finger_before.setup.wall.distance_mm;
         let (before, now) = (&from.units[0], &mut to.units[0]);
         now.pipeline = before.pipeline.clone();
         (now.frame, now.command, now.next) = (before.frame, before.command, before.next);
@@ -74,7 +75,7 @@ impl<E: Set> Bench<E> {
     }
 
     fn finger_mut(&mut self) -> &mut Finger<E::Drive> {
-        &mut self.board.world.fingers_mut()[0]
+        &mut self.board.world.fingers[0]
     }
 
     pub fn command(&mut self) -> &mut Command {
@@ -189,7 +190,7 @@ impl<E: Set> Bench<E> {
 
     /// Puts the object where the tip meets it at this travel.
     pub fn place_object(&mut self, distance_mm: f64) {
-        self.finger_mut().place_object(distance_mm);
+        self.finger_mut().setup.wall.distance_mm = distance_mm;
     }
 
     /// Moves the surface of the object at a constant speed and calls `each` after every frame.
@@ -226,7 +227,7 @@ impl Bench {
 
     /// Sets or clears defects.
     pub fn harm(&mut self, change: impl FnOnce(&mut Faults)) {
-        let faults = &mut self.board.world.fingers_mut()[0].drive.faults;
+        let faults = &mut self.board.world.fingers[0].drive.faults;
         change(faults);
         self.board.units[0].sensor.faults = faults.array;
     }

@@ -308,7 +308,7 @@ struct Object {
 
 impl Object {
     fn new<E: Set>(world: &World<E>) -> Self {
-        let scene_mm = world.fingers()[0].setup().wall.distance_mm;
+        let scene_mm = world.fingers[0].setup.wall.distance_mm;
         Self { scene_mm, now_mm: scene_mm, goal_mm: scene_mm, mm_per_s: MM_PER_S }
     }
 
@@ -327,7 +327,7 @@ impl Object {
     }
 
     fn place<E: Set>(&self, world: &mut World<E>) {
-        world.fingers_mut().iter_mut().for_each(|finger| finger.place_object(self.now_mm));
+        world.fingers.iter_mut().for_each(|finger| finger.setup.wall.distance_mm = self.now_mm);
     }
 }
 
@@ -355,7 +355,7 @@ impl<E: Set> Bus<E> {
                 Ok("the object is taken away".into())
             }
             ["put"] => {
-                let tip_mm = self.board.world.fingers().iter().map(|finger| finger.tip_mm()).fold(f64::MIN, f64::max);
+                let tip_mm = self.board.world.fingers.iter().map(|finger| finger.now.tip_mm).fold(f64::MIN, f64::max);
                 let to_mm =
                     self.object.scene_mm.max(if tip_mm > self.object.scene_mm { tip_mm + GAP_MM } else { tip_mm });
                 self.object.jump(&mut self.board.world, to_mm);
@@ -395,7 +395,7 @@ impl<E: Set> Bus<E> {
         let mm_per_s = mm_per_s.map_or(Ok(MM_PER_S), |text| number(text, "MM_PER_S", 0.001, MM_PER_S_MAX))?;
         // An object that was away starts where it cannot touch.
         if self.object.now_mm == AWAY_MM {
-            let tip_mm = self.board.world.fingers()[0].tip_mm();
+            let tip_mm = self.board.world.fingers[0].now.tip_mm;
             self.object.jump(&mut self.board.world, to_mm.max(tip_mm + GAP_MM));
         }
         (self.object.goal_mm, self.object.mm_per_s) = (to_mm, mm_per_s);

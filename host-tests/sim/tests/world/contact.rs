@@ -17,7 +17,7 @@ const HELD: &str = "[effects.dry_friction]\ntorque_mnm = 20.0\n";
 
 fn pressed(text: &str, d_mm: f64) -> sim::world::World<sim::effects::Named> {
     let mut world = world(&format!("{HELD}{text}"));
-    world.fingers_mut()[0].place(5.0 + d_mm);
+    world.fingers[0].place(5.0 + d_mm);
     world
 }
 
@@ -41,16 +41,16 @@ fn a_tip_pulled_back_quickly_leaves_the_object_before_its_shape_returns() {
     run(&mut world, 1e-3, 1_000, Bridge::Coast);
     // F_e = S at d = 2 sqrt(0.5).
     for (d_mm, touches) in [(1.45, true), (1.40, false)] {
-        world.fingers_mut()[0].place(5.0 + d_mm);
+        world.fingers[0].place(5.0 + d_mm);
         assert_eq!(world.force_n(0) > 0.0, touches, "{d_mm} mm");
     }
     // Off the object the tip recovers more slowly: dq/dt = -(1 - share) q / tau.
-    world.fingers_mut()[0].place(4.0);
+    world.fingers[0].place(4.0);
     run(&mut world, 1e-4, 1_000, Bridge::Coast);
     let remembered = (-0.5 * 0.1 / 0.05_f64).exp();
     let shape_mm = 2.0 * (0.5 * remembered).sqrt();
     for (share, touches) in [(1.0001, true), (0.9999, false)] {
-        world.fingers_mut()[0].place(5.0 + shape_mm * share);
+        world.fingers[0].place(5.0 + shape_mm * share);
         assert_eq!(world.force_n(0) > 0.0, touches, "{share} of {shape_mm} mm");
     }
 }
@@ -158,11 +158,11 @@ fn an_object_breaks_once_and_for_all() {
     run(&mut world, 1e-4, 10, Bridge::Coast);
     close(world.force_n(0), PI * 0.25 * 1.38 * 1.38, 1e-12);
     assert!(!world.truth(0, false).broken);
-    world.fingers_mut()[0].place(5.0 + 1.39);
+    world.fingers[0].place(5.0 + 1.39);
     run(&mut world, 1e-4, 1, Bridge::Coast);
     close(world.force_n(0), 0.2 * PI * 0.25 * 1.39 * 1.39, 1e-12);
     assert!(world.truth(0, false).broken);
-    world.fingers_mut()[0].place(6.0);
+    world.fingers[0].place(6.0);
     run(&mut world, 1e-4, 1, Bridge::Coast);
     close(world.force_n(0), 0.2 * PI * 0.25, 1e-12);
 }
@@ -219,25 +219,25 @@ fn the_order_of_asking_does_not_matter() {
 #[test]
 fn a_collision_keeps_momentum_and_energy() {
     let mut world = world("[object]\ndistance_mm = 1.0\n[effects.object_mass]\nmass_g = 300.0\n");
-    world.fingers_mut()[0].launch(200.0);
-    let finger_kg = world.fingers()[0].mass_kg();
+    world.fingers[0].launch(200.0);
+    let finger_kg = world.fingers[0].mass_kg();
     let momentum = finger_kg * 200.0;
     let energy_mj = 0.5 * finger_kg * 200.0 * 200.0 * 1e-3;
     let mut squeezed_mm = 0.0_f64;
     for _ in 0..20_000 {
         run(&mut world, 20e-6, 1, Bridge::Coast);
-        let body_mm_per_s = world.body().speed_mm_per_s[0];
-        close(finger_kg * world.fingers()[0].speed_mm_per_s() + 0.3 * body_mm_per_s, momentum, 1e-9);
+        let body_mm_per_s = world.body.speed_mm_per_s[0];
+        close(finger_kg * world.fingers[0].speed_mm_per_s() + 0.3 * body_mm_per_s, momentum, 1e-9);
         let body_mj = 0.5 * 0.3 * body_mm_per_s * body_mm_per_s * 1e-3;
-        close(world.fingers()[0].energy_mj() + body_mj + world.contact_mj(0), energy_mj, 1e-9);
+        close(world.fingers[0].energy_mj() + body_mj + world.contact_mj(0), energy_mj, 1e-9);
         squeezed_mm = squeezed_mm.max(world.truth(0, false).indentation_mm);
     }
     assert!(squeezed_mm > 1.0, "{squeezed_mm} mm");
     assert_eq!(world.force_n(0), 0.0);
     // The elastic collision's closed form.
     let total = finger_kg + 0.3;
-    close(world.fingers()[0].speed_mm_per_s(), 200.0 * (finger_kg - 0.3) / total, 1e-9);
-    close(world.body().speed_mm_per_s[0], 200.0 * 2.0 * finger_kg / total, 1e-9);
+    close(world.fingers[0].speed_mm_per_s(), 200.0 * (finger_kg - 0.3) / total, 1e-9);
+    close(world.body.speed_mm_per_s[0], 200.0 * 2.0 * finger_kg / total, 1e-9);
 }
 
 #[test]
@@ -246,11 +246,11 @@ fn without_fingers_it_falls_once_the_floor_is_gone() {
         "[object]\nfloor_until_s = 0.1\nshake_g = 2.0\nshake_at_s = 0.2\nshake_ms = 50.0\n[effects.object_mass]\n",
     );
     run(&mut world, 1e-4, 1_000, Bridge::Coast);
-    assert_eq!(world.body().place_mm, [0.0, 0.0]);
+    assert_eq!(world.body.place_mm, [0.0, 0.0]);
     for step in 1_000..3_000_u32 {
         world.advance(f64::from(step) * 1e-4, 1e-4, &[Bridge::Coast]);
     }
-    close(world.body().speed_mm_per_s[1], -9806.65 * (0.2 + 2.0 * 0.05), 1e-9);
+    close(world.body.speed_mm_per_s[1], -9806.65 * (0.2 + 2.0 * 0.05), 1e-9);
 }
 
 /// A grasp by two fingers.

@@ -13,7 +13,7 @@ const FULL: Bridge = Bridge::Driven { duty: 1.0 };
 const STEPS_S: [f64; 4] = [1e-6, 10e-6, 50e-6, 200e-6];
 
 fn speed(world: &World<Named>) -> f64 {
-    world.fingers()[0].shaft().speed_rad_per_s
+    world.fingers[0].now.shaft.speed_rad_per_s
 }
 
 #[test]
@@ -24,7 +24,7 @@ fn the_current_rises_with_l_over_r_at_any_step() {
         let (end_a, tau_s) = (6.0 / 3.53, 1e-3 / 3.53);
         for step in 1..=10 {
             run(&mut world, step_s, 1, FULL);
-            close(world.fingers()[0].current_a(), end_a * (1.0 - (-step_s * f64::from(step) / tau_s).exp()), 1e-9);
+            close(world.fingers[0].current_a(), end_a * (1.0 - (-step_s * f64::from(step) / tau_s).exp()), 1e-9);
         }
     }
 }
@@ -33,7 +33,7 @@ fn the_current_rises_with_l_over_r_at_any_step() {
 fn viscous_friction_stops_a_coasting_rotor_exponentially() {
     for (step_s, share) in [(10e-6, 1e-7), (1e-3, 1e-3)] {
         let mut world = world(&format!("{FAR}[effects.viscous_friction]\ntorque_unm_s = 1.0\n"));
-        world.fingers_mut()[0].launch(100.0);
+        world.fingers[0].launch(100.0);
         let start = speed(&world);
         run(&mut world, step_s, (0.05 / step_s) as u64, Bridge::Coast);
         close(speed(&world), start * (-0.05 * 1e-6 / 0.71e-7_f64).exp(), share);
@@ -42,22 +42,22 @@ fn viscous_friction_stops_a_coasting_rotor_exponentially() {
 
 #[test]
 fn inertia_adds_up() {
-    let mut world = world(&format!("{FAR}[effects.inertia]\ngear_g_cm2 = 0.29\nfinger_g = 50.0\n"));
+    let world = world(&format!("{FAR}[effects.inertia]\ngear_g_cm2 = 0.29\nfinger_g = 50.0\n"));
     let m_per_rad = 12e-3_f64 / 43.0;
-    close(world.fingers_mut()[0].inertia_kg_m2(), 1.0e-7 + 0.05 * m_per_rad * m_per_rad, 1e-12);
+    close(world.fingers[0].inertia_kg_m2(), 1.0e-7 + 0.05 * m_per_rad * m_per_rad, 1e-12);
 }
 
 #[test]
 fn dry_friction_takes_speed_away_evenly_and_then_holds() {
     let mut world = world(&format!("{FAR}[effects.dry_friction]\ntorque_mnm = 0.12\n"));
-    world.fingers_mut()[0].launch(100.0);
+    world.fingers[0].launch(100.0);
     let start = speed(&world);
     run(&mut world, 10e-6, 5_000, Bridge::Coast);
     close(speed(&world), start - 0.05 * 0.12e-3 / 0.71e-7, 1e-9);
     run(&mut world, 10e-6, 50_000, Bridge::Coast);
     assert_eq!(speed(&world), 0.0);
     // 1/2 J w^2 = T a.
-    close(world.fingers()[0].shaft().angle_rad, 0.5 * 0.71e-7 * start * start / 0.12e-3, 1e-9);
+    close(world.fingers[0].now.shaft.angle_rad, 0.5 * 0.71e-7 * start * start / 0.12e-3, 1e-9);
 }
 
 #[test]
@@ -88,13 +88,13 @@ fn stribeck_friction_breaks_away_higher_than_it_slides() {
 fn cogging_swings_at_its_own_frequency_and_keeps_its_energy() {
     let mut world = world(&format!("{FAR}[effects.cogging]\ntorque_mnm = 0.05\nteeth = 12\n"));
     let still = (0.05e-3 * 12.0 / 0.71e-7_f64).sqrt();
-    world.fingers_mut()[0].launch(0.005);
-    let start = world.fingers()[0].energy_mj();
+    world.fingers[0].launch(0.005);
+    let start = world.fingers[0].energy_mj();
     let (mut crossings, mut last_s, mut before) = (0, 0.0, 0.0);
     for step in 1..=500_000_u32 {
         run(&mut world, 10e-6, 1, Bridge::Coast);
-        close(world.fingers()[0].energy_mj(), start, 1e-9);
-        let now = world.fingers()[0].shaft().angle_rad;
+        close(world.fingers[0].energy_mj(), start, 1e-9);
+        let now = world.fingers[0].now.shaft.angle_rad;
         if before > 0.0 && now <= 0.0 {
             crossings += 1;
             last_s = f64::from(step) * 10e-6;
@@ -110,16 +110,16 @@ fn the_play_is_as_wide_as_it_says() {
     for play_um in [50.0, 300.0] {
         let mut world = world(&format!("{FAR}[effects.backlash]\nplay_um = {play_um:?}\n[effects.dry_friction]\n"));
         run(&mut world, 10e-6, 3_000, FULL);
-        let turned_mm = world.fingers()[0].flank_mm();
-        assert_eq!(world.fingers()[0].tip_mm(), turned_mm);
+        let turned_mm = world.fingers[0].flank_mm();
+        assert_eq!(world.fingers[0].now.tip_mm, turned_mm);
         let mut highest = turned_mm;
-        while world.fingers()[0].flank_mm() > turned_mm - 1.0 {
+        while world.fingers[0].flank_mm() > turned_mm - 1.0 {
             run(&mut world, 10e-6, 1, Bridge::Driven { duty: -1.0 });
-            highest = f64::max(highest, world.fingers()[0].flank_mm());
-            let expected = f64::min(highest, world.fingers()[0].flank_mm() + play_um * 1e-3);
-            assert!((world.fingers()[0].tip_mm() - expected).abs() < 1e-12);
+            highest = f64::max(highest, world.fingers[0].flank_mm());
+            let expected = f64::min(highest, world.fingers[0].flank_mm() + play_um * 1e-3);
+            assert!((world.fingers[0].now.tip_mm - expected).abs() < 1e-12);
         }
-        close(world.fingers()[0].tip_mm() - world.fingers()[0].flank_mm(), play_um * 1e-3, 1e-9);
+        close(world.fingers[0].now.tip_mm - world.fingers[0].flank_mm(), play_um * 1e-3, 1e-9);
     }
 }
 
@@ -162,11 +162,11 @@ fn the_winding_warms_up_like_its_closed_form() {
 fn the_supply_gives_way_by_the_share_of_the_current_that_it_gives() {
     let mut world = world(&format!("{FAR}[effects.supply_sag]\nsource_ohm = 0.5\n"));
     for duty in [1.0, -1.0, 0.5] {
-        world.fingers_mut()[0].place(0.0);
+        world.fingers[0].place(0.0);
         run(&mut world, 0.0, 1, Bridge::Driven { duty });
         let current = duty * 6.0 / (3.53 + duty * duty * 0.5);
-        close(world.fingers()[0].current_a(), current, 1e-12);
-        close(world.fingers()[0].supply_v(), 6.0 - 0.5 * duty * current, 1e-12);
+        close(world.fingers[0].current_a(), current, 1e-12);
+        close(world.fingers[0].supply_v(), 6.0 - 0.5 * duty * current, 1e-12);
     }
 }
 
@@ -206,8 +206,8 @@ fn never_rises(text: &str) {
     let mut random = fastrand::Rng::with_seed(11);
     let mass_kg = text.contains("object_mass").then_some(0.05);
     let energy = |world: &World<Named>| {
-        let finger = &world.fingers()[0];
-        let [x, y] = world.body().speed_mm_per_s;
+        let finger = &world.fingers[0];
+        let [x, y] = world.body.speed_mm_per_s;
         let body_mj = mass_kg.map_or(0.0, |kg: f64| 0.5 * kg * (x * x + y * y) * 1e-3);
         let stretch_mm = finger.contact.along.stretch_mm;
         let along_mj = 0.5 * finger.contact.n_per_mm_along * stretch_mm * stretch_mm;
@@ -220,11 +220,11 @@ fn never_rises(text: &str) {
     for step in 0..1_000_000_u32 {
         if step % 500 == 0 {
             // Always from a place near the wall, so that most of the time there is contact.
-            if moving.fingers()[0].flank_mm().abs() > 5.0 || mass_kg.is_some() {
+            if moving.fingers[0].flank_mm().abs() > 5.0 || mass_kg.is_some() {
                 moving = world(&scene);
             }
-            let towards = if moving.fingers()[0].flank_mm() > 0.0 && random.bool() { -1.0 } else { 1.0 };
-            moving.fingers_mut()[0].launch(towards * (20.0 + 200.0 * random.f64()));
+            let towards = if moving.fingers[0].flank_mm() > 0.0 && random.bool() { -1.0 } else { 1.0 };
+            moving.fingers[0].launch(towards * (20.0 + 200.0 * random.f64()));
             before = energy(&moving);
             scale_mj = scale_mj.max(before);
             bridge = match random.u8(0..3) {
@@ -269,13 +269,13 @@ impl Fed {
         };
         let sag_ohm = if text.contains("supply_sag") { SAG_OHM * duty * duty } else { 0.0 };
         let warmer_k = world.truth(0, false).winding_c - 25.0;
-        let finger = &world.fingers()[0];
+        let finger = &world.fingers[0];
         Self {
             volts: duty * SOURCE_V,
             ohms: open * (CIRCUIT_OHM + sag_ohm + 2.83 * COPPER_PER_K * warmer_k),
             torque_nm_per_a: TORQUE_NM_PER_A * (1.0 + MAGNET_PER_K * warmer_k),
             henry: if text.contains("winding_inductance") { HENRY } else { 0.0 },
-            angle_rad: finger.shaft().angle_rad,
+            angle_rad: finger.now.shaft.angle_rad,
             current_a: finger.current_a(),
         }
     }
@@ -283,8 +283,8 @@ impl Fed {
     /// By the charge that went through, u V dt = R q + k angle + L di, and as a current that varies heats more than its
     /// mean.
     fn at_most_mj(&self, dt_s: f64, world: &World<Named>) -> f64 {
-        let finger = &world.fingers()[0];
-        let turned_rad = finger.shaft().angle_rad - self.angle_rad;
+        let finger = &world.fingers[0];
+        let turned_rad = finger.now.shaft.angle_rad - self.angle_rad;
         let more_a = if self.henry > 0.0 { finger.current_a() - self.current_a } else { 0.0 };
         let charge_c = (self.volts * dt_s - self.torque_nm_per_a * turned_rad - self.henry * more_a) / self.ohms;
         let heat_j = if charge_c == 0.0 { 0.0 } else { self.ohms * charge_c * charge_c / dt_s };
@@ -295,9 +295,9 @@ impl Fed {
 /// Energy of a tip on a plane that remembers q, mJ: E(d) - g q d + g (q d_q - E(d_q)), F_e(d_q) = q, at the indentation
 /// or, off the object, at that of its shape.
 fn relaxing_mj(world: &World<Named>) -> f64 {
-    let finger = &world.fingers()[0];
+    let finger = &world.fingers[0];
     let forgotten_n = finger.contact.law().forgotten_n;
-    let n_per_mm2 = finger.setup().tip.force_per_mm2();
+    let n_per_mm2 = finger.setup.tip.force_per_mm2();
     let elastic_mj = |d: f64| n_per_mm2 * d * d * d / 3.0;
     let d_mm = (finger.flank_mm() - WALL_MM).max((forgotten_n / n_per_mm2).sqrt());
     let remembered_n = forgotten_n / SHARE;

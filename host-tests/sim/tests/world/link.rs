@@ -178,8 +178,8 @@ const DRIVE: Bridge = Bridge::Driven { duty: 1.0 };
 
 fn running_in() -> World<Named> {
     let mut world = world("[object]\ndistance_mm = 0.0\n");
-    world.fingers_mut()[0].place(1.0);
-    world.fingers_mut()[0].launch(50.0);
+    world.fingers[0].place(1.0);
+    world.fingers[0].launch(50.0);
     world
 }
 
@@ -196,11 +196,7 @@ fn what_lies_between_two_steps_is_what_shorter_steps_come_to() {
             assert!((here - there).abs() < 5e-5 * there.max(1.0), "{here} and {there} kPa at {off_s} s");
         }
         if off_s >= 0.0 {
-            assert_eq!(
-                coarse.fingers_mut()[0].count_ahead(off_s),
-                fine.fingers_mut()[0].count_ahead(0.0),
-                "at {off_s} s"
-            );
+            assert_eq!(coarse.fingers[0].count_ahead(off_s), fine.fingers[0].count_ahead(0.0), "at {off_s} s");
         }
     }
 }

@@ -50,7 +50,7 @@ fn scenario(text: &str, step_s: f64, until_s: f64) -> f64 {
         };
         world.advance(0.0, step_s, &[Bridge::Driven { duty }]);
     }
-    world.fingers()[0].flank_mm()
+    world.fingers[0].flank_mm()
 }
 
 #[test]
@@ -96,16 +96,16 @@ fn a_contact_a_thousand_times_as_stiff_stays_sound() {
     let mut world = World::<Named>::new(&setup, &Surroundings::of(&scene), vec![(parts.drive, parts.contact)]);
     assert!(world.check_step(200e-6).is_err());
     world.check_step(100e-6).unwrap();
-    world.fingers_mut()[0].launch(200.0);
-    let start = world.fingers()[0].energy_mj();
+    world.fingers[0].launch(200.0);
+    let start = world.fingers[0].energy_mj();
     let mut highest = 0.0_f64;
     for _ in 0..1_000 {
         run(&mut world, 100e-6, 1, Bridge::Coast);
-        close(world.fingers()[0].energy_mj() + world.contact_mj(0), start, 1e-9);
+        close(world.fingers[0].energy_mj() + world.contact_mj(0), start, 1e-9);
         highest = highest.max(world.force_n(0));
     }
     assert!(highest > 50.0, "{highest} N");
-    close(world.fingers()[0].speed_mm_per_s(), -200.0, 1e-9);
+    close(world.fingers[0].speed_mm_per_s(), -200.0, 1e-9);
 }
 
 #[test]
@@ -124,7 +124,7 @@ fn denormal_and_zero_steps_change_nothing_that_counts() {
     let mut world = world(
         "[object]\ndistance_mm = 0.5\n[effects.relaxation]\n[effects.winding_inductance]\n[effects.object_mass]\n[effects.thermal_derating]\n",
     );
-    world.fingers_mut()[0].launch(f64::MIN_POSITIVE / 8.0);
+    world.fingers[0].launch(f64::MIN_POSITIVE / 8.0);
     for step_s in [0.0, f64::MIN_POSITIVE / 4.0, 1e-300, 1e-30, 10e-6] {
         run(&mut world, step_s, 100, Bridge::Driven { duty: f64::MIN_POSITIVE / 2.0 });
         let truth = world.truth(0, true);
@@ -134,7 +134,7 @@ fn denormal_and_zero_steps_change_nothing_that_counts() {
         );
     }
     run(&mut world, 10e-6, 2_000, Bridge::Driven { duty: 0.5 });
-    assert!(world.fingers()[0].tip_mm() > 0.1);
+    assert!(world.fingers[0].now.tip_mm > 0.1);
 }
 
 /// Touches, changes the goal and releases, with tables of effects.

@@ -27,7 +27,7 @@ fn free() -> Setup {
 /// The reference finger pressed in this far, at rest.
 fn pressed(d_mm: f64) -> Plant {
     let mut world = Plant::new(&Setup::default());
-    world.place(world.setup().wall.distance_mm + d_mm);
+    world.place(world.finger().setup.wall.distance_mm + d_mm);
     world
 }
 
@@ -268,15 +268,15 @@ fn the_motor_has_the_figures_of_its_data_sheet() {
     (setup.supply.source_ohm, setup.supply.bridge_ohm) = (0.0, 0.0);
     let mut world = Plant::new(&setup);
     world.advance(0.0, FULL);
-    let torque = (world.current_a() * setup.motor.torque_nm_per_a - setup.motor.friction_nm) * 1e3;
+    let torque = (world.finger().current_a() * setup.motor.torque_nm_per_a - setup.motor.friction_nm) * 1e3;
     assert!((11.15..11.25).contains(&torque), "{torque} mNm for 11.20");
     let start = world.clone();
     run(&mut world, 0.2, FULL);
-    let (speed, current) = (world.shaft().speed_rad_per_s, world.current_a());
+    let (speed, current) = (world.finger().now.shaft.speed_rad_per_s, world.finger().current_a());
     assert!((10_550.0..10_650.0).contains(&(speed * RPM)), "{} rpm for 10,600", speed * RPM);
     assert!((0.0215..0.0225).contains(&current), "{current} A for 0.0220");
     let (mut world, mut time_s) = (start, 0.0);
-    while world.shaft().speed_rad_per_s < speed * (1.0 - (-1.0f64).exp()) {
+    while world.finger().now.shaft.speed_rad_per_s < speed * (1.0 - (-1.0f64).exp()) {
         world.advance(STEP_S, FULL);
         time_s += STEP_S;
     }
@@ -287,7 +287,7 @@ fn the_motor_has_the_figures_of_its_data_sheet() {
 fn friction_holds_inside_its_band_and_not_outside() {
     for d in [0.0, 0.5, 1.0, 2.0, 3.0] {
         let world = pressed(d);
-        let setup = world.setup().clone();
+        let setup = world.finger().setup.clone();
         let arm_m = setup.transmission.drum_radius_mm * 1e-3 / setup.transmission.ratio;
         let load = world.force_n() * arm_m;
         let band = setup.motor.friction_nm + load * (1.0 / setup.transmission.efficiency - 1.0);
@@ -305,9 +305,9 @@ fn friction_holds_inside_its_band_and_not_outside() {
                 duty = current * ohms / setup.supply.source_v;
             }
             let mut world = world.clone();
-            let angle = world.shaft().angle_rad;
+            let angle = world.finger().now.shaft.angle_rad;
             run(&mut world, 0.01, Bridge::Driven { duty });
-            assert_eq!(world.shaft().angle_rad == angle, holds, "d {d} mm, {torque} N m");
+            assert_eq!(world.finger().now.shaft.angle_rad == angle, holds, "d {d} mm, {torque} N m");
         }
     }
 }
@@ -340,7 +340,7 @@ fn a_supply_that_drops_is_sensed() {
     let mut world = Plant::new(&free());
     world.faults.supply_drop_v = 2.0;
     world.advance(0.0, Bridge::Coast);
-    assert_eq!(world.supply_v(), 4.0);
+    assert_eq!(world.finger().supply_v(), 4.0);
     assert_eq!(world.sense(3).supply_mv, 4_000);
     assert_eq!(world.sense(3).bus_silent_ms, 3);
 }
@@ -395,7 +395,7 @@ fn the_world_driven_so_arrives_at_rest() {
             world.advance(seconds - whole * STEP_S, Bridge::Driven { duty });
         }
         assert!((world.indentation_mm() - to).abs() < 1e-5, "{} mm for {to} mm", world.indentation_mm());
-        assert!(world.speed_mm_per_s().abs() < 0.05, "{} mm/s left", world.speed_mm_per_s());
+        assert!(world.finger().speed_mm_per_s().abs() < 0.05, "{} mm/s left", world.finger().speed_mm_per_s());
     }
 }
 

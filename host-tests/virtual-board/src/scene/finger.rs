@@ -142,7 +142,7 @@ impl Finger {
     }
 
     pub fn supply_v(&self) -> f64 {
-        self.joint.meeting.lock().world.fingers()[self.joint.finger].supply_v()
+        self.joint.meeting.lock().world.fingers[self.joint.finger].supply_v()
     }
 
     /// The microcontroller's temperature, a room's where the scene does not tell.
@@ -208,7 +208,7 @@ impl Finger {
     /// Costs of the effects on sensor, contact and drive.
     pub fn costs(&self) -> Vec<Cost> {
         let world = &self.joint.meeting.lock().world;
-        let finger = &world.fingers()[self.joint.finger];
+        let finger = &world.fingers[self.joint.finger];
         Named::costs(&self.sensor, &finger.contact.effects, &finger.drive, &link::Named::default())
     }
 }
@@ -295,7 +295,7 @@ impl Joint {
     fn all(scene: &Scene, world: World<Named>, now_s: f64) -> Result<Vec<Self>, SimError> {
         let longest_s = scene.table("world").number("step_us") * 1e-6;
         world.check_step(longest_s)?;
-        let fingers = world.fingers().len();
+        let fingers = world.fingers.len();
         let state = SharedWorld {
             world,
             bridges: vec![Bridge::Coast; fingers],
@@ -364,7 +364,7 @@ impl Joint {
     fn encoder_counts(&self, time_s: f64) -> i32 {
         let mut state = self.meeting.lock();
         let ahead_s = (time_s - state.now_s).max(0.0);
-        state.world.fingers_mut()[self.finger].count_ahead(ahead_s)
+        state.world.fingers[self.finger].count_ahead(ahead_s)
     }
 
     /// Mean pressures on a row's taxels at a time.

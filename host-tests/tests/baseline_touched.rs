@@ -123,7 +123,7 @@ fn what_presses_for_seconds_is_not_left_of_what_was_held() {
 }
 
 /// Holds 6 N, switches torque off, takes the object away, and puts it back; each after a time, s.
-fn lose<E: Set>(board: &mut Bench<E>, [held_s, off_s, gone_s]: [f64; 3]) {
+fn lose(board: &mut Bench, [held_s, off_s, gone_s]: [f64; 3]) {
     board.hold(6_000, held_s);
     board.command().torque = false;
     board.hold(0, off_s);
@@ -186,7 +186,7 @@ fn another_object_at_the_edge_is_taken_hold_of() {
 /// A contact at the edge was fitted before a press: its ratio must not be in the force at the end of the press.
 #[test]
 fn a_press_that_measures_loses_the_fit() {
-    let mut board: Bench<Named> = Bench::new(&scene(1, 6.8, "")).unwrap();
+    let mut board: Bench = Bench::new(&scene(1, 6.8, "")).unwrap();
     board.tare();
     board.hold(2_000, 1.0);
     board.request(Task::Press);

@@ -22,7 +22,6 @@ pub use host_tests::fit_cases::{Noise, Object, Reading, Scene, Steps};
 pub use host_tests::stimulus::config;
 pub use images::record::Record;
 pub use proptest::prelude::*;
-pub use sim::effects::{Named, Set};
 pub use sim::native::bench::Bench;
 pub use sim::plant::{Plant, Taxel};
 pub use sim::setup::Setup;
@@ -85,7 +84,7 @@ pub trait InFrames {
     fn hold(&mut self, goal_mn: i32, seconds: f64) -> f64;
 }
 
-impl<E: Set> InFrames for Bench<E> {
+impl InFrames for Bench {
     fn frames(&mut self, count: u32) -> Status {
         (0..count).for_each(|_| _ = self.step());
         *self.status()
@@ -144,7 +143,7 @@ pub fn drives(mode: Mode) -> bool {
 }
 
 /// State of a finger, for a failed assertion.
-pub fn told<E: Set>(board: &mut Bench<E>) -> String {
+pub fn told(board: &mut Bench) -> String {
     let (truth, status) = (board.truth(), *board.status());
     format!(
         "{:?} {:?}, true {:.3} N at {:.3} mm, read {:.3} N with doubt {}, limits {:014b}",
@@ -168,7 +167,7 @@ pub fn scene(seed: u64, centre_x_mm: f64, effects: &str) -> sim::scene::Scene {
 }
 
 /// Finger with noise, friction and uneven gains, and with this hysteresis and creep, tared.
-pub fn ordinary(seed: u64, centre_x_mm: f64, width_percent: u32, rate_percent_per_decade: u32) -> Bench<Named> {
+pub fn ordinary(seed: u64, centre_x_mm: f64, width_percent: u32, rate_percent_per_decade: u32) -> Bench {
     let effects = format!(
         "[effects.noise]\nrms_codes = 1.5\n[effects.dry_friction]\ntorque_mnm = 0.15\n[effects.hysteresis]\n\
         width_percent = {width_percent}\n[effects.creep]\nrate_percent_per_decade = {rate_percent_per_decade}\n\

@@ -155,12 +155,12 @@ fn a_slow_scan_follows_an_object_that_yields() {
 const CARRIED_MM_PER_S: f64 = 5.0;
 
 /// Requests a release, and expects no force after the given time, s.
-fn lets_go<E: Set>(board: &mut Bench<E>, seconds: f64, name: &str) {
+fn lets_go(board: &mut Bench, seconds: f64, name: &str) {
     board.hold(0, seconds);
     assert!(board.truth().force_n <= 0.0, "{name}: {}", told(board));
 }
 
-fn moved_while_held<E: Set>(board: &mut Bench<E>, goal_mn: i32, moved_mm: f64) {
+fn moved_while_held(board: &mut Bench, goal_mn: i32, moved_mm: f64) {
     board.hold(goal_mn, 0.7);
     board.carry_object(5.0, 5.0 - moved_mm, CARRIED_MM_PER_S, |_| {});
     board.run(0.3);
@@ -183,7 +183,7 @@ fn an_object_that_came_along_while_it_was_held_is_let_go() {
     }
 }
 
-fn goal_0_during_a_press<E: Set>(board: &mut Bench<E>) {
+fn goal_0_during_a_press(board: &mut Bench) {
     board.command().goal = newtons(1_000);
     board.step();
     board.request(Task::Press);

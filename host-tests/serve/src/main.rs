@@ -4,7 +4,6 @@ use clap::Parser;
 use output::say;
 use serve::native::Native;
 use serve::{Place, Port};
-use sim::effects::Named;
 use sim::native::served::Bus;
 use std::io::{self, Write as _};
 use std::path::PathBuf;
@@ -60,7 +59,7 @@ fn main() -> ExitCode {
 
 fn run(args: &Args) -> Result<(), String> {
     let scene = sim::cli::load(&args.scene, &args.set, args.seed)?;
-    let bus = Bus::<Named>::new(&scene).map_err(|why| format!("{}: {why}", scene.name))?;
+    let bus = Bus::new(&scene).map_err(|why| format!("{}: {why}", scene.name))?;
     let fingers = scene.table("hand").whole("fingers");
     let place = args.tcp.map_or_else(|| Place::Pty(args.pty.clone()), Place::Tcp);
     let mut port = Port::open(&place).map_err(|why| why.to_string())?.with_commands();

@@ -1,14 +1,13 @@
 //! The native core and link with a scene's world.
 
 use crate::Finger;
-use sim::effects::Set;
 use sim::native::served::Bus;
 use std::convert::Infallible;
 
 /// The fingers of a scene.
-pub struct Native<E: Set>(pub Bus<E>);
+pub struct Native(pub Bus);
 
-impl<E: Set> Finger for Native<E> {
+impl Finger for Native {
     type Error = Infallible;
 
     fn now_s(&self) -> f64 {

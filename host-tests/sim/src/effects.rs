@@ -63,7 +63,7 @@ impl<'a> Build<'a> {
 
     /// Returns a part of the effect, to be appended to the list of its stage.
     pub(crate) fn part<T: ?Sized>(&self, part: Box<T>) -> Metered<T> {
-        Metered { name: self.name, calls: 0, timed_calls: 0, timed: Duration::ZERO, repeated: 0, part }
+        Metered::new(self.name, part)
     }
 }
 
@@ -102,6 +102,10 @@ pub(crate) struct Metered<T: ?Sized> {
 }
 
 impl<T: ?Sized> Metered<T> {
+    pub fn new(name: &'static str, part: Box<T>) -> Self {
+        Self { name, calls: 0, timed_calls: 0, timed: Duration::ZERO, repeated: 0, part }
+    }
+
     pub fn call<R>(&mut self, f: impl FnOnce(&mut T) -> R) -> R {
         self.calls += 1;
         if self.calls % TIMED != 1 {
@@ -184,60 +188,23 @@ pub(crate) fn waiting_s(rng: &mut Rng, rate_per_s: f64) -> f64 {
 }
 
 /// Effects of one finger by family.
-pub struct Parts<E: Set + ?Sized> {
-    pub sensor: E::Sensor,
+#[derive(Default)]
+pub struct Parts {
+    pub sensor: sensor::Named,
     pub contact: contact::Named,
-    pub drive: E::Drive,
+    pub drive: drive::Named,
     pub link: link::Named,
 }
 
-/// Set of effects: [`Named`], or those of the plant.
-pub trait Set {
-    type Sensor: sensor::Stages;
-    type Drive: drive::Stages;
-
-    fn of(scene: &Scene, finger: usize) -> Parts<Self>;
-
-    /// True if a contact at rest gives the same codes in each scan.
-    fn repeats(_scene: &Scene) -> bool {
-        false
-    }
-
-    /// Cost of each effect so far.
-    fn costs(_: &Self::Sensor, _: &contact::Named, _: &Self::Drive, _: &link::Named) -> Vec<Cost> {
-        Vec::new()
-    }
-}
-
-/// Effects that the scene names.
-pub struct Named;
-
-impl Default for Parts<Named> {
-    fn default() -> Self {
-        let (sensor, contact) = (sensor::Named::default(), contact::Named::default());
-        Self { sensor, contact, drive: drive::Named::default(), link: link::Named::default() }
-    }
-}
-
-impl Set for Named {
-    type Sensor = sensor::Named;
-    type Drive = drive::Named;
-
-    fn of(scene: &Scene, finger: usize) -> Parts<Self> {
-        let mut parts = Parts::default();
+impl Parts {
+    /// Effects that the scene names.
+    pub fn of(scene: &Scene, finger: usize) -> Self {
+        let mut parts = Self::default();
         for NamedEffect { effect, values } in &scene.effects {
             let build = Build::new(effect.name, values, stream(scene.seed, effect.name, finger));
             (effect.build)(&build, &mut parts);
         }
         parts
-    }
-
-    fn repeats(scene: &Scene) -> bool {
-        scene.effects.iter().all(sensor::repeats)
-    }
-
-    fn costs(sensor: &sensor::Named, contact: &contact::Named, drive: &drive::Named, link: &link::Named) -> Vec<Cost> {
-        sensor.costs().chain(contact.costs()).chain(drive.costs()).chain(link.costs()).collect()
     }
 }
 
@@ -257,7 +224,7 @@ pub struct Description {
     /// Values of keys at which the effect changes nothing. Other keys may have any value.
     pub zero: &'static [(&'static str, f64)],
     /// Appends the effect to the list of its stage.
-    pub build: fn(&Build, &mut Parts<Named>),
+    pub build: fn(&Build, &mut Parts),
 }
 
 /// A family of effects, by the place at which they act.

@@ -12,6 +12,7 @@ use crate::effects::drive::{self, Circuit, Friction};
 use crate::mechanics::contact::Contact;
 use crate::mechanics::rotor::{Acts, Rotor, Shaft, resistive};
 use crate::metrics;
+use crate::plant::Faults;
 use crate::setup::Setup;
 use core::f64::consts::TAU;
 use fingertip::pipeline::{self, Status};
@@ -62,9 +63,13 @@ const ROUNDS: usize = 40;
 const TOLERANCE: f64 = 1e-15;
 
 /// Finger with the effects on its drive.
-pub struct Finger<D> {
+pub struct Finger {
     pub contact: Contact,
-    pub drive: D,
+    pub drive: drive::Named,
+    /// Defects; may be changed at any time.
+    pub faults: Faults,
+    /// Count of the encoder at the last read.
+    pub counts: i32,
     /// Setup; the surface of the object may be moved.
     pub setup: Setup,
     rotor: Rotor,
@@ -100,9 +105,9 @@ pub struct End {
     square_a2_s: f64,
 }
 
-impl<D: drive::Stages> Finger<D> {
+impl Finger {
     /// Creates a finger at rest at travel 0, with the bridge open.
-    pub fn new(setup: &Setup, mut drive: D, contact: Named) -> Self {
+    pub fn new(setup: &Setup, mut drive: drive::Named, contact: Named) -> Self {
         let mm_per_rad = setup.transmission.drum_radius_mm / setup.transmission.ratio;
         let rotor = Rotor {
             inertia_kg_m2: setup.motor.inertia_kg_m2 + drive.inertia_kg_m2(mm_per_rad * 1e-3),
@@ -124,6 +129,8 @@ impl<D: drive::Stages> Finger<D> {
         Self {
             contact,
             drive,
+            faults: Faults::default(),
+            counts: 0,
             setup: setup.clone(),
             rotor,
             mm_per_rad,
@@ -144,6 +151,7 @@ impl<D: drive::Stages> Finger<D> {
     }
 
     /// Sets what holds during the next step.
+    #[inline]
     pub fn prepare(&mut self, dt_s: f64, bridge: Bridge) {
         self.now.before = self.now.shaft;
         self.now.dt_s = dt_s;
@@ -153,9 +161,12 @@ impl<D: drive::Stages> Finger<D> {
             Bridge::Driven { duty } => duty.clamp(-1.0, 1.0),
         };
         self.now.circuit = Circuit::of(&self.setup, duty);
-        self.now.circuit.source_v = self.fallen_v.unwrap_or(self.now.circuit.source_v);
+        self.now.circuit.source_v = self.fallen_v.unwrap_or(self.now.circuit.source_v) - self.faults.supply_drop_v;
+        if self.faults.leads_swapped {
+            self.now.circuit.duty = -duty;
+        }
         self.friction = Friction::default();
-        if !self.drive.none() {
+        if self.drive.any() {
             self.drive.circuit(&mut self.now.circuit);
             let middle = self.now.shaft.speed_rad_per_s + 0.5 * dt_s * self.now.rad_per_s2;
             self.drive.friction(middle, &mut self.friction);
@@ -164,9 +175,10 @@ impl<D: drive::Stages> Finger<D> {
     }
 
     /// Returns the end of the prepared step against a load: its mean between two places of the pressing flank.
+    #[inline]
     pub fn solve(&mut self, load_n: impl Fn(&Contact, f64, f64) -> f64) -> End {
         let mut acting = Acts {
-            alone: self.drive.none(),
+            alone: !self.drive.any(),
             drive: &mut self.drive,
             circuit: &self.now.circuit,
             open: self.now.bridge == Bridge::Coast,
@@ -183,24 +195,23 @@ impl<D: drive::Stages> Finger<D> {
     }
 
     /// Moves to the end of the step, where the surface of the object is at this travel.
+    #[inline]
     pub fn finish(&mut self, end: &End, surface_mm: f64) {
         self.now.shaft = end.shaft;
         self.now.winding_a = end.winding_a;
         if self.now.dt_s > 0.0 {
             self.now.rad_per_s2 = (self.now.shaft.speed_rad_per_s - self.now.before.speed_rad_per_s) / self.now.dt_s;
         }
-        if !self.drive.none() {
-            self.stop_at_ends();
-        }
+        self.stop_at_ends();
         self.now.tip_mm = self.flank_mm();
-        if !self.drive.none() {
+        if self.drive.any() {
             self.drive.heated(self.now.dt_s, &self.now.circuit, end.square_a2_s);
             self.now.tip_mm = self.drive.tip_mm(self.now.tip_mm, surface_mm);
         }
     }
 
     fn stop_at_ends(&mut self) {
-        let Some([rear_mm, front_mm]) = self.drive.end_stops_mm() else { return };
+        let Some([rear_mm, front_mm]) = self.faults.end_stops_mm else { return };
         let held_mm = self.flank_mm().clamp(rear_mm, front_mm);
         if held_mm != self.flank_mm() {
             self.now.shaft = Shaft { angle_rad: held_mm / self.mm_per_rad, speed_rad_per_s: 0.0 };
@@ -257,8 +268,11 @@ impl<D: drive::Stages> Finger<D> {
     pub fn count_ahead(&mut self, ahead_s: f64) -> i32 {
         let turns = self.angle_ahead_rad(ahead_s) / TAU;
         let count = (turns * self.setup.motor.encoder_counts_per_turn).floor() as i32;
-        let count = count + self.slipped_counts;
-        if self.drive.none() { count } else { self.drive.count(count) }
+        let count = self.drive.count(count + self.slipped_counts);
+        if !self.faults.encoder_frozen {
+            self.counts = if self.faults.encoder_reversed { -count } else { count };
+        }
+        self.counts
     }
 
     /// Speed of the tip while the gear drives it.

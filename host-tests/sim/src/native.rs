@@ -8,9 +8,8 @@ pub mod bench;
 pub mod calibrated;
 pub mod served;
 
-use crate::effects::link;
-use crate::effects::sensor::{Readout, Stages as _};
-use crate::effects::{Named, Parts, Set};
+use crate::effects::sensor::{self, Readout, Stages as _};
+use crate::effects::{Parts, link};
 use crate::host::{Host, Reading};
 use crate::mechanics::Bridge;
 use crate::mechanics::contact::Place;
@@ -47,7 +46,7 @@ pub fn board(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, RunError> 
 /// Runs a scene with the effects that it names.
 pub fn simulate(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, SimError> {
     let started = Instant::now();
-    Board::<Named>::new(scene)?.whole(scene, started, watch)
+    Board::new(scene)?.whole(scene, started, watch)
 }
 
 /// Runs a scene as [`simulate`], with gains of the taxels of the first finger, Q14.
@@ -56,17 +55,17 @@ pub fn simulate_calibrated(
     gains: &fingertip::shipped::Gains,
     watch: &mut dyn Watch,
 ) -> Result<Summary, SimError> {
-    let mut board = Board::<Named>::new(scene)?;
+    let mut board = Board::new(scene)?;
     board.units[0].pipeline.calibrate(&Calibration::of(gains));
     board.calibration = Some(*gains.rows());
     board.whole(scene, Instant::now(), watch)
 }
 
 /// Controller of a finger, and everything between it and the world.
-struct Unit<E: Set> {
+struct Unit {
     pipeline: Pipeline,
     readout: Readout,
-    sensor: E::Sensor,
+    sensor: sensor::Named,
     link: link::Named,
     host: Host,
     frame: Frame,
@@ -79,9 +78,9 @@ struct Unit<E: Set> {
     next: Bridge,
 }
 
-struct Board<E: Set> {
-    world: World<E>,
-    units: Vec<Unit<E>>,
+struct Board {
+    world: World,
+    units: Vec<Unit>,
     bridges: Vec<Bridge>,
     params: fingertip::params::Params,
     clock: Clock,
@@ -95,11 +94,11 @@ struct Board<E: Set> {
     calibration: Option<[[u16; COLUMNS]; ROWS]>,
 }
 
-impl<E: Set> Board<E> {
+impl Board {
     fn new(scene: &Scene) -> Result<Self, SimError> {
         let config = Config::shipped(&scene.params()).map_err(SimError::Controller)?;
         let fingers = 0..scene.table("hand").whole("fingers") as usize;
-        Self::of(scene, &config, &scene.setup(), fingers.map(|finger| E::of(scene, finger)))
+        Self::of(scene, &config, &scene.setup(), fingers.map(|finger| Parts::of(scene, finger)))
     }
 
     /// Builds the board from these parts, a finger for each.
@@ -107,7 +106,7 @@ impl<E: Set> Board<E> {
         scene: &Scene,
         config: &Config,
         setup: &Setup,
-        fingers: impl Iterator<Item = Parts<E>>,
+        fingers: impl Iterator<Item = Parts>,
     ) -> Result<Self, SimError> {
         let (mut units, mut effects) = (Vec::new(), Vec::new());
         for (finger, parts) in fingers.enumerate() {
@@ -115,7 +114,7 @@ impl<E: Set> Board<E> {
             let readout = Readout::new(&setup.array).with_events(scene, finger);
             units.push(Unit {
                 pipeline: Pipeline::new(config),
-                repeats: E::repeats(scene) && !readout.eventful(),
+                repeats: scene.effects.iter().all(sensor::repeats) && !readout.eventful(),
                 readout,
                 sensor: parts.sensor,
                 link: parts.link,
@@ -127,7 +126,7 @@ impl<E: Set> Board<E> {
                 next: Bridge::Coast,
             });
         }
-        let world = World::<E>::new(setup, &Surroundings::of(scene), effects);
+        let world = World::new(setup, &Surroundings::of(scene), effects);
         let longest_s = scene.table("world").number("step_us") * 1e-6;
         world.check_step(longest_s)?;
         let slot_s = f64::from(config.timing.slot.0) / f64::from(fingertip::shipped::CLOCKS.timer_hz);
@@ -238,7 +237,8 @@ impl<E: Set> Board<E> {
     fn costs(&self, scene: &Scene) -> Vec<Cost> {
         let mut all = Vec::new();
         for (unit, finger) in self.units.iter().zip(&self.world.fingers) {
-            all.extend(E::costs(&unit.sensor, &finger.contact.effects, &finger.drive, &unit.link));
+            all.extend(unit.sensor.costs().chain(finger.contact.effects.costs()));
+            all.extend(finger.drive.costs().chain(unit.link.costs()));
         }
         by_effect(scene, &all)
     }
@@ -247,7 +247,7 @@ impl<E: Set> Board<E> {
 /// Slots between the end of a frame and the effect of its duty: the time of the step, rounded up.
 pub const DUTY_DELAY_SLOTS: usize = 3;
 
-impl<E: Set> Board<E> {
+impl Board {
     /// Scans one frame of each finger while the world moves on.
     fn scan(&mut self) {
         let slot_s = self.slot_s * self.units[0].link.second_s();

@@ -1,16 +1,14 @@
 //! Plant: the reference finger of `docs/board.md` with its array, moved step by step.
 //!
-//! The plant is a finger in the world of scenes, with these differences: its effects are part of its [`Setup`], it can
-//! be broken during a run ([`Faults`]), and its rows are driven pin by pin.
+//! The plant is a finger in the world of scenes. Its effects are built from its [`Setup`], it can be broken during a run
+//! ([`Faults`]), and its rows are driven pin by pin.
 
 pub use crate::setup::Setup;
 
-use crate::effects::drive::{self, Circuit, Friction};
+use crate::effects::drive::{Circuit, Friction};
 use crate::effects::sensor::{self, Readout, Settling};
-use crate::effects::{Parts, Set, contact, link};
+use crate::effects::{Metered, Parts};
 use crate::mechanics::{Bridge, Finger, decay};
-use crate::scene::Scene;
-use crate::setup::Array;
 use crate::world::{Surroundings, World};
 use fingertip::frame::Sense;
 use fingertip::shipped::{COLUMNS, Frame, ROWS, SLOTS};
@@ -19,30 +17,31 @@ use fingertip::shipped::{COLUMNS, Frame, ROWS, SLOTS};
 pub struct Plant {
     /// Defects; may be changed at any time.
     pub faults: Faults,
-    world: World<Reference>,
-    sensor: Sensor,
+    world: World,
+    sensor: sensor::Named,
     readout: Readout,
 }
 
 impl Plant {
     /// Creates a plant at rest at travel 0, with the bridge open.
     pub fn new(setup: &Setup) -> Self {
-        let world = World::new(setup, &Surroundings::default(), vec![(Drive::new(setup), contact::Named::default())]);
-        let (sensor, readout) = (Sensor::new(&setup.array), Readout::new(&setup.array));
+        let Parts { sensor, contact, drive, .. } = parts(setup);
+        let world = World::new(setup, &Surroundings::default(), vec![(drive, contact)]);
+        let readout = Readout::new(&setup.array);
         Self { faults: Faults::default(), world, sensor, readout }
     }
 
-    pub fn finger(&self) -> &Finger<Drive> {
+    pub fn finger(&self) -> &Finger {
         &self.world.fingers[0]
     }
 
-    pub fn finger_mut(&mut self) -> &mut Finger<Drive> {
+    pub fn finger_mut(&mut self) -> &mut Finger {
         &mut self.world.fingers[0]
     }
 
     /// Advances by one step with a constant bridge. The tests cover steps of 10 us.
     pub fn advance(&mut self, dt_s: f64, bridge: Bridge) {
-        self.finger_mut().drive.faults = self.faults;
+        self.finger_mut().faults = self.faults;
         self.world.advance(0.0, dt_s, &[bridge]);
         // A frozen count keeps the value of its last read.
         self.finger_mut().count_ahead(0.0);
@@ -69,7 +68,7 @@ impl Plant {
 
     /// Count of the timer in encoder mode, unwrapped.
     pub fn encoder_counts(&self) -> i32 {
-        self.finger().drive.counts
+        self.finger().counts
     }
 
     /// Returns what the control step receives beside the frame.
@@ -91,7 +90,7 @@ impl Plant {
         if faults.saturated {
             return [array.reference_v; COLUMNS];
         }
-        self.sensor.faults = faults;
+        self.readout.faults = Some(faults);
         let mut volts = [array.ground_v; COLUMNS];
         for (row, _) in faults.driven(driven).iter().enumerate().filter(|(_, driven)| **driven) {
             let kpa = self.world.row_kpa(0, f64::INFINITY, row);
@@ -129,7 +128,7 @@ impl Clone for Plant {
         let (mut plant, finger) = (Self::new(&self.finger().setup), self.finger());
         plant.faults = self.faults;
         plant.finger_mut().now = finger.now;
-        plant.finger_mut().drive.counts = finger.drive.counts;
+        plant.finger_mut().counts = finger.counts;
         plant
     }
 }
@@ -193,129 +192,34 @@ pub struct Faults {
     pub supply_drop_v: f64,
 }
 
-/// Effects of the reference finger, which may break during a run.
-pub struct Reference;
-
-impl Reference {
-    pub fn parts(setup: &Setup) -> Parts<Self> {
-        let (contact, link) = (contact::Named::default(), link::Named::default());
-        Parts { sensor: Sensor::new(&setup.array), contact, drive: Drive::new(setup), link }
-    }
-}
-
-impl Set for Reference {
-    type Sensor = Sensor;
-    type Drive = Drive;
-
-    fn of(scene: &Scene, _finger: usize) -> Parts<Self> {
-        Self::parts(&scene.setup())
-    }
-}
-
-/// Friction, gear and supply.
-pub struct Drive {
-    pub faults: Faults,
-    /// Count of the encoder at the last read.
-    pub counts: i32,
-    friction_nm: f64,
-    load_share: f64,
-    source_ohm: f64,
-}
-
-impl Drive {
-    pub fn new(setup: &Setup) -> Self {
-        Self {
-            faults: Faults::default(),
-            counts: 0,
-            friction_nm: setup.motor.friction_nm,
-            load_share: 1.0 / setup.transmission.efficiency - 1.0,
-            source_ohm: setup.supply.source_ohm,
-        }
-    }
-}
-
-impl drive::Stages for Drive {
-    fn none(&self) -> bool {
-        false
-    }
-
-    fn circuit(&mut self, circuit: &mut Circuit) {
-        circuit.source_v -= self.faults.supply_drop_v;
-        circuit.source_ohm = self.source_ohm;
-        if self.faults.leads_swapped {
-            circuit.duty = -circuit.duty;
-        }
-    }
-
-    fn friction(&mut self, _speed_rad_per_s: f64, friction: &mut Friction) {
-        let Self { friction_nm, load_share, .. } = *self;
-        *friction = Friction { sliding_nm: friction_nm, holding_nm: friction_nm, load_share, viscous_nm_s: 0.0 };
-    }
-
-    fn end_stops_mm(&self) -> Option<[f64; 2]> {
-        self.faults.end_stops_mm
-    }
-
-    fn count(&mut self, count: i32) -> i32 {
-        if !self.faults.encoder_frozen {
-            self.counts = if self.faults.encoder_reversed { -count } else { count };
-        }
-        self.counts
-    }
-}
-
-/// Characteristic of the taxels, row switches and settling.
-pub struct Sensor {
-    pub faults: ArrayFaults,
-    array: Array,
-    settling: Settling,
-    /// Voltage that each row adds to the columns while it is driven.
-    rows: [sensor::Row; ROWS],
-}
-
-impl Sensor {
-    pub fn new(array: &Array) -> Self {
-        Self {
-            faults: ArrayFaults::default(),
-            array: *array,
-            settling: Settling::new(array.settle_tau_s, array.sample_after_s),
-            rows: [[0.0; COLUMNS]; ROWS],
-        }
-    }
-}
-
-impl sensor::Stages for Sensor {
-    fn none(&self) -> bool {
-        false
-    }
-
-    fn conductance(&mut self, row: usize, _time_s: f64, siemens: &mut sensor::Row) {
-        for (siemens, taxel) in siemens.iter_mut().zip(self.faults.taxels[row]) {
-            *siemens = match taxel {
-                Taxel::Sound => self.array.loaded(*siemens),
-                Taxel::Dead => 0.0,
-                Taxel::Shorted => self.array.short_siemens,
-            };
-        }
-    }
-
-    fn network(&mut self, row: usize, _array: &[sensor::Row; ROWS], seen: &mut sensor::Row) {
-        let left = 1.0 + self.array.row_ohm * seen.iter().sum::<f64>();
+/// Effects of the reference finger: friction, gear and supply; characteristic of the taxels, row switches and settling.
+pub fn parts(setup: &Setup) -> Parts {
+    let (array, source_ohm) = (setup.array, setup.supply.source_ohm);
+    let (friction_nm, load_share) = (setup.motor.friction_nm, 1.0 / setup.transmission.efficiency - 1.0);
+    let supply = move |circuit: &mut Circuit| circuit.source_ohm += source_ohm;
+    let friction = move |_, friction: &mut Friction| {
+        friction.sliding_nm += friction_nm;
+        friction.holding_nm += friction_nm;
+        friction.load_share += load_share;
+    };
+    let load = move |_, _, siemens: &mut sensor::Row| *siemens = siemens.map(|line| array.loaded(line));
+    let sag = move |_, _: &_, seen: &mut sensor::Row| {
+        let left = 1.0 + array.row_ohm * seen.iter().sum::<f64>();
         seen.iter_mut().for_each(|siemens| *siemens /= left);
-        self.rows[row] = seen.map(|siemens| siemens * self.array.feedback_ohm * self.array.drive_v);
-    }
-
-    fn volts(&mut self, slot: usize, time_s: f64, volts: &mut sensor::Row) {
-        for (row, (state, added)) in self.faults.rows.iter().zip(&self.rows).enumerate() {
-            let sign = match state {
-                Row::StuckHigh if row != slot => 1.0,
-                Row::StuckLow if row == slot => -1.0,
-                _ => continue,
-            };
-            volts.iter_mut().zip(added).for_each(|(volts, added)| *volts += sign * added);
-        }
-        let reference_v = self.array.reference_v;
-        *volts = volts.map(|volts| if self.faults.saturated { reference_v } else { volts.min(reference_v) });
-        self.settling.sample(time_s, volts);
-    }
+    };
+    let mut settling = Settling::new(array.settle_tau_s, array.sample_after_s);
+    let settle = move |_, time_s, volts: &mut sensor::Row| {
+        *volts = volts.map(|volts| volts.min(array.reference_v));
+        settling.sample(time_s, volts);
+    };
+    let mut parts = Parts::default();
+    parts.drive.electric.push(Metered::new(NAME, Box::new(supply)));
+    parts.drive.resist.push(Metered::new(NAME, Box::new(friction)));
+    parts.sensor.conductance.push(Metered::new(NAME, Box::new(load)));
+    parts.sensor.network.push(Metered::new(NAME, Box::new(sag)));
+    parts.sensor.volts.push(Metered::new(NAME, Box::new(settle)));
+    parts
 }
+
+/// Name of the effects of the plant.
+const NAME: &str = "plant";

@@ -1,7 +1,6 @@
 //! World of a scene: fingers and their object, moved by steps, with weight, floor, shaking and the lifting hand.
 
-use crate::effects::drive::Stages as _;
-use crate::effects::{Set, contact};
+use crate::effects::{contact, drive};
 use crate::events::{Event, Happened};
 use crate::mechanics::contact::{Contact, Place};
 use crate::mechanics::{Bridge, Finger};
@@ -25,8 +24,8 @@ const GONE_MM: f64 = 1e3;
 /// Speed at which an object is put back from where the tip stood in its way, mm/s.
 const PUT_BACK_MM_PER_S: f64 = 20.0;
 
-pub struct World<E: Set> {
-    pub fingers: Vec<Finger<E::Drive>>,
+pub struct World {
+    pub fingers: Vec<Finger>,
     around: Surroundings,
     /// Mass of the object; none if it is fixed.
     mass_kg: Option<f64>,
@@ -43,10 +42,10 @@ fn side(finger: usize) -> f64 {
     if finger == 0 { 1.0 } else { -1.0 }
 }
 
-impl<E: Set> World<E> {
+impl World {
     /// Creates a world of one finger or two.
-    pub fn new(setup: &Setup, around: &Surroundings, effects: Vec<(E::Drive, contact::Named)>) -> Self {
-        let mut fingers: Vec<Finger<E::Drive>> =
+    pub fn new(setup: &Setup, around: &Surroundings, effects: Vec<(drive::Named, contact::Named)>) -> Self {
+        let mut fingers: Vec<Finger> =
             effects.into_iter().map(|(drive, contact)| Finger::new(setup, drive, contact)).collect();
         let mass_kg = fingers[0].contact.effects.mass_kg().filter(|kg| *kg > 0.0);
         let body = Body::default();
@@ -82,6 +81,7 @@ impl<E: Set> World<E> {
     }
 
     /// Advances by one step from a time with constant bridges, one for each finger.
+    #[inline]
     pub fn advance(&mut self, time_s: f64, dt_s: f64, bridges: &[Bridge]) {
         self.dt_s = dt_s;
         self.body_before = self.body;
@@ -283,7 +283,7 @@ fn surface_mm(setup: &Setup, finger: usize, body: &Body) -> f64 {
     setup.wall.distance_mm + side(finger) * body.place_mm[0] + body.away_mm
 }
 
-impl<E: Set> World<E> {
+impl World {
     /// True if neither this finger nor the object moved in the last step.
     pub fn rests(&self, index: usize) -> bool {
         self.fingers[index].rests() && self.body == self.body_before && self.body.speed_mm_per_s == [0.0; 2]

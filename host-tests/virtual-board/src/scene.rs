@@ -27,8 +27,8 @@ use fingertip::params::Params;
 use fingertip::shipped::{Config, Record, TARE_FRAMES, address};
 use host::{Host, Shown};
 use rigless::soc::Width;
+use sim::effects::Parts;
 use sim::effects::link;
-use sim::effects::{Named, Set as _};
 use sim::scene::Scene;
 use sim::watch::{Controller, Summary, Watch};
 use sim::{SimError, encode};
@@ -88,11 +88,11 @@ impl Boards {
             let mut rig = Rig::new(image, finger, &options)?;
             set_up(&mut rig, scene, start_ns)?;
             let offset = frame_offset(&mut rig)?;
-            let host = Host::new(scene, number, Named::of(scene, number).link, start_ns, frame_ns, offset);
+            let host = Host::new(scene, number, Parts::of(scene, number).link, start_ns, frame_ns, offset);
             rig.with(move |stand| stand.bench.host = Some(Box::new(host)))?;
             rigs.push(rig);
         }
-        let clock_link = Named::of(scene, 0).link;
+        let clock_link = Parts::of(scene, 0).link;
         Ok(Self { rigs, params, clock, clock_link, now_ns: start_ns - MS, set_up: begun.elapsed() })
     }
 

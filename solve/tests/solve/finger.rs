@@ -1,8 +1,8 @@
 //! A simulated finger that presses as the chip will: the tip is carried along a plan, and every frame goes through the
 //! effects of the scene. Hysteresis, creep and relaxation go on from press to press.
 
+use sim::effects::Parts;
 use sim::effects::sensor::{self, Readout};
-use sim::effects::{Named, Set};
 use sim::mechanics::contact::Contact;
 use sim::scene::{Scene, read};
 use sim::setup::Setup;
@@ -58,7 +58,7 @@ impl Draw {
     pub fn gains(&self) -> Vec<f64> {
         use sim::effects::sensor::Stages;
         let alone = Self { creep_percent: 0.0, hysteresis_percent: 0.0, extra: String::new(), ..self.clone() };
-        let mut sensor = Named::of(&alone.scene(&Place::default()), 0).sensor;
+        let mut sensor = Parts::of(&alone.scene(&Place::default()), 0).sensor;
         let mut gains = Vec::new();
         for row in 0..ROWS {
             let mut kpa = [100.0; COLUMNS];
@@ -127,7 +127,7 @@ pub struct Finger {
 impl Finger {
     pub fn new(draw: &Draw) -> Self {
         let scene = draw.scene(&Place::default());
-        let parts = Named::of(&scene, 0);
+        let parts = Parts::of(&scene, 0);
         let setup = scene.setup();
         let (readout, contact) = (Readout::new(&setup.array), Contact::new(&setup, parts.contact));
         let tare = [[0.0; COLUMNS]; ROWS];
@@ -149,7 +149,7 @@ impl Finger {
     pub fn go(&mut self, place: &Place) {
         let scene = self.draw.scene(place);
         self.setup = scene.setup();
-        self.contact = Contact::new(&self.setup, Named::of(&scene, 0).contact);
+        self.contact = Contact::new(&self.setup, Parts::of(&scene, 0).contact);
         self.travel_mm = self.setup.wall.distance_mm - 0.5;
     }
 

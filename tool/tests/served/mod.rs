@@ -10,7 +10,6 @@ use rustix::process::{Pid, Signal};
 use serve::native::Native;
 use serve::{Finger as _, Place, Port, Stop};
 use signal_hook::consts::SIGHUP;
-use sim::effects::Named;
 use sim::native::served::Bus;
 use std::cell::RefCell;
 use std::io::{BufRead as _, BufReader, Read};
@@ -37,7 +36,7 @@ pub struct Served {
 
 /// A finger that executes commands between two polls.
 struct Told {
-    native: Native<Named>,
+    native: Native,
     commands: Receiver<Asked>,
     line: Line,
 }

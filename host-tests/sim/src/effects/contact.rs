@@ -6,7 +6,7 @@
 //! plane without friction: d = x, F = pi Y d^2. All forces of a step are the mean slope of one energy, so a step
 //! creates no energy.
 
-use crate::effects::{self, Build, Description, Metered, Parts, normal_within_3};
+use crate::effects::{Build, Description, Metered, Parts, normal_within_3};
 use crate::mechanics::decay;
 use crate::scene::tables::Key;
 use crate::watch::{Cost, Truth};
@@ -23,7 +23,7 @@ pub struct Surface {
 }
 
 impl Surface {
-    fn add<F>(build: &Build, parts: &mut Parts<effects::Named>, plain: bool, height_mm: F)
+    fn add<F>(build: &Build, parts: &mut Parts, plain: bool, height_mm: F)
     where
         F: Fn(f64, f64, f64) -> f64 + Send + 'static,
     {

@@ -87,49 +87,6 @@ pub type Play = dyn FnMut(f64, f64) -> f64 + Send;
 /// Effect on a count of the encoder. It has no memory, as each read calls it.
 pub type Encoder = dyn FnMut(i32) -> i32 + Send;
 
-/// Stages as the finger calls them: of the named effects, or of the plant with its built-in defects.
-pub trait Stages {
-    /// True if no stage has an effect: the finger then calls none.
-    fn none(&self) -> bool {
-        true
-    }
-    /// Sum of [`Inertia`].
-    fn inertia_kg_m2(&mut self, _m_per_rad: f64) -> f64 {
-        0.0
-    }
-    /// See [`Electric::apply`].
-    fn circuit(&mut self, _circuit: &mut Circuit) {}
-    /// See [`Electric::after`].
-    fn heated(&mut self, _dt_s: f64, _circuit: &Circuit, _square_a2_s: f64) {}
-    /// See [`Resist`].
-    fn friction(&mut self, _speed_rad_per_s: f64, _friction: &mut Friction) {}
-    /// Mean torque of what stores energy between two angles: the difference in energy over the distance.
-    fn potential_nm(&mut self, _from_rad: f64, _to_rad: f64) -> f64 {
-        0.0
-    }
-    fn potential_j(&self, _angle_rad: f64) -> f64 {
-        0.0
-    }
-    /// Largest slope of that torque.
-    fn steepest_nm_per_rad(&self) -> f64 {
-        0.0
-    }
-    /// See [`Play`].
-    fn tip_mm(&mut self, flank_mm: f64, _surface_mm: f64) -> f64 {
-        flank_mm
-    }
-    /// Travels of the pressing flank at the end stops, rear and front.
-    fn end_stops_mm(&self) -> Option<[f64; 2]> {
-        None
-    }
-    /// See [`Encoder`].
-    fn count(&mut self, count: i32) -> i32 {
-        count
-    }
-    /// Adds the state of the effects to the truth.
-    fn tell(&self, _truth: &mut Truth) {}
-}
-
 named! {
     inertia: Inertia,
     electric: dyn Electric,
@@ -139,50 +96,56 @@ named! {
     encoder: Encoder,
 }
 
-impl Stages for Named {
-    fn none(&self) -> bool {
-        !self.any()
-    }
-
-    fn inertia_kg_m2(&mut self, m_per_rad: f64) -> f64 {
+/// Stages as the finger calls them.
+impl Named {
+    /// Sum of [`Inertia`].
+    pub fn inertia_kg_m2(&mut self, m_per_rad: f64) -> f64 {
         self.inertia.iter_mut().map(|effect| effect.call(|part| part(m_per_rad))).sum()
     }
 
-    fn circuit(&mut self, circuit: &mut Circuit) {
+    /// See [`Electric::apply`].
+    pub fn circuit(&mut self, circuit: &mut Circuit) {
         self.electric.iter_mut().for_each(|effect| effect.call(|part| part.apply(circuit)));
     }
 
-    fn heated(&mut self, dt_s: f64, circuit: &Circuit, square_a2_s: f64) {
+    /// See [`Electric::after`].
+    pub fn heated(&mut self, dt_s: f64, circuit: &Circuit, square_a2_s: f64) {
         self.electric.iter_mut().for_each(|effect| effect.call(|part| part.after(dt_s, circuit, square_a2_s)));
     }
 
-    fn friction(&mut self, speed_rad_per_s: f64, friction: &mut Friction) {
+    /// See [`Resist`].
+    pub fn friction(&mut self, speed_rad_per_s: f64, friction: &mut Friction) {
         self.resist.iter_mut().for_each(|effect| effect.call(|part| part(speed_rad_per_s, friction)));
     }
 
-    fn potential_nm(&mut self, from_rad: f64, to_rad: f64) -> f64 {
+    /// Mean torque of what stores energy between two angles: the difference in energy over the distance.
+    pub fn potential_nm(&mut self, from_rad: f64, to_rad: f64) -> f64 {
         self.potential.iter_mut().map(|effect| effect.call(|part| part.mean_nm(from_rad, to_rad))).sum()
     }
 
-    fn potential_j(&self, angle_rad: f64) -> f64 {
+    pub fn potential_j(&self, angle_rad: f64) -> f64 {
         self.potential.iter().map(|effect| effect.part().energy_j(angle_rad)).sum()
     }
 
-    fn steepest_nm_per_rad(&self) -> f64 {
+    /// Largest slope of that torque.
+    pub fn steepest_nm_per_rad(&self) -> f64 {
         self.potential.iter().map(|effect| effect.part().steepest_nm_per_rad()).sum()
     }
 
-    fn tip_mm(&mut self, flank_mm: f64, surface_mm: f64) -> f64 {
+    /// See [`Play`].
+    pub fn tip_mm(&mut self, flank_mm: f64, surface_mm: f64) -> f64 {
         let plays = self.play.iter_mut();
         plays.fold(flank_mm, |tip_mm, effect| effect.call(|part| part(tip_mm, surface_mm)))
     }
 
-    fn count(&mut self, count: i32) -> i32 {
+    /// See [`Encoder`].
+    pub fn count(&mut self, count: i32) -> i32 {
         self.encoder.iter_mut().fold(count, |count, effect| effect.call(|part| part(count)))
     }
 
+    /// Adds the state of the effects to the truth.
     #[inline]
-    fn tell(&self, truth: &mut Truth) {
+    pub fn tell(&self, truth: &mut Truth) {
         self.electric.iter().for_each(|effect| effect.part().tell(truth));
     }
 }

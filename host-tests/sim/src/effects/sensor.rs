@@ -9,6 +9,7 @@ mod floating;
 use crate::effects::{Description, Metered, NamedEffect, family_of, normal_within_3, normals};
 use crate::events::ArrayEvents;
 use crate::mechanics::decay;
+use crate::plant::{self, ArrayFaults};
 use crate::scene::Scene;
 use crate::scene::tables::{Key, Kind};
 use crate::setup::Array;
@@ -39,7 +40,7 @@ pub type Volts = dyn FnMut(usize, f64, &mut Row) + Send;
 /// Effect on the codes of the converter before rounding: slot, time and codes as in [`Volts`].
 pub type Codes = dyn FnMut(usize, f64, &mut Row) + Send;
 
-/// Stages as the readout calls them: of the named effects, of the plant with its built-in defects, or none: `()`.
+/// Stages as the readout calls them: of the named effects, or none: `()`.
 pub trait Stages {
     /// True if no stage has an effect: the readout is then ideal and calls none.
     fn none(&self) -> bool {
@@ -125,6 +126,8 @@ pub struct Readout {
     codes_per_volt: f64,
     siemens: [Row; ROWS],
     events: Option<Box<ArrayEvents>>,
+    /// Defects; none if the array is sound.
+    pub faults: Option<ArrayFaults>,
 }
 
 impl Readout {
@@ -133,7 +136,7 @@ impl Readout {
         let volts_per_siemens = array.feedback_ohm * array.drive_v;
         let codes_per_volt = Array::CODES / array.reference_v;
         let siemens = [[array.preload_siemens; COLUMNS]; ROWS];
-        Self { array: *array, volts_per_siemens, codes_per_volt, siemens, events: None }
+        Self { array: *array, volts_per_siemens, codes_per_volt, siemens, events: None, faults: None }
     }
 
     /// Adds the events of a scene that change the codes of a finger.
@@ -167,11 +170,32 @@ impl Readout {
         if slot < ROWS {
             self.add_row(stages, slot, time_s, kpa, &mut volts);
         }
+        if let Some(faults) = self.faults {
+            self.break_rows(&faults, stages, slot, &mut volts);
+        }
         stages.volts(slot, time_s, &mut volts);
         let mut codes = volts.map(|volts| volts * self.codes_per_volt);
         stages.codes(slot, time_s, &mut codes);
         // The conversion to an integer rounds down, and negative values become 0.
         codes.map(|code| (code as u16).min(Array::CODES as u16 - 1))
+    }
+
+    /// Adds rows that are stuck in the driven state, removes those that are never driven, and saturates the amplifiers.
+    #[cold]
+    fn break_rows(&self, faults: &ArrayFaults, stages: &mut impl Stages, slot: usize, volts: &mut Row) {
+        for (row, state) in faults.rows.iter().enumerate() {
+            let sign = match state {
+                plant::Row::StuckHigh if row != slot => 1.0,
+                plant::Row::StuckLow if row == slot => -1.0,
+                _ => continue,
+            };
+            let mut seen = self.siemens[row];
+            stages.network(row, &self.siemens, &mut seen);
+            volts.iter_mut().zip(seen).for_each(|(volts, siemens)| *volts += sign * siemens * self.volts_per_siemens);
+        }
+        if faults.saturated {
+            *volts = [self.array.reference_v; COLUMNS];
+        }
     }
 
     /// Adds the voltages of a driven row under these pressures.
@@ -184,6 +208,15 @@ impl Readout {
             if loaded > 0.0 { loaded } else { 0.0 }
         });
         stages.conductance(row, time_s, &mut self.siemens[row]);
+        if let Some(faults) = &self.faults {
+            for (siemens, taxel) in self.siemens[row].iter_mut().zip(faults.taxels[row]) {
+                *siemens = match taxel {
+                    plant::Taxel::Sound => *siemens,
+                    plant::Taxel::Dead => 0.0,
+                    plant::Taxel::Shorted => array.short_siemens,
+                };
+            }
+        }
         let mut seen = self.siemens[row];
         stages.network(row, &self.siemens, &mut seen);
         for (volts, siemens) in volts.iter_mut().zip(seen) {

@@ -5,7 +5,7 @@
 //! friction and the winding remove energy. If the shaft comes to rest inside a step, the step is cut there. From rest
 //! it moves only if the drive exceeds friction.
 
-use crate::effects::drive::{Circuit, Friction, Stages};
+use crate::effects::drive::{Circuit, Friction, Named};
 use crate::mechanics::decay;
 use crate::setup::Setup;
 
@@ -259,8 +259,8 @@ pub(crate) fn resistive(circuit: &Circuit, open: bool) -> Source {
 }
 
 /// Everything that acts on the shaft of a finger.
-pub(crate) struct Acts<'a, D, L> {
-    pub drive: &'a mut D,
+pub(crate) struct Acts<'a, L> {
+    pub drive: &'a mut Named,
     /// True if the drive has no effects.
     pub alone: bool,
     pub circuit: &'a Circuit,
@@ -276,7 +276,7 @@ pub(crate) struct Acts<'a, D, L> {
     pub square_a2_s: f64,
 }
 
-impl<D, L> Acts<'_, D, L> {
+impl<L> Acts<'_, L> {
     /// exp(-x) and its mean from 0 to x, x the time in units of L / R.
     fn kept(&self, dt_s: f64, ohms: f64) -> [f64; 2] {
         let x = dt_s * ohms / self.circuit.henry;
@@ -290,7 +290,7 @@ impl<D, L> Acts<'_, D, L> {
     }
 }
 
-impl<D: Stages, L: Fn(f64, f64) -> f64> Acting for Acts<'_, D, L> {
+impl<L: Fn(f64, f64) -> f64> Acting for Acts<'_, L> {
     fn resistance(&mut self, from_rad: f64, to_rad: f64) -> Resistance {
         let load_n = (self.load_n)(from_rad * self.mm_per_rad, to_rad * self.mm_per_rad);
         let load_nm = self.mm_per_rad * 1e-3 * load_n;

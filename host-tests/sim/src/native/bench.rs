@@ -1,11 +1,10 @@
 //! Finger on a bench, frame by frame, under the command of a test. The inputs of its controller can be changed, and the
 //! scene around it can be exchanged while its controller stays, as a user moves finger and plate between two presses.
-//! The finger of the plant ([`crate::plant`]) can also be broken and moved.
+//! Its finger can also be broken and moved.
 
-use crate::effects::Set;
 use crate::mechanics::{Bridge, Finger};
 use crate::native::{Board, SimError, Unit};
-use crate::plant::{Faults, Reference};
+use crate::plant::{self, Faults};
 use crate::scene::{Scene, read};
 use crate::setup::Setup;
 use crate::watch::Truth;
@@ -17,8 +16,8 @@ use fingertip::shipped::{Capture, Config, Frame, Pipeline, TARE_FRAMES};
 use images::record::Record;
 
 /// First finger of a scene, or the finger of the plant.
-pub struct Bench<E: Set = Reference> {
-    board: Board<E>,
+pub struct Bench {
+    board: Board,
     sense: Sense,
     capture: Box<Capture>,
 }
@@ -28,7 +27,7 @@ const MEASURE_FRAMES: usize = 300_000;
 /// Time between two frames of a rest.
 const REST_STEP_S: f64 = 0.02;
 
-impl<E: Set> Bench<E> {
+impl Bench {
     /// Creates the bench at rest, torque off, not tared.
     pub fn new(scene: &Scene) -> Result<Self, SimError> {
         Ok(Self::around(Board::new(&scene.without_events())?))
@@ -41,11 +40,12 @@ impl<E: Set> Bench<E> {
         (now.clock, now.start, now.bridges) = (before.clock, before.start, before.bridges);
         let finger = &mut now.world.fingers[0];
         let finger_before = &mut before.world.fingers[0];
-        finger.now = finger_before.now;
+        (finger.now, finger.faults) = (finger_before.now, finger_before.faults);
         finger.contact.effects.remember(&mut finger_before.contact.effects);
         if let (Some(now), Some(before)) = (now.units.first_mut(), before.units.into_iter().next()) {
             (now.pipeline, now.frame, now.command) = (before.pipeline, before.frame, before.command);
             (now.sensor, now.next, now.repeats) = (before.sensor, before.next, before.repeats);
+            now.readout.faults = before.readout.faults;
         }
         Ok(())
     }
@@ -66,15 +66,15 @@ impl<E: Set> Bench<E> {
         Ok(fork)
     }
 
-    fn around(board: Board<E>) -> Self {
+    fn around(board: Board) -> Self {
         Self { board, sense: Sense::default(), capture: Box::new(Capture::NEW) }
     }
 
-    fn unit(&self) -> &Unit<E> {
+    fn unit(&self) -> &Unit {
         &self.board.units[0]
     }
 
-    fn finger_mut(&mut self) -> &mut Finger<E::Drive> {
+    fn finger_mut(&mut self) -> &mut Finger {
         &mut self.board.world.fingers[0]
     }
 
@@ -220,15 +220,20 @@ impl Bench {
     /// Creates the finger of the plant under a controller: at rest, torque off, not tared.
     pub fn of(setup: &Setup, config: &Config) -> Self {
         let scene = read("plant", SCENE).expect("the plant's scene is one");
-        let parts = core::iter::once(Reference::parts(setup));
+        let parts = core::iter::once(plant::parts(setup));
         let board = Board::of(&scene, config, setup, parts);
-        Self::around(board.unwrap_or_else(|error| panic!("{error}")))
+        let mut bench = Self::around(board.unwrap_or_else(|error| panic!("{error}")));
+        // The scene does not name the effects of the plant.
+        bench.board.units[0].repeats = false;
+        bench
     }
 
     /// Sets or clears defects.
     pub fn harm(&mut self, change: impl FnOnce(&mut Faults)) {
-        let faults = &mut self.board.world.fingers[0].drive.faults;
+        let faults = &mut self.board.world.fingers[0].faults;
         change(faults);
-        self.board.units[0].sensor.faults = faults.array;
+        let unit = &mut self.board.units[0];
+        unit.readout.faults = Some(faults.array);
+        unit.repeats = false;
     }
 }

@@ -6,7 +6,6 @@
 //! (`populations/unlike.toml`).
 
 use crate::cores;
-use crate::effects::Named;
 use crate::native::bench::Bench;
 use crate::native::simulate_calibrated;
 use crate::population::load;
@@ -93,7 +92,7 @@ pub fn board(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, RunError> 
 }
 
 /// Calibrates a finger in front of the plate of its scene. The finger has the result in the end.
-pub fn calibrate(bench: &mut Bench<Named>, scene: &Scene) -> Result<Calibrated, RunError> {
+pub fn calibrate(bench: &mut Bench, scene: &Scene) -> Result<Calibrated, RunError> {
     let mut params = scene.params();
     let (mut presses, mut refused) = (Vec::new(), Vec::new());
     for place in PLACES {
@@ -176,7 +175,7 @@ pub fn changed(scene: &Scene, changes: &[(&str, String)]) -> Result<Scene, RunEr
 }
 
 /// Holds a force, starting from any state. Returns the means of the true force and of the reading over the end, N.
-fn hold(bench: &mut Bench<Named>, goal_n: f64, seconds: f64) -> [f64; 2] {
+fn hold(bench: &mut Bench, goal_n: f64, seconds: f64) -> [f64; 2] {
     bench.command().goal = newtons((goal_n * 1e3) as i32);
     bench.run(seconds - READ_S);
     let until_s = bench.time_s() + READ_S;
@@ -192,7 +191,7 @@ fn hold(bench: &mut Bench<Named>, goal_n: f64, seconds: f64) -> [f64; 2] {
 }
 
 /// Releases the object, then torque off.
-fn release(bench: &mut Bench<Named>) {
+fn release(bench: &mut Bench) {
     bench.command().goal = newtons(0);
     bench.run(RELEASE_S);
     bench.command().torque = false;
@@ -236,8 +235,8 @@ fn finger(seed: u64, number: usize) -> Result<Unlike, RunError> {
     let angle = TAU * rng.f64();
     let off = Place { centre_mm: [OFF_MM * angle.cos(), OFF_MM * angle.sin()], ..Place::default() };
     let scene = changed(&drawn.scene, &[("effects.broken_taxels.dead", format!("{taxels:?}"))])?;
-    let mut bench = Bench::<Named>::new(&scene)?;
-    let errors = |bench: &mut Bench<Named>| -> Result<[f64; 3], RunError> {
+    let mut bench = Bench::new(&scene)?;
+    let errors = |bench: &mut Bench| -> Result<[f64; 3], RunError> {
         let mut errors = [0.0; 3];
         for (error, (_, goal_n, is_off)) in errors.iter_mut().zip(TESTS) {
             bench.exchange(&plate(&scene, if is_off { off } else { Place::default() })?)?;

@@ -5,7 +5,6 @@
 //! parameters make a new configuration, and saved ones survive a reboot. Not simulated are the time of bytes on the
 //! line, and the time in which the microcontroller starts, saves and answers (loop times read 0).
 
-use crate::effects::Set;
 use crate::mechanics::Bridge;
 use crate::native::{Board, SimError};
 use crate::scene::Scene;
@@ -34,8 +33,8 @@ pub struct Answer {
 }
 
 /// The fingers of a scene on a bus.
-pub struct Bus<E: Set> {
-    board: Board<E>,
+pub struct Bus {
+    board: Board,
     devices: Vec<Device>,
     object: Object,
     answers: VecDeque<Answer>,
@@ -59,10 +58,10 @@ struct Device {
     capture: Box<Capture>,
 }
 
-impl<E: Set> Bus<E> {
+impl Bus {
     /// Powers the fingers on: torque off, not tared, nothing stored but the values of the scene.
     pub fn new(scene: &Scene) -> Result<Self, SimError> {
-        let board = Board::<E>::new(&scene.without_events())?;
+        let board = Board::new(&scene.without_events())?;
         let device = |finger: usize| {
             let flash = Record { id: 1 + finger as u8, params: board.params, ..Record::DEFAULT };
             Device::new(flash, ResetCause::PowerOn, 0.0)
@@ -307,13 +306,13 @@ struct Object {
 }
 
 impl Object {
-    fn new<E: Set>(world: &World<E>) -> Self {
+    fn new(world: &World) -> Self {
         let scene_mm = world.fingers[0].setup.wall.distance_mm;
         Self { scene_mm, now_mm: scene_mm, goal_mm: scene_mm, mm_per_s: MM_PER_S }
     }
 
     /// Advances towards the goal.
-    fn approach<E: Set>(&mut self, world: &mut World<E>, dt_s: f64) {
+    fn approach(&mut self, world: &mut World, dt_s: f64) {
         if self.now_mm != self.goal_mm {
             let most_mm = self.mm_per_s * dt_s;
             self.now_mm += (self.goal_mm - self.now_mm).clamp(-most_mm, most_mm);
@@ -321,12 +320,12 @@ impl Object {
         }
     }
 
-    fn jump<E: Set>(&mut self, world: &mut World<E>, to_mm: f64) {
+    fn jump(&mut self, world: &mut World, to_mm: f64) {
         (self.now_mm, self.goal_mm) = (to_mm, to_mm);
         self.place(world);
     }
 
-    fn place<E: Set>(&self, world: &mut World<E>) {
+    fn place(&self, world: &mut World) {
         world.fingers.iter_mut().for_each(|finger| finger.setup.wall.distance_mm = self.now_mm);
     }
 }
@@ -342,7 +341,7 @@ state                says what is true of each finger
 help                 says this
 ";
 
-impl<E: Set> Bus<E> {
+impl Bus {
     /// Carries out a line of text and returns what was done. The error is for people.
     pub fn command(&mut self, text: &str) -> Result<String, String> {
         let words: Vec<&str> = text.split_whitespace().collect();

@@ -16,12 +16,11 @@ use fingertip::config::newtons;
 use fingertip::params::Params;
 use fingertip::shipped::Frame;
 use images::record::Record;
-use sim::effects::Named;
 use sim::native::bench::Bench;
 use sim::scene::{Scene, read};
 
 /// A finger with the effects that its scene names.
-type Finger = Bench<Named>;
+type Finger = Bench;
 
 /// Losses of the reference finger of `docs/runs.md`.
 const LOSSES: &str = "[effects.dry_friction]\n[effects.gear_efficiency]\n[effects.supply_sag]\n";

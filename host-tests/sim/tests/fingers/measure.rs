@@ -8,7 +8,6 @@ use fingertip::params::Params;
 use fingertip::shipped::Config;
 use fingertip::state::Fault;
 use sim::cores;
-use sim::effects::{Named, Set};
 use sim::native::bench::Bench;
 use sim::plant::Faults;
 use sim::population::{Finger, read};
@@ -38,7 +37,7 @@ struct Made {
 }
 
 /// Tares and makes a motion; calls `each` after every frame with the time since the request.
-fn make<E: Set>(mut bench: Bench<E>, task: Task, mut each: impl FnMut(&mut Bench<E>, f64)) -> Made {
+fn make(mut bench: Bench, task: Task, mut each: impl FnMut(&mut Bench, f64)) -> Made {
     bench.tare();
     if task == Task::Press {
         bench.run(0.05);
@@ -103,7 +102,7 @@ fn tips(count: usize, changes: &[(&str, &str)]) -> Vec<Finger> {
 fn make_all(fingers: &[Finger], task: Task, place_mm: Option<fn(f64, f64) -> f64>) -> Vec<Made> {
     cores::map(fingers, |finger| {
         let distance_mm = drawn(finger, "object.distance_mm");
-        make(Bench::<Named>::new(&finger.scene).expect("a world"), task, |bench, time_s| {
+        make(Bench::new(&finger.scene).expect("a world"), task, |bench, time_s| {
             if let (Some(place_mm), Some(distance_mm)) = (place_mm, distance_mm) {
                 bench.place_object(place_mm(distance_mm, time_s));
             }
@@ -215,7 +214,7 @@ fn presses_end_within_limits(count: usize) {
 }
 
 /// The reference finger with a defect.
-fn harmed(defect: impl FnOnce(&mut Faults)) -> Bench<impl Set> {
+fn harmed(defect: impl FnOnce(&mut Faults)) -> Bench {
     let config = Config::shipped(&images::CONFIRMED).expect("the defaults are allowed");
     let mut bench = Bench::of(&Setup::default(), &config);
     bench.harm(defect);

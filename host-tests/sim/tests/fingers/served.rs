@@ -5,12 +5,11 @@ use fingertip::link::packet::instruction::{READ, WRITE};
 use fingertip::link::packet::{Event, Receiver, Sender};
 use fingertip::shipped::address;
 use fingertip::state::{Fault, Mode};
-use sim::effects::Named;
 use sim::native::served::Bus;
 
 const MODE: u16 = address::PRESENT_MODE;
 
-struct Host(Bus<Named>);
+struct Host(Bus);
 
 impl Host {
     fn new(scene: &str) -> Self {

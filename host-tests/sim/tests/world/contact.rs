@@ -15,7 +15,7 @@ use sim::watch::{Step, Watch};
 /// Friction that stops all motion, so that the tip stays where it is placed.
 const HELD: &str = "[effects.dry_friction]\ntorque_mnm = 20.0\n";
 
-fn pressed(text: &str, d_mm: f64) -> sim::world::World<sim::effects::Named> {
+fn pressed(text: &str, d_mm: f64) -> sim::world::World {
     let mut world = world(&format!("{HELD}{text}"));
     world.fingers[0].place(5.0 + d_mm);
     world

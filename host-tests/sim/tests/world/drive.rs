@@ -3,8 +3,7 @@
 use crate::{close, parts, run, world};
 use core::f64::consts::TAU;
 use sim::cores;
-use sim::effects::Named;
-use sim::effects::drive::{Circuit, Friction, Stages as _};
+use sim::effects::drive::{Circuit, Friction};
 use sim::mechanics::Bridge;
 use sim::world::World;
 
@@ -12,7 +11,7 @@ const FAR: &str = "[object]\ndistance_mm = 100.0\n";
 const FULL: Bridge = Bridge::Driven { duty: 1.0 };
 const STEPS_S: [f64; 4] = [1e-6, 10e-6, 50e-6, 200e-6];
 
-fn speed(world: &World<Named>) -> f64 {
+fn speed(world: &World) -> f64 {
     world.fingers[0].now.shaft.speed_rad_per_s
 }
 
@@ -205,7 +204,7 @@ fn never_rises(text: &str) {
     let mut moving = world(&scene);
     let mut random = fastrand::Rng::with_seed(11);
     let mass_kg = text.contains("object_mass").then_some(0.05);
-    let energy = |world: &World<Named>| {
+    let energy = |world: &World| {
         let finger = &world.fingers[0];
         let [x, y] = world.body.speed_mm_per_s;
         let body_mj = mass_kg.map_or(0.0, |kg: f64| 0.5 * kg * (x * x + y * y) * 1e-3);
@@ -262,7 +261,7 @@ struct Fed {
 }
 
 impl Fed {
-    fn by(text: &str, bridge: Bridge, world: &mut World<Named>) -> Self {
+    fn by(text: &str, bridge: Bridge, world: &mut World) -> Self {
         let (duty, open) = match bridge {
             Bridge::Coast => (0.0, f64::INFINITY),
             Bridge::Driven { duty } => (duty, 1.0),
@@ -282,7 +281,7 @@ impl Fed {
 
     /// By the charge that went through, u V dt = R q + k angle + L di, and as a current that varies heats more than its
     /// mean.
-    fn at_most_mj(&self, dt_s: f64, world: &World<Named>) -> f64 {
+    fn at_most_mj(&self, dt_s: f64, world: &World) -> f64 {
         let finger = &world.fingers[0];
         let turned_rad = finger.now.shaft.angle_rad - self.angle_rad;
         let more_a = if self.henry > 0.0 { finger.current_a() - self.current_a } else { 0.0 };
@@ -294,7 +293,7 @@ impl Fed {
 
 /// Energy of a tip on a plane that remembers q, mJ: E(d) - g q d + g (q d_q - E(d_q)), F_e(d_q) = q, at the indentation
 /// or, off the object, at that of its shape.
-fn relaxing_mj(world: &World<Named>) -> f64 {
+fn relaxing_mj(world: &World) -> f64 {
     let finger = &world.fingers[0];
     let forgotten_n = finger.contact.law().forgotten_n;
     let n_per_mm2 = finger.setup.tip.force_per_mm2();

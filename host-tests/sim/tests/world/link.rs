@@ -2,7 +2,7 @@
 
 use crate::{parts, run, scene, world};
 use fingertip::shipped::{COLUMNS, SLOTS};
-use sim::effects::{Named, sensor::Stages as _, stream};
+use sim::effects::{sensor::Stages as _, stream};
 use sim::host::Host;
 use sim::mechanics::Bridge;
 use sim::native::Clock;
@@ -176,7 +176,7 @@ const ROW: usize = 4;
 /// Full drive into a wall.
 const DRIVE: Bridge = Bridge::Driven { duty: 1.0 };
 
-fn running_in() -> World<Named> {
+fn running_in() -> World {
     let mut world = world("[object]\ndistance_mm = 0.0\n");
     world.fingers[0].place(1.0);
     world.fingers[0].launch(50.0);

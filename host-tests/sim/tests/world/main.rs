@@ -11,22 +11,22 @@ mod plant;
 mod sensor;
 
 use fingertip::state::Mode;
-use sim::effects::{self, Named, Parts, Set as _};
+use sim::effects::{self, Parts};
 use sim::mechanics::Bridge;
 use sim::scene::{self, Scene, read};
 use sim::watch::{Cost, Step, Summary, Truth, Watch};
 use sim::world::{Surroundings, World};
 
 /// The world of a scene, to be moved by hand.
-fn world(text: &str) -> World<Named> {
+fn world(text: &str) -> World {
     let scene = scene(&format!("duration_s = 1.0\n{text}"));
     let fingers = 0..scene.table("hand").whole("fingers") as usize;
-    let effects = fingers.map(|finger| Named::of(&scene, finger)).map(|parts| (parts.drive, parts.contact)).collect();
+    let effects = fingers.map(|finger| Parts::of(&scene, finger)).map(|parts| (parts.drive, parts.contact)).collect();
     World::new(&scene.setup(), &Surroundings::of(&scene), effects)
 }
 
 /// Moves it on under one duty.
-fn run(world: &mut World<Named>, step_s: f64, steps: u64, bridge: Bridge) {
+fn run(world: &mut World, step_s: f64, steps: u64, bridge: Bridge) {
     for step in 0..steps {
         world.advance(step as f64 * step_s, step_s, &[bridge; 2]);
     }
@@ -92,8 +92,8 @@ fn a_contact_a_thousand_times_as_stiff_stays_sound() {
     let scene = scene("duration_s = 0.1\n[object]\ndistance_mm = 0.5\n");
     let mut setup = scene.setup();
     setup.tip.modulus_kpa *= 1000.0;
-    let parts = Named::of(&scene, 0);
-    let mut world = World::<Named>::new(&setup, &Surroundings::of(&scene), vec![(parts.drive, parts.contact)]);
+    let parts = Parts::of(&scene, 0);
+    let mut world = World::new(&setup, &Surroundings::of(&scene), vec![(parts.drive, parts.contact)]);
     assert!(world.check_step(200e-6).is_err());
     world.check_step(100e-6).unwrap();
     world.fingers[0].launch(200.0);
@@ -193,8 +193,8 @@ fn scene(text: &str) -> Scene {
 }
 
 /// The effects of these tables.
-fn parts(tables: &str, seed: u64) -> Parts<Named> {
-    Named::of(&Scene { seed, ..scene(&format!("duration_s = 1.0\n{tables}")) }, 0)
+fn parts(tables: &str, seed: u64) -> Parts {
+    Parts::of(&Scene { seed, ..scene(&format!("duration_s = 1.0\n{tables}")) }, 0)
 }
 
 #[derive(Debug, Default)]

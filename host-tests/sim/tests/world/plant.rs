@@ -6,7 +6,6 @@ use fingertip::shipped::{self, COLUMNS, Frame, ROWS, SLOTS};
 use fingertip::state::Mode;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
-use sim::effects::Named;
 use sim::mechanics::pressures::Cell;
 use sim::mechanics::rotor::{Reason, profile};
 use sim::mechanics::{Bridge, decay};
@@ -56,7 +55,7 @@ fn a_scene_that_names_what_the_plant_holds_is_the_same_to_the_bit() {
     setup.wall.distance_mm = 0.5;
     // As the scene has it: in g cm^2, which rounds otherwise.
     setup.motor.inertia_kg_m2 = 0.71 * 1e-7;
-    let mut named = Bench::<Named>::new(&scene).expect("it runs");
+    let mut named = Bench::new(&scene).expect("it runs");
     let mut plant = Bench::of(&setup, &shipped::Config::shipped(&scene.params()).unwrap());
     named.tare();
     plant.tare();

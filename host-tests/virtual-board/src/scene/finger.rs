@@ -5,8 +5,8 @@ use crate::converter::ROOM_C;
 use fingertip::frame::Sense;
 use fingertip::shipped::{COLUMNS, Frame, ROWS, SLOTS};
 use sim::SimError;
+use sim::effects::Parts;
 use sim::effects::sensor::{self, Readout, Stages as _};
-use sim::effects::{Named, Parts, Set, link};
 use sim::mechanics::Bridge;
 use sim::scene::Scene;
 use sim::setup::Array;
@@ -96,7 +96,7 @@ impl Finger {
         let fingers = scene.table("hand").whole("fingers") as usize;
         let (mut sensors, mut effects) = (Vec::new(), Vec::new());
         for finger in 0..fingers {
-            let Parts { sensor, contact, drive, .. } = Named::of(scene, finger);
+            let Parts { sensor, contact, drive, .. } = Parts::of(scene, finger);
             sensors.push(sensor);
             effects.push((drive, contact));
         }
@@ -209,7 +209,7 @@ impl Finger {
     pub fn costs(&self) -> Vec<Cost> {
         let world = &self.joint.meeting.lock().world;
         let finger = &world.fingers[self.joint.finger];
-        Named::costs(&self.sensor, &finger.contact.effects, &finger.drive, &link::Named::default())
+        self.sensor.costs().chain(finger.contact.effects.costs()).chain(finger.drive.costs()).collect()
     }
 }
 
@@ -222,7 +222,7 @@ impl Finger {
 
 /// The world, and the progress of each board.
 struct SharedWorld {
-    world: World<Named>,
+    world: World,
     bridges: Vec<Bridge>,
     reached_ns: Vec<u64>,
     moved_to_ns: u64,
@@ -292,7 +292,7 @@ impl Drop for Joint {
 
 impl Joint {
     /// A hold for each finger of a world at scene time `now_s`.
-    fn all(scene: &Scene, world: World<Named>, now_s: f64) -> Result<Vec<Self>, SimError> {
+    fn all(scene: &Scene, world: World, now_s: f64) -> Result<Vec<Self>, SimError> {
         let longest_s = scene.table("world").number("step_us") * 1e-6;
         world.check_step(longest_s)?;
         let fingers = world.fingers.len();
@@ -399,7 +399,7 @@ impl SharedWorld {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sim::effects::{Parts, Set};
+    use sim::effects::Parts;
     use sim::world::Surroundings;
 
     const DRIVEN: fn(f64) -> Bridge = |duty| Bridge::Driven { duty };
@@ -407,7 +407,7 @@ mod tests {
     fn two() -> Vec<Joint> {
         let text = "about = \"two\"\nduration_s = 1.0\n[hand]\nfingers = 2\n";
         let scene = sim::scene::read("test.toml", text).unwrap_or_else(|errors| panic!("{errors}"));
-        let effects = (0..2).map(|finger| Named::of(&scene, finger));
+        let effects = (0..2).map(|finger| Parts::of(&scene, finger));
         let effects = effects.map(|Parts { drive, contact, .. }| (drive, contact)).collect();
         let world = World::new(&scene.setup(), &Surroundings::of(&scene), effects);
         Joint::all(&scene, world, 0.0).expect("the world is sound")

@@ -31,8 +31,6 @@ pub struct Inputs {
     pub frames: Frames,
     /// Contacts without noise, and with noise of 1 % of each reading: several tactile images of each.
     pub fits: [Vec<Seen>; 2],
-    /// A controller's errors, -1 to 1.
-    pub control: Vec<Pair>,
     pub records: Vec<Record>,
 }
 
@@ -70,19 +68,6 @@ fn seen_to_bytes<'a>(seen: impl Iterator<Item = &'a Seen>, pictures: usize) -> V
         words.extend(shown.flat_map(|picture| picture.taxels.into_iter().flatten()));
     }
     words.into_iter().flat_map(i32::to_le_bytes).collect()
-}
-
-/// A disturbed first-order error, so that the output runs into its slew and its limits now and then.
-fn control(rng: &mut Rng) -> Vec<Pair> {
-    let (mut error, mut push) = (0, 0);
-    let mut next = |n: usize| {
-        if n.is_multiple_of(64) {
-            push = rng.i32(-3_000..=3_000);
-        }
-        error += (push * 8 - error) / 16 + rng.i32(-300..=300);
-        [error, 0]
-    };
-    (0..2_048).map(&mut next).collect()
 }
 
 /// Frames of a contact, and what the array's calibration is.
@@ -139,7 +124,6 @@ impl Default for Inputs {
             rings: spread(&mut rng, 32, 32_768, 327_680),
             frames: Frames::new(&mut rng),
             fits: SERIES.map(|series| seen(&GOOD[series])),
-            control: control(&mut rng),
             records: stimulus::records(),
         }
     }
@@ -173,7 +157,6 @@ impl Inputs {
         for seen in &self.fits {
             bytes.extend(seen_to_bytes(seen.iter().step_by(contact), pictures));
         }
-        bytes.extend(some(&self.control, number));
         bytes
     }
 

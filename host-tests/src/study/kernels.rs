@@ -45,8 +45,6 @@ pub enum Measure {
         /// True if the pictures have noise.
         noisy: bool,
     },
-    /// A controller's output.
-    Control,
     /// Only the time is of interest.
     Cost,
 }
@@ -144,16 +142,6 @@ pub const KERNELS: &[Kernel] = &[
             frame.",
     },
     Kernel {
-        name: "control",
-        title: "Controller step",
-        text: "PI controller by increments with limits of slew and output, without windup: y = y1 + 1.591 e - 1.53 e1, 2048 steps, \
-            against arbitrary precision. The firmware has another law (*speed law with limits* in [the step](#the-step-and-its-parts)).",
-        error: "output error, share of the range",
-        other: None,
-        measure: Measure::Control,
-        why: "",
-    },
-    Kernel {
         name: "step",
         title: "The step and its parts",
         text: "`Pipeline::step` over a recorded stimulus of 10,000 frames with faults, by default at fit level 2; its parts over the first \
@@ -207,7 +195,6 @@ fn point(kernel: &Kernel, ran: &Ran, inputs: &Inputs) -> Result<Point, String> {
         Measure::Absolute(section, exact) => one(scalar(ran, section(inputs), exact, false)),
         Measure::Relative(section, exact) => one(scalar(ran, section(inputs), exact, true)),
         Measure::Fit { noisy } => two(fit(ran, &inputs.fits[usize::from(noisy)])),
-        Measure::Control => one(control(ran, &inputs.control)),
         // Nothing to compare with: neither on a front nor beaten.
         Measure::Cost => one(Some([f64::NAN; 2])),
         Measure::Frames => two(scan::errors(&ran.returned, &inputs.frames)),
@@ -247,25 +234,6 @@ fn fit(ran: &Ran, seen: &[Seen]) -> Option<[[f64; 2]; 2]> {
         centre.add((x.to_f64() - scene.x_mm).hypot(y.to_f64() - scene.y_mm));
     }
     Some([force.both(), centre.both()])
-}
-
-/// Against the same law, y = y1 + 1.591 e - 1.53 e1 within 0.03 of y1 and within 1 either way, in arbitrary precision.
-fn control(ran: &Ran, inputs: &[Pair]) -> Option<[f64; 2]> {
-    let thousandths = |n: i32| real(n, 0) / real(1_000, 0);
-    let held = |value: Real, low: Real, high: Real| if value < low { low } else { value.min(high) };
-    let (mut before, mut y, mut errors) = (real(0, 0), real(0, 0), Errors::default());
-    if ran.returned.len() != inputs.len() {
-        return None;
-    }
-    for ([error, _], returned) in inputs.iter().zip(&ran.returned) {
-        let error = input(*error);
-        let wanted = &y + thousandths(1_591) * &error - thousandths(1_530) * &before;
-        let slewed = held(wanted, &y - thousandths(30), &y + thousandths(30));
-        y = held(slewed, real(-1, 0), real(1, 0));
-        before = error;
-        errors.add(returned.first()?.real().map_or(f64::NAN, |value| (value - &y).to_f64().value()));
-    }
-    Some(errors.both())
 }
 
 pub fn input(bits: i32) -> Real {

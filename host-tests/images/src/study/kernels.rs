@@ -1,6 +1,5 @@
 //! Every kernel of the study, one after the other. Whoever runs them brings the inputs, and how to call a kernel.
 
-mod control;
 mod fit;
 mod force;
 mod frame;
@@ -41,6 +40,5 @@ pub fn run(config: &Config, inputs: &mut Inputs) {
     frame::run(region, config, inputs);
     fit::run("fit-clean", region, inputs);
     fit::run("fit-noise", region, inputs);
-    control::run(region, inputs);
     step::run(region, config, inputs);
 }

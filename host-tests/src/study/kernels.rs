@@ -113,13 +113,11 @@ pub const KERNELS: &[Kernel] = &[
         name: "frame",
         title: "Frame to force, centre and flags",
         text: "100 taxels: offset, gain, row sag, tare, sum, moments, dead and saturated taxels; 256 frames of a simulated array with \
-            gains of 0.8 to 1.2 and indentations of 0.1 to 5 mm. The error is that of the arithmetic, against exact sums of the same codes and gains. \
-            *Sums* is the former pass, which computed single taxels only on demand: *two rows* in most frames, *all rows* at most.",
+            gains of 0.8 to 1.2 and indentations of 0.1 to 5 mm. The error is that of the arithmetic, against exact sums of the same codes and gains.",
         error: "force error, N",
         other: Some("centre error, mm"),
         measure: Measure::Frames,
-        why: "it also computes every taxel in every frame. With older rows in the image, a contact on rows that were not read was \
-            never fitted.",
+        why: "",
     },
     Kernel {
         name: "fit-clean",

@@ -3,7 +3,6 @@
 use super::Inputs;
 use super::call::pass_on;
 use super::packed;
-use super::sparse::{self, Sparse};
 use crate::host::{fail, say};
 use fingertip::shipped::{
     Array, BANK_COLUMNS, COLUMNS, Calibration, Config, Frame, ROWS, SLOTS, TARE_FRAMES, TactileImage,
@@ -48,8 +47,6 @@ pub struct Bench {
     pub out_single: Sums<f32>,
     /// Results in codes, double precision.
     pub out_double: Sums<f64>,
-    /// Earlier version of the firmware.
-    pub sparse: Sparse,
     /// True if a taxel is dead or saturated.
     pub suspect: bool,
 }
@@ -73,7 +70,7 @@ enum Format {
 
 type Kernel = extern "C" fn(&mut Bench);
 
-const VARIANTS: [(&str, Kernel, Format); 12] = [
+const VARIANTS: [(&str, Kernel, Format); 9] = [
     ("packed, no gains, no sag", packed::plain, Format::Fixed(4)),
     ("packed, gains", packed::gains, Format::Fixed(4)),
     ("packed, gains, sag to first order", packed::first_order, Format::Fixed(4)),
@@ -82,9 +79,6 @@ const VARIANTS: [(&str, Kernel, Format); 12] = [
     ("f32", single, Format::Single),
     ("f64", double, Format::Double),
     ("I16F16 saturating, `fixed`", saturating, Format::Fixed(11)),
-    ("sums alone", sparse::sums, Format::Fixed(4)),
-    ("sums, taxels of two rows", sparse::two_rows, Format::Fixed(4)),
-    ("sums, taxels of all rows", sparse::all_rows, Format::Fixed(4)),
     ("**Array::read**", firmware, Format::Picture),
 ];
 
@@ -206,7 +200,6 @@ fn bench(config: &Config, inputs: &mut Inputs) -> Bench {
     Bench {
         config: config.clone(),
         frame: quiet,
-        sparse: Sparse::new(&gain, &weighted, config),
         gain,
         weighted,
         tare_sums: sums(&|row, column| rounded(tare[row][column], 4_096.0)),

@@ -5,7 +5,6 @@ mod force;
 mod frame;
 mod packed;
 mod scalar;
-mod sparse;
 mod step;
 
 use super::Inputs;

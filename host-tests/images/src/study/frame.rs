@@ -2,7 +2,6 @@
 
 use super::Inputs;
 use super::call::pass_on;
-use super::packed;
 use crate::host::{fail, say};
 use fingertip::shipped::{
     Array, BANK_COLUMNS, COLUMNS, Calibration, Config, Frame, ROWS, SLOTS, TARE_FRAMES, TactileImage,
@@ -29,14 +28,8 @@ pub struct Bench {
     pub frame: Frame,
     /// Q14, in pairs as the codes are.
     pub gain: [[u32; BANK_COLUMNS]; ROWS],
-    /// The gains weighted along the columns, Q11.
-    pub weighted: [[u32; BANK_COLUMNS]; ROWS],
     /// Tare, sixteenths of a code.
     pub tare: [[i32; COLUMNS]; ROWS],
-    /// Sums of the tare, Q12 of a code.
-    pub tare_sums: Sums<i32>,
-    /// The same where gains are left out, sixteenths of a code.
-    pub plain_tare: Sums<i32>,
     pub single: Float<f32>,
     pub double: Float<f64>,
     /// Data in I16F16, unit 32 codes.
@@ -70,11 +63,7 @@ enum Format {
 
 type Kernel = extern "C" fn(&mut Bench);
 
-const VARIANTS: [(&str, Kernel, Format); 9] = [
-    ("packed, no gains, no sag", packed::plain, Format::Fixed(4)),
-    ("packed, gains", packed::gains, Format::Fixed(4)),
-    ("packed, gains, sag to first order", packed::first_order, Format::Fixed(4)),
-    ("packed, gains, sag by rows", packed::by_rows, Format::Fixed(10)),
+const VARIANTS: [(&str, Kernel, Format); 5] = [
     ("plain integers", integers, Format::Fixed(4)),
     ("f32", single, Format::Single),
     ("f64", double, Format::Double),
@@ -129,13 +118,6 @@ pub fn run(region: &mut u32, config: &Config, inputs: &mut Inputs) {
     }
 }
 
-/// The codes of a frame in words, as the two converters read them at the same instant.
-pub fn pairs(frame: &Frame) -> &[[u32; BANK_COLUMNS]; SLOTS] {
-    const { assert!(size_of_val(&Frame::EMPTY.codes) == 4 * BANK_COLUMNS * SLOTS) };
-    // SAFETY: the codes stand in the order of their fields without a gap, on a word's border, and any bits are a word.
-    unsafe { &*(&raw const frame.codes).cast() }
-}
-
 impl Bench {
     /// State that the firmware's variant left in the array.
     fn collect(&mut self, format: Format) {
@@ -180,30 +162,12 @@ fn bench(config: &Config, inputs: &mut Inputs) -> Bench {
     let tare: [[f64; COLUMNS]; ROWS] = core::array::from_fn(|row| core::array::from_fn(|column| exact(row, column)));
     // A power of two above 0, to the nearest.
     let rounded = |value: f64, one: f64| (value * one + 0.5) as i32;
-    let weight = |place: usize| 2 * place as i32 - 9;
-    let pairs = |of: &dyn Fn(usize, usize) -> i32| {
-        core::array::from_fn(|row| {
-            core::array::from_fn(|place| lanes::pair(of(row, place) as i16, of(row, place + BANK_COLUMNS) as i16))
-        })
-    };
-    let sums = |of: &dyn Fn(usize, usize) -> i32| {
-        let mut sums = Sums::default();
-        for (row, column) in (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column))) {
-            sums.sum += of(row, column);
-            sums.moment_x += of(row, column) * weight(column);
-            sums.moment_y += of(row, column) * weight(row);
-        }
-        sums
-    };
-    let gain = pairs(&|row, column| gains[row][column].into());
-    let weighted = pairs(&|row, column| (i32::from(gains[row][column]) * weight(column) + 4) >> 3);
+    let gain =
+        gains.map(|row| core::array::from_fn(|place| lanes::pair(row[place] as i16, row[place + BANK_COLUMNS] as i16)));
     Bench {
         config: config.clone(),
         frame: quiet,
         gain,
-        weighted,
-        tare_sums: sums(&|row, column| rounded(tare[row][column], 4_096.0)),
-        plain_tare: sums(&|row, column| 16 * net(row, column)),
         single: Float {
             gain: gains.map(|row| row.map(|gain| f32::from(gain) / 16_384.0)),
             tare: tare.map(|row| row.map(|tare| tare as f32)),

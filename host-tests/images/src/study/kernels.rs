@@ -3,7 +3,6 @@
 mod fit;
 mod force;
 mod frame;
-mod packed;
 mod scalar;
 mod step;
 

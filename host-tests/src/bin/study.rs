@@ -102,7 +102,7 @@ fn verdicts(studied: &[Studied]) {
         let beaten = page::beaten_by(points);
         let firmware = points.iter().zip(beaten).filter(|(point, _)| point.firmware);
         for (point, by) in firmware {
-            let place = page::verdict(point, by.map(|by| &points[by]));
+            let place = by.map_or("front".into(), |by| format!("beaten by {}", points[by].name));
             println!(
                 "{:<14} {:>6} cycles, error {:>8}: {place}; front of {count}, {} times in error, {cycles:.1} times in cycles",
                 kernel.name,

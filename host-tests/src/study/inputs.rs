@@ -12,6 +12,8 @@ use images::record::Record;
 use sim::plant::{Plant, Setup};
 
 const SEED: u64 = 2003;
+/// Seed of the frames of contacts.
+const FRAMES_SEED: u64 = 0xc33d_778f_6519_a910;
 
 /// A pair of numbers in Q16, with at most 24 significant bits each.
 pub type Pair = [i32; 2];
@@ -25,8 +27,6 @@ pub struct Inputs {
     pub indentation: Vec<Pair>,
     /// Distances from the centre, up to a little beyond the rim, and indentations, 0.01 to 9.5 mm.
     pub pressure: Vec<Pair>,
-    /// Indentations, 0.5 to 5 mm.
-    pub rings: Vec<Pair>,
     /// Frames of contacts, and the calibration.
     pub frames: Frames,
     /// Contacts without noise, and with noise of 1 % of each reading: several tactile images of each.
@@ -121,8 +121,7 @@ impl Default for Inputs {
                 .into_iter()
                 .map(|[d, _]| [distance(&mut rng, d), d])
                 .collect(),
-            rings: spread(&mut rng, 32, 32_768, 327_680),
-            frames: Frames::new(&mut rng),
+            frames: Frames::new(&mut Rng::with_seed(FRAMES_SEED)),
             fits: SERIES.map(|series| seen(&GOOD[series])),
             records: stimulus::records(),
         }
@@ -132,7 +131,7 @@ impl Default for Inputs {
 impl Inputs {
     /// As the image reads them.
     pub fn to_bytes(&self) -> Vec<u8> {
-        let mut bytes = self.every([1; 4], FRAMES);
+        let mut bytes = self.every([1; 3], FRAMES);
         bytes.extend((self.records.len() as u32).to_le_bytes());
         bytes.extend(self.records.iter().flat_map(Record::to_bytes));
         bytes
@@ -140,18 +139,16 @@ impl Inputs {
 
     /// Inputs that the image of `cargo xtask bringup` keeps: a few of all but the records, which it makes itself.
     pub fn few_to_bytes(&self) -> Vec<u8> {
-        self.every([32, 8, 16, 16], 12)
+        self.every([32, 16, 16], 12)
     }
 
-    /// Every n-th of the numbers, of the indentations of the rings, of the frames and of the contacts, with so many pictures
-    /// of a contact.
-    fn every(&self, [number, ring, frame, contact]: [usize; 4], pictures: usize) -> Vec<u8> {
+    /// Every n-th of the numbers, of the frames and of the contacts, with this number of pictures of a contact.
+    fn every(&self, [number, frame, contact]: [usize; 3], pictures: usize) -> Vec<u8> {
         let some = |pairs: &[Pair], each| pairs_to_bytes(&pairs.iter().copied().step_by(each).collect::<Vec<_>>());
         let mut bytes = Vec::new();
         for section in [&self.root, &self.force, &self.indentation, &self.pressure] {
             bytes.extend(some(section, number));
         }
-        bytes.extend(some(&self.rings, ring));
         let contacts = self.frames.contacts.iter().copied().step_by(frame).collect();
         bytes.extend(Frames { contacts, ..self.frames }.to_bytes());
         for seen in &self.fits {

@@ -100,16 +100,6 @@ pub const KERNELS: &[Kernel] = &[
             and tests, is correctly rounded everywhere and holds no floating-point number.",
     },
     Kernel {
-        name: "rings",
-        title: "Equation 14 by rings",
-        text: "F = integral of p dS over 4 to 64 rings, by the midpoint rule in r or in u = r^2, against pi Y d^2, for 32 indentations from \
-            0.5 to 5 mm. The closed form is apart from the front. `fixed` is I16F16, *Tip* is `force_by_rings`.",
-        error: "relative error of the force",
-        other: None,
-        measure: Measure::Relative(|inputs| &inputs.rings, |reference, [d, _]| reference.force(&input(*d))),
-        why: "",
-    },
-    Kernel {
         name: "frame",
         title: "Frame to force, centre and flags",
         text: "100 taxels: offset, gain, row sag, tare, sum, moments, dead and saturated taxels; 256 frames of a simulated array with \

@@ -12,9 +12,6 @@ use std::iter;
 pub const PAGE: Page = Page { name: "docs/study.md", tables: "study", command: "cargo xtask study" };
 pub const README: Page = Page { name: "README.md", ..PAGE };
 
-/// Largest number of variants of which the page shows also the beaten ones.
-const SHOWN_MAX: usize = 20;
-
 /// A kernel with its variants, cheapest first.
 pub type Studied<'a> = (&'a Kernel, Vec<Point>);
 
@@ -41,19 +38,14 @@ fn section(page: &mut String, kernel: &Kernel, points: &[Point]) {
         | --- | --- | --- |{rule} --- |"
     );
     let beaten = beaten_by(points);
-    let few = points.len() <= SHOWN_MAX;
-    for (point, by) in points.iter().zip(&beaten).filter(|(_, by)| few || by.is_none()) {
+    for (point, by) in points.iter().zip(&beaten) {
         let Point { name, firmware, cost, error_max, error_rms, other } = point;
         let bold = if *firmware { "**" } else { "" };
         let more = other.iter().flat_map(|[max, rms]| [*error_rms, *max, *rms]);
         let errors = [*error_max].into_iter().chain(more).map(figure);
         let cells = iter::once(cycles(cost)).chain(errors).collect::<Vec<_>>().join(" | ");
-        let place = by.map_or_else(|| verdict(point, None), |_| String::new());
+        let place = if by.is_none() { "front" } else { "" };
         let _ = writeln!(page, "| {bold}{name}{bold} | {cells} | {place} |");
-    }
-    if !few {
-        let hidden = beaten.iter().flatten().count();
-        let _ = writeln!(page, "\nThe picture and `--json` also have the {hidden} beaten variants.");
     }
     let beats_firmware = points.iter().zip(&beaten).any(|(point, by)| point.firmware && by.is_some());
     if beats_firmware {
@@ -79,15 +71,6 @@ fn costs(page: &mut String, kernel: &Kernel, points: &[Point]) {
 fn cycles(cost: &Cost) -> String {
     let Passes { median, max } = cost.estimate;
     if median == max { median.to_string() } else { format!("{median} ({max})") }
-}
-
-/// Position of a variant among the others.
-pub fn verdict(point: &Point, by: Option<&Point>) -> String {
-    match by {
-        Some(by) => format!("beaten by {}", by.name),
-        None if point.competes() => "front".into(),
-        None => "apart".into(),
-    }
 }
 
 /// Two digits; a power of ten where it is small or large.
@@ -164,16 +147,8 @@ impl Point {
         self.cost.estimate.median
     }
 
-    /// True if it competes with the others; a closed form among sums does not, nor what has no error.
-    pub fn competes(&self) -> bool {
-        !self.name.contains("closed form") && !self.error_max.is_nan()
-    }
-
     /// True if it is no worse in error and in time, and better in one.
     fn beats(&self, other: &Self) -> bool {
-        if !(self.competes() && other.competes()) {
-            return false;
-        }
         let no_worse = self.cycles() <= other.cycles() && self.error_max <= other.error_max;
         no_worse && (self.cycles() < other.cycles() || self.error_max < other.error_max)
     }
@@ -191,12 +166,7 @@ pub fn beaten_by(points: &[Point]) -> Vec<Option<usize>> {
 /// Extent of the front: points on it, its errors' ratio, its cycles' ratio.
 pub fn span(points: &[Point]) -> (usize, f64, f64) {
     let beaten = beaten_by(points);
-    let front: Vec<_> = points
-        .iter()
-        .zip(beaten)
-        .filter(|(point, by)| by.is_none() && point.competes())
-        .map(|(point, _)| point)
-        .collect();
+    let front: Vec<_> = points.iter().zip(beaten).filter(|(_, by)| by.is_none()).map(|(point, _)| point).collect();
     let ratio = |of: &dyn Fn(&Point) -> f64| {
         let values = || front.iter().map(|point| of(point)).filter(|value| *value > 0.0);
         values().fold(0.0, f64::max) / values().fold(f64::INFINITY, f64::min)
@@ -213,24 +183,14 @@ pub fn draw(kernel: &Kernel, points: &[Point]) -> Result<String, PlotError> {
         x: point.cycles().max(1) as f64,
         y: point.error_max,
         label: point.name.replace('`', ""),
-        best: by.is_none() && point.competes(),
+        best: by.is_none(),
         own: point.firmware,
     };
-    let square = match points.iter().find(|point| point.firmware) {
-        Some(point) if point.competes() => "; the square is the firmware's",
-        Some(_) => " of the sums; the square is the firmware's, no sum",
-        None => "",
-    };
     front(&Front {
-        title: &format!("{}: filled points are the front{square}", kernel.title),
+        title: &format!("{}: filled points are the front; the square is the firmware's", kernel.title),
         x: "estimated cycles on a Cortex-M4F, median, without wait states",
         y: &format!("largest {}", kernel.error),
-        dots: points
-            .iter()
-            .zip(beaten_by(points))
-            .filter(|(point, _)| point.competes() || point.firmware)
-            .map(dot)
-            .collect(),
+        dots: points.iter().zip(beaten_by(points)).map(dot).collect(),
     })
 }
 

@@ -31,7 +31,6 @@ pub fn run(config: &Config, inputs: &mut Inputs) {
         ("force", force::FORCE),
         ("indentation", force::INDENTATION),
         ("pressure", force::PRESSURE),
-        ("rings", force::RINGS),
     ] {
         scalar::run(kernel, variants, region, &tools, inputs);
     }

@@ -19,7 +19,6 @@ pub struct Constants<T> {
     pub radius: T,
     /// Young's modulus Y.
     pub modulus: T,
-    pub pi: T,
     pub pi_y: T,
     /// 1 / (pi Y).
     pub inverse: T,
@@ -50,18 +49,11 @@ impl Tools {
             single: Constants {
                 radius: radius as f32,
                 modulus: modulus as f32,
-                pi: pi as f32,
                 pi_y: pi_y as f32,
                 inverse: inverse as f32,
             },
-            double: Constants { radius, modulus, pi, pi_y, inverse },
-            fixed: Constants {
-                radius: q16(radius),
-                modulus: q16(modulus),
-                pi: q16(pi),
-                pi_y: q16(pi_y),
-                inverse: q16(inverse),
-            },
+            double: Constants { radius, modulus, pi_y, inverse },
+            fixed: Constants { radius: q16(radius), modulus: q16(modulus), pi_y: q16(pi_y), inverse: q16(inverse) },
             pi_y_q30: (pi_y * (1_u32 << 30) as f64 + 0.5) as u32,
             inverse_q30: (inverse * (1_u32 << 30) as f64 + 0.5) as u32,
         }

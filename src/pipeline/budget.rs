@@ -50,7 +50,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Budget<ROWS, COLUMNS> {
     /// Bounds, upper and lower, of the time that the model adds to the longest frame, cycles of the core.
     ///
     /// Estimated cycles on a Cortex-M4F with the flash's wait states, all taxels under the contact, rounded up
-    /// (`cargo xtask timing`, `docs/study.md`): with 10 x 10 taxels the start of a refinement takes at most 2,100,
+    /// (`docs/study.md`): with 10 x 10 taxels the start of a refinement takes at most 2,100,
     /// its solution 1,600, a row 1,000. A refinement that is spread over frames starts in a separate frame. For other
     /// shapes a row is computed from its taxels, and the start from the sum of both sides.
     pub const fn model_cycles(fit_level: FitLevel) -> [u32; 2] {

@@ -87,7 +87,7 @@ enum Command {
     /// Run the loop on every core that QEMU emulates, compare with the host, and renew the table of docs/porting.md
     #[command(after_help = "Examples:\n  cargo xtask cores")]
     Cores,
-    /// Estimate the cycles of the loop's kernels on a Cortex-M4F, with and without the flash's wait states
+    /// Estimate the cycles of an image's regions on a Cortex-M4F, with and without the flash's wait states
     Timing(timing::Args),
     /// Measure what accuracy costs in time: every variant of every kernel, with tables and plots
     Study(timing::StudyArgs),

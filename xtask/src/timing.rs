@@ -18,11 +18,13 @@ const VERSION_MIN: u32 = 9;
 const WHY: &str = "estimating cycles on an emulated Cortex-M4F";
 
 #[derive(clap::Args)]
-#[command(after_help = "Examples:\n  cargo xtask timing\n  cargo xtask timing --json kernels.json\n  \
-    cargo xtask timing --check\n  cargo xtask timing my-image.elf")]
+#[command(
+    after_help = "Examples:\n  cargo xtask timing my-image.elf\n  cargo xtask timing my-image.elf --json kernels.json\n  \
+    cargo xtask timing --check"
+)]
 pub struct Args {
-    /// An image of your own with marked regions, instead of the loop's kernels
-    #[arg(conflicts_with = "check")]
+    /// An image of your own with marked regions
+    #[arg(required_unless_present = "check", conflicts_with = "check")]
     image: Option<PathBuf>,
     /// Write the figures to a file, an object a line
     #[arg(long, value_name = "FILE", conflicts_with = "check")]
@@ -40,18 +42,11 @@ pub struct Run {
     pub regions: Vec<Measured>,
 }
 
-/// Measures the loop's kernels or an image, or checks the model.
+/// Measures an image, or checks the model.
 pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
-    if args.check {
-        return check(choice, console);
-    }
-    let run = match &args.image {
-        Some(image) => {
-            let image = fs::canonicalize(image).with_context(|| host::shown(image))?;
-            measure(&image, None, console)?
-        }
-        None => kernels(choice, console)?,
-    };
+    let Some(image) = &args.image else { return check(choice, console) };
+    let image = fs::canonicalize(image).with_context(|| host::shown(image))?;
+    let run = measure(&image, None, console)?;
     console.print(&table(&run.regions));
     match &args.json {
         Some(path) => {
@@ -68,15 +63,6 @@ pub fn check(choice: Choice, console: &mut Console) -> Result<()> {
     let image = image::build(toolchain::ensure(choice, console)?, "timing-check", "timing", console)?;
     let mut command = host::tests(&["--test", "silicon", "--", "--ignored", "--nocapture", "--test-threads=1"]);
     host::test(command.env("M4_TIMING_PLUGIN", plugin).env("M4_TIMING_IMAGE", image), console)
-}
-
-/// Measures the loop's kernels over the recorded stimulus.
-pub fn kernels(choice: Choice, console: &mut Console) -> Result<Run> {
-    let image = image::build(toolchain::ensure(choice, console)?, "timing", "timing", console)?;
-    let recording = host::made("timing")?.join("recording.bin");
-    let mut recorder = host::example("recording", console)?;
-    console.run(recorder.arg(&recording))?;
-    measure(&image, Some(&recording), console)
 }
 
 /// Runs an image to its end under the plugin; `argument` is its command line.

@@ -1,22 +1,19 @@
 //! The loop as it is, over the recorded stimulus: the whole step at each fit level, and its parts.
 
-#[path = "parts.rs"]
-mod parts;
-
 use super::Inputs;
 use super::call::pass_on;
 use crate::host::{fail, say};
 use fingertip::command::Command;
-use fingertip::contact::{Contact, FitLevel};
+use fingertip::contact::{self, Contact, FitLevel};
 use fingertip::control::{Reference, SpeedLoop, TemperatureDrift, Winding};
 use fingertip::frame::Sense;
-use fingertip::grip::Grip;
+use fingertip::grip::{Goal, Grip};
 use fingertip::pipeline::AcknowledgedRequests;
 use fingertip::safety::guard::{Guard, Seen};
 use fingertip::shipped::{Array, Config, Pipeline, TactileImage};
 use fingertip::state::{Limits, Mode};
 use fingertip::touch::Touch;
-use fingertip::units::{Duty, Newtons};
+use fingertip::units::{Celsius, Duty, Newtons};
 use images::CORRECTED;
 use images::record::Record;
 use static_cell::StaticCell;
@@ -67,23 +64,69 @@ const PART_RECORDS: i32 = 3_000;
 
 /// The part, and whether it runs only while the loop drives the motor.
 const PARTS: [(&str, Kernel, bool); 12] = [
-    ("**Array::read**", parts::read, false),
-    ("**contact::from_sums**", parts::sums, false),
-    ("**observer**", parts::observe, true),
-    ("**goal and profile**", parts::reference, true),
-    ("**speed law with limits**", parts::follow, true),
+    ("**Array::read**", read, false),
+    ("**contact::from_sums**", sums, false),
+    ("**observer**", observe, true),
+    ("**goal and profile**", reference, true),
+    ("**speed law with limits**", follow, true),
     ("**limits alone, Drive::apply**", apply, true),
-    ("**duty from the voltage**", parts::duty, true),
+    ("**duty from the voltage**", duty, true),
     ("**guard**", guard, true),
-    ("**Array::read, by a curve**", parts::curved_read, false),
-    ("**goal and profile, with creep**", parts::creeping, true),
-    ("**warmth, with a coefficient**", parts::temperature_drift, false),
-    ("**winding**", parts::winding, false),
+    ("**Array::read, by a curve**", curved_read, false),
+    ("**goal and profile, with creep**", creeping, true),
+    ("**warmth, with a coefficient**", temperature_drift, false),
+    ("**winding**", winding, false),
 ];
 
 extern "C" fn step(bench: &mut Bench) {
     let Record { frame, sense, command } = &bench.record;
     bench.duty = bench.pipeline.step(frame, sense, &Command { fit_level: bench.fit_level, ..*command }).0;
+}
+
+extern "C" fn read(bench: &mut Bench) {
+    bench.array.read(&bench.record.frame, bench.config);
+}
+
+extern "C" fn curved_read(bench: &mut Bench) {
+    bench.array.read(&bench.record.frame, bench.corrected);
+}
+
+extern "C" fn observe(bench: &mut Bench) {
+    bench.motion.observe(bench.record.sense.encoder, bench.config);
+}
+
+extern "C" fn reference(bench: &mut Bench) {
+    let Bench { config, record, contact, touch, drift, motion, grip, limits, .. } = bench;
+    let goal = Goal { force: record.command.goal, drift: *drift };
+    bench.reference = images::reference(grip, goal, contact, touch, motion, config, limits);
+}
+
+extern "C" fn creeping(bench: &mut Bench) {
+    let Bench { corrected, record, contact, touch, drift, motion, grip, limits, .. } = bench;
+    let goal = Goal { force: record.command.goal, drift: *drift };
+    bench.reference = images::reference(grip, goal, contact, touch, motion, corrected, limits);
+}
+
+extern "C" fn follow(bench: &mut Bench) {
+    let supply_mv = bench.record.sense.supply_mv;
+    bench.motion.apply_law(bench.reference, supply_mv, bench.config, &mut bench.limits);
+}
+
+extern "C" fn duty(bench: &mut Bench) {
+    bench.duty = bench.motion.drive.duty(bench.record.sense.supply_mv, bench.config);
+}
+
+extern "C" fn winding(bench: &mut Bench) {
+    bench.winding.observe(bench.motion.drive.acceleration(), bench.config);
+}
+
+extern "C" fn temperature_drift(bench: &mut Bench) {
+    bench.temperature_drift.observe(Some(Celsius::from_bits(30 << 16)), bench.corrected);
+    bench.drift = bench.temperature_drift.force(bench.record.command.goal, bench.corrected);
+}
+
+extern "C" fn sums(bench: &mut Bench) {
+    bench.contact = contact::from_sums(&bench.picture, bench.config);
 }
 
 extern "C" fn apply(bench: &mut Bench) {

@@ -1,7 +1,9 @@
 //! The model: properties of any tip and any input (order, inverses, energy, quadrature, totality), and its hard cases.
 
 use crate::common::*;
+use core::hint::black_box;
 use core::num::NonZeroU16;
+use fingertip::arith::floor_sqrt;
 use fingertip::model::{MODULUS_MAX, MODULUS_MIN, RADIUS_MAX, RADIUS_MIN, Tip, TipError};
 use fingertip::units::Kilopascals;
 use host_tests::prove::random::{self, boundary_depths, boundary_tips, mm, newtons, reference_tip};
@@ -22,6 +24,11 @@ fn tip_and_depth() -> impl Strategy<Value = (Tip, i32)> {
         let top = f64::from(tip.depth_max().to_bits());
         (tip, top.powf(share) as i32)
     })
+}
+
+/// Numbers of every size.
+fn sized() -> impl Strategy<Value = [i32; 4]> {
+    any::<[(i32, u8); 4]>().prop_map(|numbers| numbers.map(|(number, drop)| number >> (drop % 31)))
 }
 
 fn number(bits: i32, fraction_bits: i32) -> f64 {
@@ -118,9 +125,8 @@ proptest! {
         }
     }
 
-    /// That no input makes a function panic is tested by `same_bits::a_digest_is_that_of_its_inputs_and_sees_one_bit`.
     #[test]
-    fn results_stay_in_their_domain_for_every_input(tip in any_tip(), x: i32, y: i32, z: i32) {
+    fn results_stay_in_their_domain_for_every_input_and_nothing_panics(tip in any_tip(), [x, y, z, w] in sized()) {
         let depths = [tip.indentation(newtons(x)), tip.indentation_from_peak(Kilopascals::from_bits(x)), tip.indentation_from_radius(mm(x))];
         for depth in depths {
             prop_assert!(depth >= mm(0) && depth <= tip.depth_max());
@@ -129,6 +135,26 @@ proptest! {
         prop_assert!(paper::energy(&tip, displacement).to_bits() >= 0);
         let limit = paper::limit_surface(&tip, mm(x), Ratio::from_bits(y));
         prop_assert!(limit.margin(newtons(z), NewtonMillimetres::from_bits(x)).to_bits() <= 1 << 16);
+        let (d, r, theta, area) = (mm(x), mm(y), Radians::from_bits(y), SquareMillimetres::from_bits(z));
+        let (force, peak, wide) = (newtons(x), Kilopascals::from_bits(y), (x as u64) << 32 | z as u64);
+        let rings = NonZeroU16::MIN.saturating_add(w as u16 & 7);
+        let _ = black_box((Tip::new(d, peak), floor_sqrt(wide), tip.pi_y_times(wide, w as u32)));
+        let _ = black_box((tip.force(d), tip.force_by_rings(d, rings), tip.stiffness(d), tip.stiffness_at_force(force)));
+        let _ = black_box((tip.contact_radius(d), tip.particle_length(r), tip.compression(r, d), tip.strain(r, d)));
+        let _ = black_box((tip.pressure(r, d), tip.peak_pressure(d), tip.mean_pressure(d)));
+        let _ = black_box((paper::touching_angle_max(&tip, d), paper::touching_angle(&tip, r, d)));
+        let _ = black_box((paper::distance_at(&tip, theta, d), paper::distance_slope(&tip, theta, d)));
+        let _ = black_box((paper::area_density(&tip, theta, d), paper::height_at(&tip, theta, d)));
+        let _ = black_box((paper::compression_at(&tip, theta, d), paper::particle_force(&tip, d, r, area)));
+        let _ = black_box((pressure_of(force, area), strain_of(d, r), force_on(peak, area)));
+        let _ = black_box((paper::load(&tip, displacement), paper::free_shift(&tip, d, theta), paper::friction_shape(&tip, d)));
+        let terms = [(x, y), (z, w)].map(|(share, time)| RelaxationTerm {
+            share: Ratio::from_bits(share),
+            time_constant_us: time.unsigned_abs(),
+        });
+        if let Ok(filter) = Relaxation::new(w.unsigned_abs(), &terms) {
+            filter.step(&mut RelaxationState::settled(newtons(y)), force);
+        }
     }
 }
 

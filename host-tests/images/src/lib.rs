@@ -1,5 +1,4 @@
-//! What the images for an emulated Cortex-M4F share with this machine: recordings, and the same inputs for every
-//! function.
+//! What the images for an emulated Cortex-M4F share with this machine: recordings, and inputs for functions.
 #![no_std]
 #![forbid(unsafe_code)]
 #![allow(missing_docs, reason = "parts of the project's own programs: a name that says all needs no comment")]
@@ -7,8 +6,9 @@
 #[cfg(test)]
 extern crate std;
 
+use fingertip::command::Command;
 use fingertip::config::Config;
-use fingertip::contact::Contact;
+use fingertip::contact::{Contact, FitLevel};
 use fingertip::control::{Reference, SpeedLoop};
 use fingertip::grip::{Goal, Grip};
 use fingertip::params::Params;
@@ -31,6 +31,11 @@ pub const CONFIRMED: Params = Params { direction_confirmed: 1, ..Params::DEFAULT
 /// temperature. The images that count cycles measure the cost of the corrections with them.
 pub const CORRECTED: Params =
     Params { curve_permille: 3_300, creep_permille: 66, array_gain_ppm_per_k: 3_600, ..CONFIRMED };
+
+/// Command of a record for a second controller, which has [`CORRECTED`]: each fit level in turn.
+pub fn varied(record: u32, command: &Command) -> Command {
+    Command { fit_level: FitLevel::from_number((record / 500 % 6) as u8), ..*command }
+}
 
 /// Steps touch and grip by a frame of an approach or a hold, without an external force before the array shows one.
 #[inline(always)]

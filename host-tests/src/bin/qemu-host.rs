@@ -1,8 +1,10 @@
-//! Runs the core's recording on the emulated Cortex-M4F and on this machine, and compares.
+//! Runs the core's recording, and functions with instructions of their own, on the emulated Cortex-M4F and on this
+//! machine, and compares.
 //!
 //! `qemu-host IMAGE FOLDER [panic|hardfault|hang]`: the image, where to put the recording, a failure to inject.
 
 use host_tests::{program, stimulus};
+use images::same_bits::{Comparison, INPUTS};
 use std::{
     collections::BTreeMap,
     env,
@@ -57,6 +59,13 @@ fn compare(image: &Path, folder: &Path, failure: Option<&str>) -> Result<(), Box
     println!("instructions in all    {}", figure("instructions_total")?);
     if figure("steps")? != records.len().to_string() || emulated != host {
         return Err("FAILED: the emulated core and this machine differ".into());
+    }
+    let mut comparison = Comparison::new();
+    (0..INPUTS).for_each(|_| comparison.take());
+    for (name, digest) in comparison.digests() {
+        if figure(name)? != format!("{digest:016x}") {
+            return Err(format!("FAILED: {name} differs on the emulated core and this machine").into());
+        }
     }
     println!("The emulated core gives the same bits as this machine.");
     Ok(())

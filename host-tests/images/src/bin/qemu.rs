@@ -1,20 +1,16 @@
-//! The core on an emulated Cortex-M4F: replays a recording, or gives random inputs to every function of the model, and
-//! reports digests of the results.
+//! The core on an emulated Cortex-M4F: replays a recording, then gives random inputs to every function with instructions
+//! of its own, and reports digests of the results.
 //!
-//! Not for a board: it talks to the emulator by semihosting. The command line is one of
-//!
-//! - `FILE [panic|hardfault|hang]`: replays the recording, counts instructions, and fails half way on request;
-//! - `same-bits INPUTS [FUNCTION]`: gives that number of inputs to every function, and changes the digest of the one
-//!   named.
-//!
-//! Each failure prints a line that begins with `FAILED:` and ends the emulator with an error.
+//! Not for a board: it talks to the emulator by semihosting. The command line is `FILE [panic|hardfault|hang]`: replays the
+//! recording, counts instructions, and fails half way on request. Each failure prints a line that begins with `FAILED:`
+//! and ends the emulator with an error.
 //!
 //! SysTick is stopwatch and watchdog in one: it restarts before each step, and if it ever runs out, the step hangs.
 //! A loop of known length measures the instructions in a tick, so the counts do not depend on the emulator's clocks.
 #![no_std]
 #![no_main]
 
-/// The flash image's copies, which `same-bits` compares.
+/// The flash image's copies, which are compared too.
 #[path = "../../../../src/board/copy.rs"]
 mod copy;
 mod host;
@@ -27,11 +23,12 @@ use fingertip::shipped::{Config, Pipeline};
 use fingertip::units::Duty;
 use host::{File, command_line, fail, say};
 use images::record::{Digest, MAGIC, Record};
-use images::same_bits::Comparison;
+use images::same_bits::{Comparison, INPUTS};
 use static_cell::StaticCell;
 
 /// Static, because it is as large as half of the stack.
 static PIPELINE: StaticCell<Pipeline> = StaticCell::new();
+static CORRECTED: StaticCell<Pipeline> = StaticCell::new();
 
 /// SysTick counts down from here, 24 bits.
 const TICKS_MAX: u32 = 0x00ff_ffff;
@@ -53,31 +50,22 @@ async fn main(_spawner: Spawner) {
 
     let mut line = [0; 256];
     let (name, rest) = words(command_line(&mut line));
-    if name == b"same-bits\0" {
-        compare(rest, &mut syst);
-    } else {
-        replay(name, rest, &mut syst).await;
-    }
+    replay(name, rest, &mut syst).await;
+    compare(&mut syst);
     debug::exit(debug::EXIT_SUCCESS);
 }
 
 /// Gives random inputs to every function.
-fn compare(words: &[u8], syst: &mut SYST) {
-    let words = core::str::from_utf8(words).unwrap_or_default();
-    let (inputs, spoilt) = words.split_once(' ').unwrap_or((words, ""));
-    let inputs = inputs.parse::<u32>();
-    let (Ok(inputs), Ok(mut comparison)) = (inputs, Comparison::new()) else { fail("no inputs to take") };
-    for index in 0..inputs {
+fn compare(syst: &mut SYST) {
+    let mut comparison = Comparison::new();
+    for index in 0..INPUTS {
         if index % INPUTS_A_WATCH == 0 {
             syst.clear_current();
         }
         comparison.take();
     }
-    if !spoilt.is_empty() && !comparison.spoil(spoilt) {
-        fail(format_args!("no function {spoilt}"))
-    }
-    for (name, digest, taken) in comparison.digests() {
-        say(format_args!("function {digest:016x} {taken} {name}"));
+    for (name, digest) in comparison.digests() {
+        say(format_args!("{name} {digest:016x}"));
     }
 }
 
@@ -95,6 +83,7 @@ async fn replay(name: &[u8], failure: &[u8], syst: &mut SYST) {
 
     let Ok(config) = Config::shipped(&images::CONFIRMED) else { fail("the default parameters are refused") };
     let pipeline = PIPELINE.init_with(|| Pipeline::new(&config));
+    let corrected = corrected();
     let mut digest = Digest::new();
     let loop_ticks = ticks(syst, spin);
     let empty_ticks = ticks(syst, || {});
@@ -109,6 +98,9 @@ async fn replay(name: &[u8], failure: &[u8], syst: &mut SYST) {
         let mut duty = Duty::ZERO;
         let taken = ticks(syst, || duty = pipeline.step(&frame, &sense, &command).0);
         digest.add(duty, pipeline.status());
+        let command = images::varied(index, &command);
+        let (duty, status) = corrected.step(&frame, &sense, &command);
+        digest.add(duty, status);
         total += u64::from(taken);
         min = min.min(taken);
         max = max.max(taken);
@@ -127,6 +119,13 @@ async fn replay(name: &[u8], failure: &[u8], syst: &mut SYST) {
     say(format_args!("instructions_min {}", instructions(min.into(), 1)));
     say(format_args!("instructions_max {}", instructions(max.into(), 1)));
     say(format_args!("ticks_per_million_instructions {loop_ticks}"));
+}
+
+/// A controller with all corrections. A separate function, because its configuration takes stack only here.
+#[inline(never)]
+fn corrected() -> &'static mut Pipeline {
+    let Ok(config) = Config::shipped(&images::CORRECTED) else { fail("a curve is refused") };
+    CORRECTED.init_with(|| Pipeline::new(&config))
 }
 
 /// SysTick ticks that some work takes.

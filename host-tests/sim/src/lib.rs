@@ -49,3 +49,25 @@ pub fn encode<const ROWS: usize, const COLUMNS: usize>(
 ) -> Vec<u8> {
     fingertip::store::words(record, sequence).flat_map(u32::to_le_bytes).collect()
 }
+
+/// Defines the test `name` of the usual size, and `name::long_` of what that leaves out.
+///
+/// `cargo xtask test --long` runs the latter.
+#[macro_export]
+macro_rules! sizes {
+    ($name:ident, $usual:expr, $long:expr) => {
+        #[test]
+        fn $name() {
+            $usual;
+        }
+
+        mod $name {
+            #[test]
+            #[ignore = "long: cargo xtask test --long"]
+            fn long_() {
+                use super::*;
+                $long;
+            }
+        }
+    };
+}

@@ -303,16 +303,7 @@ fn two(job: &Job, kill: bool) -> bool {
     true
 }
 
-#[test]
-fn interruptions_lose_nothing() {
-    campaign("usual", 1);
-}
-
-#[test]
-#[ignore = "long: cargo xtask test --long"]
-fn long_interruptions_lose_nothing() {
-    campaign("long", 23);
-}
+sim::sizes!(interruptions_lose_nothing, campaign("usual", 1), campaign("long", 23));
 
 /// Interrupts each job a number of times in each way.
 fn campaign(name: &str, times: usize) {

@@ -147,16 +147,11 @@ fn shortened(mut sequence: Sequence, mut reason: String) -> (Sequence, String) {
     (sequence, reason)
 }
 
-#[test]
-fn random_sequences_keep_the_force_in_bounds_and_the_table_of_modes() {
-    keep_the_rules(0..USUAL / 8);
-}
-
-#[test]
-#[ignore = "long: cargo xtask test --long"]
-fn long_random_sequences_keep_the_force_in_bounds_and_the_table_of_modes() {
-    keep_the_rules(USUAL / 8..number("SEQUENCES", USUAL).max(USUAL / 8));
-}
+sim::sizes!(
+    random_sequences_keep_the_force_in_bounds_and_the_table_of_modes,
+    keep_the_rules(0..USUAL / 8),
+    keep_the_rules(USUAL / 8..number("SEQUENCES", USUAL).max(USUAL / 8))
+);
 
 fn keep_the_rules(seeds: Range<u64>) {
     let count = seeds.end - seeds.start;
@@ -428,16 +423,11 @@ fn press(goal_n: f64, yield_mm_per_n: f64, first: u64, every: u64) -> [(f64, f64
     worst
 }
 
-#[test]
-fn an_event_at_any_instant_of_a_press_does_not_let_the_force_rise() {
-    keep_the_force(100);
-}
-
-#[test]
-#[ignore = "long: cargo xtask test --long"]
-fn long_an_event_at_any_instant_of_a_press_does_not_let_the_force_rise() {
-    keep_the_force(number("INSTANTS_STEP", 20).clamp(1, INSTANTS));
-}
+sim::sizes!(
+    an_event_at_any_instant_of_a_press_does_not_let_the_force_rise,
+    keep_the_force(100),
+    keep_the_force(number("INSTANTS_STEP", 20).clamp(1, INSTANTS))
+);
 
 fn keep_the_force(every: u64) {
     let presses: Vec<_> =

@@ -14,16 +14,6 @@ use sim::population::{Finger, read};
 use sim::setup::Setup;
 use solve::record;
 
-/// The tests below with more fingers.
-#[test]
-#[ignore = "long: cargo xtask test --long"]
-fn long_measuring_motions_of_more_fingers() {
-    presses_complete(30);
-    presses_end_within_limits(12);
-    strokes_complete(40);
-    strokes_stop_at_an_object(20);
-}
-
 /// A measuring motion, and the largest true values during it.
 struct Made {
     status: MeasureStatus,
@@ -110,10 +100,7 @@ fn make_all(fingers: &[Finger], task: Task, place_mm: Option<fn(f64, f64) -> f64
     })
 }
 
-#[test]
-fn valid_presses_complete() {
-    presses_complete(10);
-}
+sim::sizes!(valid_presses_complete, presses_complete(10), presses_complete(30));
 
 /// Every press completes and gives a modulus: most within two reported sigmas, and with errors that are not smaller
 /// than noise allows.
@@ -194,10 +181,11 @@ const TROUBLES: [Trouble; 7] = [
     ),
 ];
 
-#[test]
-fn what_moves_yields_or_vanishes_ends_a_press_within_its_limits() {
-    presses_end_within_limits(3);
-}
+sim::sizes!(
+    what_moves_yields_or_vanishes_ends_a_press_within_its_limits,
+    presses_end_within_limits(2),
+    presses_end_within_limits(12)
+);
 
 fn presses_end_within_limits(count: usize) {
     let mut broken = Vec::new();
@@ -234,35 +222,44 @@ fn a_stuck_finger_ends_a_press() {
 /// Limit of the strokes: distance from the origin.
 const STROKES_MM: f64 = 1.6;
 
-/// Strokes or jogs of drawn drives, within their limits of travel and force. Returns how many completed.
+/// Strokes or jogs of drawn drives, within their limits of travel and force; what is solved from strokes is true, also
+/// where something is in the way. Returns how many completed.
 fn driven(name: &str, count: usize, task: Task, changes: &[(&str, &str)]) -> usize {
-    let made = make_all(&fingers(&replaced(include_str!("drives.toml"), changes), 1, 0..count), task, None);
+    let fingers = fingers(&replaced(include_str!("drives.toml"), changes), 1, 0..count);
+    let made = make_all(&fingers, task, None);
     print(name, &made);
+    for (finger, made) in fingers.iter().zip(&made).filter(|_| task == Task::Strokes) {
+        let strokes = record::strokes(&made.record, &finger.scene.params()).expect("strokes");
+        let Ok(solve::strokes::MeasuredDrive { torque_constant, .. }) = solve::strokes::solve(&strokes) else {
+            continue;
+        };
+        let true_k = 1e-3 * drawn(finger, "torque_mnm_per_a").expect("it is drawn");
+        assert!((torque_constant.value / true_k - 1.0).abs() < 0.05, "{name}: {torque_constant}, not {true_k}");
+    }
     let [travel_mm, force_n] = [largest(&made, |made| made.travel_mm), largest(&made, |made| made.force_n)];
     assert!(travel_mm < STROKES_MM && force_n < 0.3, "{name}: {travel_mm} mm, {force_n} N");
     made.iter().filter(|made| made.status.state == MeasureState::Done).count()
 }
 
-#[test]
-fn strokes_in_free_air_stay_near_the_origin_and_complete() {
-    strokes_complete(8);
-}
+sim::sizes!(strokes_in_free_air_stay_near_the_origin_and_complete, strokes_complete(4), strokes_complete(40));
 
 fn strokes_complete(count: usize) {
     let done = driven("free air", count, Task::Strokes, &[]);
     assert!(10 * done >= 9 * count, "{done}");
 }
 
-#[test]
-fn jogs_complete() {
-    let done = driven("jogs", 20, Task::Jog, &[("direction_confirmed = 1", "direction_confirmed = 0")]);
-    assert!(10 * done >= 9 * 20, "{done}");
+sim::sizes!(jogs_complete, complete_jogs(8), complete_jogs(20));
+
+fn complete_jogs(count: usize) {
+    let done = driven("jogs", count, Task::Jog, &[("direction_confirmed = 1", "direction_confirmed = 0")]);
+    assert!(10 * done >= 9 * count, "{done}");
 }
 
-#[test]
-fn an_object_in_the_way_is_pressed_with_no_more_than_300_mn() {
-    strokes_stop_at_an_object(4);
-}
+sim::sizes!(
+    an_object_in_the_way_is_pressed_with_no_more_than_300_mn,
+    strokes_stop_at_an_object(2),
+    strokes_stop_at_an_object(20)
+);
 
 /// An object from 0.1 to 1.2 mm ahead, on the array or off it.
 fn strokes_stop_at_an_object(count: usize) {

@@ -15,6 +15,7 @@ use sim::run::{Run, run};
 use sim::scene::{self, Goal, Scene, read};
 use sim::watch::Watch;
 use sim::{cores, population};
+use std::ops::Range;
 
 /// Largest true force of a run in which all codes keep their last values, or go back to those of the tare as when the
 /// connector is unplugged: during a hold, or some time before the touch.
@@ -118,9 +119,10 @@ fn a_taxel_at_the_edge_of_saturation_does_not_shake_the_motor() {
     judge("a taxel at the edge of saturation", "% or mN", &cases.into_iter().flatten().collect::<Vec<_>>());
 }
 
-#[test]
-fn a_tilted_contact_near_the_edge_is_not_pressed_too_hard() {
-    let cases = cores::map(0..100, |seed| {
+sim::sizes!(a_tilted_contact_near_the_edge_is_not_pressed_too_hard, tilted_contacts(0..35), tilted_contacts(35..100));
+
+fn tilted_contacts(seeds: Range<u64>) {
+    let cases = cores::map(seeds, |seed| {
         let mut rng = Rng::with_seed(seed);
         let centre = [0; 2].map(|_| uniform(&mut rng, -3.5, 3.5));
         let tilt = [0; 2].map(|_| uniform(&mut rng, 10.0, 14.0) * if rng.bool() { 1.0 } else { -1.0 });
@@ -204,18 +206,13 @@ fn long_the_creep_term_is_the_best_of_those_tried_on_other_arrays() {
     assert_eq!(*best, CREEP, "{tried:?} leave {medians_mn:?}");
 }
 
-#[test]
-fn calibration_and_the_creep_term_leave_a_third_of_a_worn_sensors_error() {
-    leave_a_third(1..2);
-}
+sim::sizes!(
+    calibration_and_the_creep_term_leave_a_third_of_a_worn_sensors_error,
+    leave_a_third(1..2),
+    leave_a_third(2..7)
+);
 
-#[test]
-#[ignore = "long: cargo xtask test --long"]
-fn long_calibration_and_the_creep_term_leave_a_third_of_a_worn_sensors_error() {
-    leave_a_third(2..7);
-}
-
-fn leave_a_third(seeds: std::ops::Range<u64>) {
+fn leave_a_third(seeds: Range<u64>) {
     for seed in seeds {
         let raw = raw_mn(&worn(seed, OFF));
         let [plain, crept] = [OFF, CREEP].map(|creep| calibrated_mn(&worn(seed, creep)));
@@ -250,7 +247,8 @@ fn dead_taxels_under_the_contact_do_not_keep_the_scale_from_being_found() {
 
 /// `population unlike --fingers 40` prints the figures of more fingers.
 #[test]
-fn calibration_leaves_a_few_percent_of_the_force() {
+#[ignore = "long: cargo xtask test --long"]
+fn long_calibration_leaves_a_few_percent_of_the_force() {
     let fingers = fingers(1, 4).unwrap_or_else(|error| panic!("{error}"));
     println!("{}", errors_text(&fingers));
     let [before, after] = percentiles(&fingers);

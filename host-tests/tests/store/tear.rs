@@ -4,6 +4,7 @@ use super::{OTHERS, Other};
 use crate::common::*;
 use fingertip::shipped::{Loaded, Record};
 use fingertip::store::{Flash, Journal, SLOT_BYTES, SaveError, Sector};
+use proptest::test_runner::TestRunner;
 use sim::encode;
 
 /// Slots of a small sector.
@@ -25,132 +26,24 @@ fn sector(size: usize, count: usize, first: i32, other: Other) -> (Vec<u8>, Opti
     (bytes, newest)
 }
 
-/// A board with records in one small sector and nothing in the other.
-fn half_blank(count: usize, other: Other) -> Board {
-    let (bytes, newest) = sector(SIZE, count, 1, other);
-    Board::new(Nor::new([bytes, vec![0xFF; SIZE]]), newest)
-}
-
 /// Every place at which an operation can be cut; of an erase one word in `few`.
-fn cuts(done: &[Done], words: usize, few: usize, thorough: bool) -> Vec<Cut> {
+fn cuts(done: &[Done], words: usize, few: usize) -> Vec<Cut> {
     let mut cuts = Vec::new();
     for (after, kind) in done.iter().enumerate() {
         let seed = after as u64;
         let cut = Cut { after, undone: 0, words: 0, rest: Rest::Old, seed };
         match kind {
             Done::Word => {
-                let all = [u32::MAX, 0, bits(seed), bits(seed + 999)];
-                let some = if thorough { &all[..] } else { &all[1..3] };
-                cuts.extend(some.iter().map(|&undone| Cut { undone, ..cut }));
+                cuts.extend([u32::MAX, 0, bits(seed), bits(seed + 999)].map(|undone| Cut { undone, ..cut }));
             }
             Done::Erase => {
-                let rests = if thorough { &RESTS[..] } else { &RESTS[2..] };
                 for words in (0..=words).step_by(few) {
-                    cuts.extend(rests.iter().map(|&rest| Cut { words, rest, ..cut }));
+                    cuts.extend(RESTS.map(|rest| Cut { words, rest, ..cut }));
                 }
             }
         }
     }
     cuts
-}
-
-/// Starts and saves; the numbers of the records are of no other.
-fn go(board: &mut Board, cut: Option<Cut>, number: i32) {
-    board.start(cut);
-    let _ = board.save(record(number));
-}
-
-/// Flash operations of `go` if nothing interrupts it.
-fn ops(board: &Board) -> Vec<Done> {
-    let mut board = board.clone();
-    go(&mut board, None, 100);
-    board.nor.done
-}
-
-/// Cuts the power at every operation, and again at one operation in `few` of the next start and save, others each time.
-fn tear_twice(board: &Board, few: usize) -> [usize; 2] {
-    let (mut cases, mut alarms) = (0, 0);
-    for first in cuts(&ops(board), SIZE / 4, 1, true) {
-        let mut torn = board.clone();
-        go(&mut torn, Some(first), 100);
-        let second = cuts(&ops(&torn), SIZE / 4, 5, false);
-        for second in second.into_iter().skip(first.after % few).step_by(few) {
-            let mut twice = torn.clone();
-            go(&mut twice, Some(second), 101);
-            twice.start(None);
-            twice.start(None);
-            if twice.save(record(102)).is_ok() {
-                assert_eq!(twice.kept, Some(record(102)));
-            }
-            twice.start(None);
-            cases += 1;
-            alarms += twice.false_alarms;
-        }
-    }
-    [cases, alarms]
-}
-
-#[test]
-fn what_is_torn_twice_leaves_the_old_or_the_new_values() {
-    tear_all([24, 240, 72]);
-}
-
-#[test]
-#[ignore = "long: cargo xtask test --long"]
-fn long_what_is_torn_twice_leaves_the_old_or_the_new_values() {
-    tear_all([4, 40, 12]);
-}
-
-fn tear_all(few: [usize; 3]) {
-    let tears: [fn(usize) -> usize; 3] = [tear_saves, tear_erases, tear_layouts];
-    for (tear, few) in tears.into_iter().zip(few) {
-        let cases = tear(few);
-        assert!(cases > 80_000 / few.min(40), "{cases} cases, one in {few}");
-    }
-}
-
-fn tear_saves(few: usize) -> usize {
-    let torn = (0..=SLOTS).map(|count| tear_twice(&half_blank(count, Other::None), few));
-    let cases = torn.map(|[cases, alarms]| {
-        assert_eq!(alarms, 0, "no erase, no false alarm");
-        cases
-    });
-    cases.sum()
-}
-
-/// The sector with the newest record is nearly full, so that the next start erases the other sector.
-fn tear_erases(few: usize) -> usize {
-    let mut sum = 0;
-    let (older, _) = sector(SIZE, SLOTS, 1, Other::None);
-    for count in [SLOTS - 1, SLOTS] {
-        let (newer, newest) = sector(SIZE, count, 50, Other::None);
-        for sectors in [[&newer, &older], [&older, &newer]] {
-            let board = Board::new(Nor::new(sectors.map(Vec::clone)), newest);
-            assert!(ops(&board).contains(&Done::Erase), "{count} records");
-            sum += tear_twice(&board, few)[0];
-        }
-    }
-    sum
-}
-
-fn tear_layouts(few: usize) -> usize {
-    let mut sum = 0;
-    for other in OTHERS {
-        sum += [1, SLOTS].map(|count| tear_twice(&half_blank(count, other), few)[0]).iter().sum::<usize>();
-        // Both sectors full.
-        let (a, _) = sector(SIZE, 2 * SLOTS, 1, other);
-        let (b, newest) = sector(SIZE, 2 * SLOTS, 50, other);
-        let mut board = Board::new(Nor::new([a, b]), newest);
-        for cut in cuts(&ops(&board), SIZE / 4, 1, true) {
-            let mut torn = board.clone();
-            go(&mut torn, Some(cut), 100);
-            torn.start(None);
-            sum += 1;
-        }
-        go(&mut board, None, 100);
-        assert_eq!(board.kept, Some(record(100)));
-    }
-    sum
 }
 
 #[test]
@@ -163,11 +56,15 @@ fn sectors_of_the_real_size_are_torn_too() {
         let (older, _) = sector(SIZE, slots, 1_000 - slots as i32, Other::None);
         let (newer, newest) = sector(SIZE, count, 1_000, Other::None);
         let board = Board::new(Nor::new([older, newer]), newest);
-        let ops = ops(&board);
+        let mut whole = board.clone();
+        whole.start(None);
+        assert_eq!(whole.save(record(3_000)), Ok(()));
+        let ops = whole.nor.done;
         assert!(ops.contains(&Done::Erase), "room for less than a quarter is made");
-        for cut in cuts(&ops, SIZE / 4, 501, true) {
+        for cut in cuts(&ops, SIZE / 4, 501) {
             let mut torn = board.clone();
-            go(&mut torn, Some(cut), 3_000);
+            torn.start(Some(cut));
+            let _ = torn.save(record(3_000));
             torn.start(None);
             assert_eq!(torn.save(record(3_001)), Ok(()));
             torn.start(None);
@@ -194,7 +91,7 @@ fn gains_torn_anywhere_are_the_old_ones_or_the_new_ones() {
         let mut whole = board.clone();
         whole.start(None);
         assert_eq!(whole.save(next), Ok(()));
-        for cut in cuts(&whole.nor.done, size / 4, 61, true) {
+        for cut in cuts(&whole.nor.done, size / 4, 61) {
             let mut torn = board.clone();
             torn.start(Some(cut));
             let _ = torn.save(next);
@@ -233,7 +130,8 @@ enum Step {
 }
 
 fn step(words: usize) -> impl Strategy<Value = Step> {
-    let dies = (0..160usize, any::<u32>(), 0..=words, 0..4usize, any::<u64>(), any::<bool>()).prop_map(
+    let undone = prop_oneof![1 => Just(0), 1 => Just(u32::MAX), 2 => any::<u32>()];
+    let dies = (0..160usize, undone, 0..=words, 0..4usize, any::<u64>(), any::<bool>()).prop_map(
         |(after, undone, words, rest, seed, none)| {
             let after = if none { 0 } else { after };
             Step::Dies(Cut { after, undone, words, rest: RESTS[rest], seed })
@@ -242,18 +140,21 @@ fn step(words: usize) -> impl Strategy<Value = Step> {
     prop_oneof![(0..8usize).prop_map(Step::Live), dies]
 }
 
-proptest! {
-    #![proptest_config(seeded(2000, 22))]
+sim::sizes!(a_board_has_the_old_values_or_the_new_ones, live(2_000), live(60_000));
 
-    #[test]
-    fn a_board_has_the_old_values_or_the_new_ones(
-        slots in 4..7usize,
-        odd in 0..SLOT_BYTES / 16,
-        steps in prop::collection::vec(step(6 * SLOT_BYTES / 4), 1..40),
-    ) {
+/// Boards with records of any firmware in both sectors, which start, save and lose their power.
+fn live(boards: u32) {
+    let counts = [0..8_usize, 0..8_usize];
+    let steps = prop::collection::vec(step(6 * SLOT_BYTES / 4), 1..40);
+    let inputs = (4..7_usize, 0..SLOT_BYTES / 16, 0..OTHERS.len(), counts, any::<bool>(), steps);
+    let outcome = TestRunner::new(seeded(boards, 22)).run(&inputs, |(slots, odd, other, counts, swapped, steps)| {
         // Sectors of a whole number of records, and of a part more.
-        let mut board = Board::new(Nor::blank(slots * SLOT_BYTES + 16 * odd), None);
-        let mut number = 0;
+        let size = slots * SLOT_BYTES + 16 * odd;
+        let (older, old) = sector(size, counts[0], 1, OTHERS[other]);
+        let (newer, newest) = sector(size, counts[1], 50, OTHERS[other]);
+        let sectors = if swapped { [newer, older] } else { [older, newer] };
+        let mut board = Board::new(Nor::new(sectors), newest.or(old));
+        let mut number = 100;
         for step in steps {
             let (cut, saves) = match step {
                 Step::Live(saves) => (None, saves),
@@ -271,7 +172,13 @@ proptest! {
             }
         }
         board.start(None);
-    }
+        Ok(())
+    });
+    outcome.expect("the old values or the new ones");
+}
+
+proptest! {
+    #![proptest_config(seeded(2000, 22))]
 
     #[test]
     fn no_bytes_make_it_fail(

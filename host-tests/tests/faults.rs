@@ -3,7 +3,7 @@
 
 use crate::common::*;
 use fingertip::pipeline::Bridge;
-use sim::plant::{Faults, Row};
+use sim::plant::Faults;
 
 /// Steps until a fault; the number of frames that took.
 fn frames_to_fault(board: &mut Bench, at_most: u32) -> (u32, Status) {
@@ -20,26 +20,6 @@ fn frames_to_fault(board: &mut Bench, at_most: u32) -> (u32, Status) {
 fn expect(board: &mut Bench, fault: Fault, at_most: u32) {
     let (frames, status) = frames_to_fault(board, at_most);
     assert_eq!(status.fault, Some(fault), "after {frames} frames");
-}
-
-#[test]
-fn an_array_of_which_much_is_broken() {
-    fn twelve(faults: &mut Faults, state: Taxel) {
-        (0..12).for_each(|place| faults.array.taxels[place * 7 / 10][place * 7 % 10] = state);
-    }
-    let harms: [fn(&mut Faults); 5] = [
-        |faults| twelve(faults, Taxel::Dead),
-        |faults| twelve(faults, Taxel::Shorted),
-        |faults| faults.array.rows[4] = Row::StuckLow,
-        |faults| faults.array.rows[4] = Row::StuckHigh,
-        |faults| faults.array.saturated = true,
-    ];
-    for (number, harm) in harms.into_iter().enumerate() {
-        let mut board = holding(1_000);
-        board.harm(harm);
-        let (_, Status { fault, .. }) = frames_to_fault(&mut board, 2);
-        assert!(fault == Some(Fault::ArrayBroken) || number > 1 && fault == Some(Fault::RowStuck), "{fault:?}");
-    }
 }
 
 /// Interference in a single frame is no fault: the motor is shorted during that frame, and the contact keeps its
@@ -104,21 +84,6 @@ fn taxels_that_die_within_the_contact_do_not_change_the_force() {
         let near = (held_n - goal_n).abs() <= 0.05 * goal_n + 0.01 && largest_n <= 1.1 * goal_n + 0.02;
         assert!(near, "goal {goal_n} N: at most {largest_n:.3} N, {}", told(&mut board));
     }
-}
-
-#[test]
-fn an_encoder_that_stands_still() {
-    let mut board = holding(1_000);
-    board.harm(|faults| faults.encoder_frozen = true);
-    board.command().goal = newtons(4_000);
-    expect(&mut board, Fault::EncoderFrozen, 200);
-    assert!(board.truth().force_n < 9.0);
-
-    let mut board = ready();
-    board.harm(|faults| faults.encoder_frozen = true);
-    board.command().goal = newtons(1_000);
-    expect(&mut board, Fault::EncoderFrozen, 100);
-    assert!(board.truth().travel_mm < 2.0, "{} mm", board.truth().travel_mm);
 }
 
 /// Noise at no force looks like an indentation that the encoder does not see: it is no fault, however long it lasts.
@@ -205,23 +170,6 @@ fn nothing_that_arrives_ends_a_release_for_a_silent_bus() {
 }
 
 #[test]
-fn a_fault_stays_until_it_is_cleared_with_torque_off() {
-    let mut board = holding(1_000);
-    board.harm(|faults| faults.supply_drop_v = 2.0);
-    expect(&mut board, Fault::SupplyLow, 10);
-    board.harm(|faults| faults.supply_drop_v = 0.0);
-    board.command().clear_request += 1;
-    assert_eq!(board.step().mode, Mode::Fault, "torque is still on");
-    board.command().torque = false;
-    assert_eq!(board.step().mode, Mode::Fault, "the request came with torque on");
-    board.command().clear_request += 1;
-    let status = board.step();
-    assert_eq!((status.mode, status.fault), (Mode::Off, None));
-    board.command().torque = true;
-    assert_eq!(board.step().mode, Mode::Force, "what it touches is still known");
-}
-
-#[test]
 fn missed_frames_are_counted() {
     let mut board = holding(1_000);
     let mut frame = *board.frame();
@@ -261,24 +209,6 @@ fn a_part_of_a_frame_shorts_only_a_driven_motor_and_only_if_it_is_broken() {
     board.command().torque = false;
     assert_eq!(board.step().mode, Mode::Off);
     assert!(!board.pipeline().check_part(&frame, ROWS), "the bridge is off");
-}
-
-/// A fault brakes, that of the bridge itself puts it to sleep; off and tare brake while the tip moves, and open then.
-#[test]
-fn each_mode_has_its_command_for_the_bridge() {
-    let bridge = |mode, fault, braking| Status { mode, fault, braking, duty: Duty(-77), ..Status::default() }.bridge();
-    for (braking, expected) in [(false, Bridge::Open), (true, Bridge::Brakes)] {
-        for mode in [Mode::Off, Mode::Tare] {
-            assert_eq!(bridge(mode, None, braking), expected, "{mode:?}");
-        }
-        for mode in [Mode::Approach, Mode::Force, Mode::Release, Mode::Press, Mode::Strokes] {
-            assert_eq!(bridge(mode, None, braking), Bridge::Driven(Duty(-77)), "{mode:?}");
-        }
-        assert_eq!(bridge(Mode::Fault, Some(Fault::Bridge), braking), Bridge::Asleep);
-        for fault in [Fault::LostFrames, Fault::OverForce, Fault::SupplyLow, Fault::Crash] {
-            assert_eq!(bridge(Mode::Fault, Some(fault), braking), Bridge::Brakes, "{fault:?}");
-        }
-    }
 }
 
 type End = fn(&mut Bench);

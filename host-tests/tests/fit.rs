@@ -296,16 +296,6 @@ fn image(scene: &Scene) -> TactileImage {
 }
 
 #[test]
-fn efforts_are_counted_without_a_gap() {
-    for (number, fit_level) in FitLevel::ALL.into_iter().enumerate() {
-        assert_eq!(FitLevel::from_number(number as u8), fit_level);
-        assert_eq!(fit_level.higher(), FitLevel::ALL[(number + 1).min(5)]);
-        assert_eq!(fit_level.lower(), FitLevel::ALL[number.saturating_sub(1)]);
-    }
-    assert_eq!([6, 255].map(FitLevel::from_number), [FitLevel::AllRows; 2]);
-}
-
-#[test]
 fn a_refinement_ends_in_its_frame_and_another_effort_begins_anew() {
     let (config, picture) = (config(), image(&cut_off(1.5)));
     let levels = [(FitLevel::OneRow, 11), (FitLevel::TwoRows, 6), (FitLevel::FiveRows, 3), (FitLevel::AllRows, 1)];

@@ -290,6 +290,7 @@ fn every_corner_of_the_parameters_makes_a_configuration() {
 const CASES: u32 = 500;
 
 /// A pipeline and its last inputs.
+#[derive(Clone)]
 struct Run {
     pipeline: Pipeline,
     arguments: Record,
@@ -444,48 +445,36 @@ impl Run {
 proptest! {
     #![proptest_config(fixed(CASES))]
 
-    /// Whatever was commanded before: nothing drives without torque, and torque on again forgets the old goal.
+    /// Torque off, a stop from outside, and new parameters, whatever was commanded before. Nothing drives without torque,
+    /// and torque on again forgets the old goal. A stop is latched. New parameters turn the bridge off, and the loop
+    /// continues with them.
     #[test]
-    fn nothing_commanded_acts_after_torque_off(params in any_params(), inputs in any_inputs(100)) {
-        let mut run = Run::new(&params, true);
-        run.take(&inputs);
-        run.arguments.command.torque = false;
-        for _ in 0..10 {
-            prop_assert_eq!(run.step().duty, Duty::ZERO);
-        }
-        run.arguments.command.torque = true;
-        run.arguments.command.goal = Newtons::ZERO;
-        let mode = run.step().mode;
-        prop_assert!(matches!(mode, Mode::Release | Mode::Off | Mode::Tare | Mode::Fault), "{:?}", mode);
-    }
-
-    #[test]
-    fn a_stop_from_outside_is_latched(params in any_params(), before in any_inputs(60), after in any_inputs(60)) {
-        let mut run = Run::new(&params, true);
-        run.take(&before);
-        run.pipeline.stop(Fault::LostFrames);
-        let status = *run.pipeline.status();
-        prop_assert_eq!((status.mode, status.duty), (Mode::Fault, Duty::ZERO));
-        prop_assert!(status.fault.is_some());
-        run.before = status;
-        run.take(&after);
-    }
-
-    /// New parameters at any time: the bridge is off, and the loop continues with them.
-    #[test]
-    fn parameters_may_change_at_any_moment(
-        first in any_params(),
-        second in any_params(),
-        before in any_inputs(60),
-        after in any_inputs(60),
+    fn torque_off_a_stop_and_new_parameters_act_at_any_moment(
+        params in any_params(), second in any_params(), before in any_inputs(100), after in any_inputs(60),
     ) {
-        let mut run = Run::new(&first, true);
-        run.take(&before);
-        run.pipeline.configure(&config(&second));
-        if run.before.mode != Mode::Fault {
-            run.before.mode = Mode::Off;
+        let mut off = Run::new(&params, true);
+        off.take(&before);
+        let [mut stopped, mut changed] = [off.clone(), off.clone()];
+
+        off.arguments.command.torque = false;
+        for _ in 0..10 {
+            prop_assert_eq!(off.step().duty, Duty::ZERO);
         }
-        run.take(&after);
+        (off.arguments.command.torque, off.arguments.command.goal) = (true, Newtons::ZERO);
+        let mode = off.step().mode;
+        prop_assert!(matches!(mode, Mode::Release | Mode::Off | Mode::Tare | Mode::Fault), "{:?}", mode);
+
+        stopped.pipeline.stop(Fault::LostFrames);
+        stopped.before = *stopped.pipeline.status();
+        prop_assert_eq!((stopped.before.mode, stopped.before.duty), (Mode::Fault, Duty::ZERO));
+        prop_assert!(stopped.before.fault.is_some());
+        stopped.take(&after);
+
+        changed.pipeline.configure(&config(&second));
+        if changed.before.mode != Mode::Fault {
+            changed.before.mode = Mode::Off;
+        }
+        changed.take(&after);
     }
 }
 

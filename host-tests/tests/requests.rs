@@ -276,15 +276,23 @@ fn torque_is_refused_before_the_direction_is_confirmed() {
 }
 
 #[test]
-fn torque_that_was_on_before_the_tare_drives_nothing_until_it_was_off() {
-    for (off_first, frames) in [(0, 0), (0, 1), (0, 100), (1, 1), (1, 100)] {
-        let mut board = at(5.0);
+fn torque_that_was_on_before_a_tare_or_a_configuration_drives_nothing_until_it_was_off() {
+    let tare: fn(&mut Bench) = |board| board.command().tare_request += 1;
+    let configure: fn(&mut Bench) = |board| board.pipeline().configure(&config());
+    let calibrate: fn(&mut Bench) = |board| {
+        board.pipeline().calibrate(&Calibration::NONE);
+        board.command().tare_request += 1;
+    };
+    // Frames without torque and with it before the change.
+    let untared = [(0, 0), (0, 1), (0, 100), (1, 1), (1, 100)].map(|frames| (at(5.0), frames, tare));
+    let tared = [configure, calibrate].map(|change| (ready(), (0, 0), change));
+    for (number, (mut board, (off_first, frames), change)) in untared.into_iter().chain(tared).enumerate() {
         board.command().goal = newtons(1_000);
         board.frames(off_first);
         board.command().torque = true;
         let Status { mode, limits, .. } = board.frames(frames);
-        assert!(frames == 0 || mode == Mode::Off && limits.has(Limits::NOT_TARED), "{off_first}, {frames}: {mode:?}");
-        board.command().tare_request += 1;
+        assert!(frames == 0 || mode == Mode::Off && limits.has(Limits::NOT_TARED), "{number}: {mode:?}");
+        change(&mut board);
         for _ in 0..2 * TARE_FRAMES {
             let status = board.step();
             assert!(matches!(status.mode, Mode::Off | Mode::Tare) && status.limits.has(Limits::TORQUE_HELD));
@@ -293,7 +301,7 @@ fn torque_that_was_on_before_the_tare_drives_nothing_until_it_was_off() {
         board.command().torque = false;
         board.step();
         board.command().torque = true;
-        assert_eq!((board.step().mode, board.status().tare), (Mode::Approach, Taring::Done), "{off_first}, {frames}");
+        assert_eq!((board.step().mode, board.status().tare), (Mode::Approach, Taring::Done), "{number}");
     }
 }
 
@@ -310,30 +318,6 @@ fn torque_that_comes_with_a_tare_or_during_it_waits_for_its_end() {
             assert_eq!(board.step().duty.0, 0);
         }
         assert_eq!((board.step().mode, board.status().tare), (Mode::Approach, Taring::Done), "after {after} frames");
-    }
-}
-
-#[test]
-fn torque_that_was_on_before_a_configuration_drives_nothing_until_it_was_off() {
-    let changes: [fn(&mut Bench); 2] =
-        [|board| board.pipeline().configure(&config()), |board| board.pipeline().calibrate(&Calibration::NONE)];
-    for (number, change) in changes.into_iter().enumerate() {
-        let mut board = ready();
-        change(&mut board);
-        for _ in 0..100 {
-            let status = board.step();
-            assert_eq!(status.mode, Mode::Off);
-            assert!(status.limits.has(Limits::TORQUE_HELD));
-        }
-        board.command().tare_request += u8::from(number == 1);
-        for _ in 0..=2 * TARE_FRAMES {
-            let mode = board.step().mode;
-            assert!(mode == Mode::Off || mode == Mode::Tare);
-        }
-        board.command().torque = false;
-        board.step();
-        board.command().torque = true;
-        assert_eq!(board.step().mode, Mode::Release);
     }
 }
 

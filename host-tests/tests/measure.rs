@@ -8,6 +8,7 @@ use fingertip::capture::Ended as CaptureEnded;
 use fingertip::measure::press::{HOLDS_MS, PARTS, Press, PressInputs, ROWS_MAX, Step};
 use fingertip::measure::{BuiltIn, MeasureStatus};
 use fingertip::pipeline::Bridge;
+use std::ops::Range;
 
 impl<const BYTES: usize> Recorded<BYTES> {
     /// 5 mm from the wall, not tared.
@@ -179,9 +180,10 @@ fn a_press_has_no_more_rows_than_stated() {
     assert!(most > ROWS_MAX / 2, "{most} rows at most: the inputs show nothing");
 }
 
-#[test]
-fn a_motion_takes_anything_and_closes_its_record() {
-    for seed in 0..60 {
+sim::sizes!(a_motion_takes_anything_and_closes_its_record, take_anything(0..15), take_anything(15..60));
+
+fn take_anything(seeds: Range<u64>) {
+    for seed in seeds {
         let mut random = fastrand::Rng::with_seed(seed);
         let task = [Task::Jog, Task::Strokes, Task::Press][seed as usize % 3];
         let mut finger = Recorded::<CAPTURE_BYTES>::begun(task);
@@ -235,16 +237,11 @@ fn frames(task: Task) -> u32 {
     frames
 }
 
-#[test]
-fn a_motion_ends_at_any_moment_and_the_next_one_works() {
-    end_and_go_on(&[0, 4]);
-}
-
-#[test]
-#[ignore = "long: cargo xtask test --long"]
-fn long_a_motion_ends_at_any_moment_and_the_next_one_works() {
-    end_and_go_on(&[1, 2, 3, 5, 6]);
-}
+sim::sizes!(
+    a_motion_ends_at_any_moment_and_the_next_one_works,
+    end_and_go_on(&[0, 4]),
+    end_and_go_on(&[1, 2, 3, 5, 6])
+);
 
 fn end_and_go_on(parts: &[u32]) {
     for task in [Task::Jog, Task::Strokes, Task::Press] {
@@ -265,7 +262,7 @@ fn end_and_go_on(parts: &[u32]) {
                 finger.frame();
                 finger.assert_ended(task, Ended::Interrupted);
                 // Goal 0: a press that was stopped releases.
-                finger.frames(15_000);
+                finger.frames(7_000);
                 let status = *finger.bench.status();
                 assert!(!matches!(status.mode, Mode::Press | Mode::Strokes), "{name} at {at}: {status:?}");
                 let speed = finger.bench.truth().speed_mm_per_s;

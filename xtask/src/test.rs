@@ -48,9 +48,7 @@ pub fn run(args: &Args, choice: Choice) -> Result<()> {
     stages.stage("virtual board", |console| {
         let python = install::bus_python(console)?;
         let mut command = host::tests(&["--test", "board"]);
-        let checking = image::checking(toolchain::ensure(choice, console)?, flash::BRINGUP, console)?;
         command.env("FINGERTIP_IMAGE", &image()?.elf).env("FINGERTIP_PYTHON", &python);
-        command.env("FINGERTIP_BRINGUP", &checking.elf);
         host::test(&mut command, console)
     });
     stages.stage("Python package on a served finger", |console| {
@@ -75,8 +73,10 @@ fn long(mut stages: Stages, choice: Choice) -> Result<()> {
     });
     stages.stage("long tests on the virtual board", |console| {
         let image = image::firmware(choice, console)?;
+        let checking = image::checking(toolchain::ensure(choice, console)?, flash::BRINGUP, console)?;
         let mut command = host::tests(&["--test", "board", "--", "--ignored", "long_"]);
-        host::test(command.env("FINGERTIP_IMAGE", &image.elf), console)
+        command.env("FINGERTIP_IMAGE", &image.elf).env("FINGERTIP_BRINGUP", &checking.elf);
+        host::test(&mut command, console)
     });
     stages.stage("proofs of the model's error bounds", |console| host::run_tool("prove", &["--check"], console));
     stages.stage("fit of thousands of tactile images", |console| host::run_tool("fit", &["--check"], console));

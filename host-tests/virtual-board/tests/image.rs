@@ -218,7 +218,7 @@ fn two_runs_have_one_trace_also_on_a_slow_machine() {
     );
 }
 
-// `FINGERTIP_BRINGUP` names the image; `cargo xtask test` builds it and sets it.
+// `FINGERTIP_BRINGUP` names the image; `cargo xtask test --long` builds it and sets it.
 
 /// Figures of the emulated board that show nothing of a real one.
 const NOT_SHOWN: [&str; 10] = [
@@ -235,7 +235,8 @@ const NOT_SHOWN: [&str; 10] = [
 ];
 
 #[test]
-fn what_the_emulated_board_can_show_passes() {
+#[ignore = "long: cargo xtask test --long"]
+fn long_what_the_emulated_board_can_show_passes() {
     let image = named("FINGERTIP_BRINGUP");
     let told = &mut |said: &str| println!("{said}");
     let options = Options::default();

@@ -1,5 +1,5 @@
 //! Jog, strokes and a press over the bus, on the flash image: each completes, and its record is read and parsed by the
-//! host's solver.
+//! host's solver. At the usual size strokes and press are stopped on their way.
 
 use crate::common::{
     away, let_go, on_bus, read_u8, read_u8_beside_a_capture, read_u16, read_u32, reboot, refused, restart, running,
@@ -11,7 +11,7 @@ use fingertip::params::Params;
 use fingertip::shipped::{CAPTURE_BYTES, CLOCKS, COLUMNS, ROWS, address};
 use fingertip::state::Mode;
 use replay::{Replayed, replay};
-use solve::record;
+use solve::record::{self, Reason};
 use virtual_board::{Options, Rig};
 
 const LONGEST_MS: u64 = 20_000;
@@ -42,40 +42,56 @@ fn tare(rig: &mut Rig) {
     assert_eq!(read_u8(rig, address::TARE_STATE), 2);
 }
 
-#[test]
-fn jog_and_strokes_complete_and_the_drive_is_solved() {
+/// Makes a motion, to its end or a quarter of it. Returns its record.
+fn recorded(rig: &mut Rig, task: Task, whole: bool) -> Vec<u8> {
+    tare(rig);
+    if task == Task::Press {
+        write_and_run_ms(rig, address::TORQUE_ENABLE, 1, 2);
+    }
+    if whole {
+        measure(rig, task);
+    } else {
+        write_and_run_ms(rig, address::MEASURE, task as u8, 1_500);
+        while read_u8(rig, address::MEASURE_PROGRESS) < 25 {
+            assert_eq!(read_u8(rig, address::MEASURE_STATE), MeasureState::Running as u8);
+            rig.run_ms(20).expect("it runs");
+        }
+        write_and_run_ms(rig, address::MEASURE, Task::Stop as u8, 200);
+        assert_eq!(read_u8(rig, address::MEASURE_ENDED), Reason::Interrupted as u8);
+    }
+    fetch(rig)
+}
+
+fn motions(whole: bool) {
     let setup = away(2.0);
     let mut rig = running(&setup, &Options::default());
     tare(&mut rig);
     measure(&mut rig, Task::Jog);
     write_param(&mut rig, "direction_confirmed", 1);
-    tare(&mut rig);
-    measure(&mut rig, Task::Strokes);
-    let strokes = record::strokes(&fetch(&mut rig), &Params::DEFAULT).expect("strokes");
-    assert_eq!((strokes.strokes.len(), strokes.ended), (32, None));
-    let found = solve::strokes::solve(&strokes).expect("a drive");
-    let k = found.torque_constant.value;
-    println!("torque constant {k}, true {}", setup.motor.torque_nm_per_a);
-    assert!((k / setup.motor.torque_nm_per_a - 1.0).abs() < 0.03, "{k}");
+    let strokes = record::strokes(&recorded(&mut rig, Task::Strokes, whole), &Params::DEFAULT).expect("strokes");
+    restart(&mut rig);
+    write_param(&mut rig, "direction_confirmed", 1);
+    let press = record::press(&recorded(&mut rig, Task::Press, whole), &Params::DEFAULT).expect("a press");
+    // The finger holds forces afterwards.
+    write_goal(&mut rig, 500);
+    rig.run_ms(300).expect("it runs");
+    assert_eq!(read_u8(&mut rig, address::PRESENT_MODE), Mode::Force as u8);
+    let_go(&mut rig);
     rig.check_gaps().expect("no unknown gap");
+    let reasons = [strokes.ended, press.ended].map(|ended| ended.map(|ended| ended.reason));
+    if !whole {
+        assert_eq!(reasons, [Some(Reason::Interrupted); 2]);
+        assert!(!strokes.strokes.is_empty() && !press.steps.is_empty());
+        return;
+    }
+    assert_eq!((strokes.strokes.len(), reasons), (32, [None; 2]));
+    let k = solve::strokes::solve(&strokes).expect("a drive").torque_constant.value / setup.motor.torque_nm_per_a;
+    let kpa = solve::modulus(&[press]).expect("a modulus").kpa / setup.tip.modulus_kpa;
+    println!("torque constant and modulus over the true ones: {k}, {kpa}");
+    assert!((k - 1.0).abs() < 0.03 && (kpa - 1.0).abs() < 0.03, "{k} {kpa}");
 }
 
-pub fn a_press_completes_and_the_modulus_is_solved(rig: &mut Rig) {
-    tare(rig);
-    write_and_run_ms(rig, address::TORQUE_ENABLE, 1, 2);
-    measure(rig, Task::Press);
-    let press = record::press(&fetch(rig), &Params::DEFAULT).expect("a press");
-    let kpa = solve::modulus(&[press]).expect("a modulus").kpa;
-    let true_kpa = rig.world(|world| world.finger().setup.tip.modulus_kpa).expect("it runs");
-    println!("modulus {kpa} kPa, true {true_kpa}");
-    assert!((kpa / true_kpa - 1.0).abs() < 0.03, "{kpa}");
-    // The finger holds forces afterwards.
-    write_goal(rig, 500);
-    rig.run_ms(300).expect("it runs");
-    assert_eq!(read_u8(rig, address::PRESENT_MODE), Mode::Force as u8);
-    let_go(rig);
-    rig.check_gaps().expect("no unknown gap");
-}
+sim::sizes!(motions_are_recorded_and_what_they_measure_is_solved, motions(false), motions(true));
 
 // A capture over the bus, on the flash image: it replays to the bit on this machine, also with calibrated gains; and
 // what becomes of one that is asked for out of turn, interrupted, or read while it is under way.
@@ -90,12 +106,10 @@ const ACCESS: u8 = 7;
 const WINDOW: u16 = 248;
 
 #[test]
-fn captures_replay_and_a_press_is_solved() {
+fn captures_replay() {
     let mut rig = running(&away(0.4), &Options::confirmed());
     out_of_turn_and_interrupted(&mut rig);
     a_press_replays_to_the_bit_also_with_calibrated_gains(&mut rig);
-    restart(&mut rig);
-    a_press_completes_and_the_modulus_is_solved(&mut rig);
 }
 
 /// Arms, tares, and presses with half a newton from then on.
@@ -125,7 +139,7 @@ fn window(rig: &mut Rig, offset: u32) -> Vec<u8> {
     })
 }
 
-pub fn fetch(rig: &mut Rig) -> Vec<u8> {
+fn fetch(rig: &mut Rig) -> Vec<u8> {
     let length = read_u32(rig, address::CAPTURE_BYTES);
     let mut bytes = Vec::new();
     while bytes.len() < length as usize {
@@ -229,8 +243,4 @@ fn out_of_turn_and_interrupted(rig: &mut Rig) {
     reboot(rig, 30);
     assert_eq!((read_u8(rig, address::CAPTURE_STATE), read_u8(rig, address::CAPTURE_COUNT)), (NONE, 0));
     assert_eq!((read_u32(rig, address::CAPTURE_BYTES), window(rig, 0)), (0, vec![0; WINDOW.into()]));
-    write_and_run_ms(rig, address::CAPTURE, 1, 1);
-    write_u8(rig, address::TARE, 1);
-    until_done(rig);
-    same(rig);
 }

@@ -63,7 +63,7 @@ fn nothing_is_wrong(name: &str) {
     let (scene, trace, mut outcome) = ran(name);
     // The longest name of a metric must fit a phone.
     for verdict in &mut outcome.verdicts {
-        verdict.bound.metric = "over_force_defective_mn".into();
+        verdict.metric = "over_force_defective_mn".into();
     }
     let ablated = run::ablate(&scene, &native::board).unwrap();
     let report =

@@ -44,6 +44,17 @@ fn taxels_that_are_bad_for_one_frame_are_no_fault() {
     assert_eq!(spoil(&mut holding(1_000), 0, 51).fault, Some(Fault::ArrayBroken));
 }
 
+#[test]
+fn after_a_fault_what_was_touched_is_known() {
+    let mut board = holding(1_000);
+    board.pipeline().stop(Fault::MissedDeadline);
+    board.command().torque = false;
+    board.command().clear_request += 1;
+    board.step();
+    board.command().torque = true;
+    assert_eq!(board.step().mode, Mode::Force);
+}
+
 /// Interference in a single frame, too weak to make a taxel bad, changes the force that is held for no longer.
 #[test]
 fn a_frame_that_reads_too_much_or_too_little_is_forgotten() {

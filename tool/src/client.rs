@@ -57,8 +57,10 @@ pub struct Client {
     pub id: u8,
     /// Longest wait for an answer.
     pub timeout: Duration,
-    /// Instant of the last keep-alive packet; `None` sends none.
-    pub fed: Option<Instant>,
+    /// True if it sends keep-alive packets.
+    pub feeds: bool,
+    /// Instant of the last one.
+    fed: Instant,
     /// An answer was not waited for: it may come yet.
     owed: bool,
 }
@@ -82,7 +84,16 @@ impl Client {
         let port = reach.port.clone().ok_or(Error::NoPort)?;
         let line = Line::open(&port, reach.baud).map_err(|why| Error::Open(port.clone(), why))?;
         let timeout = Duration::from_millis(reach.timeout_ms);
-        Ok(Self { line, port, baud: reach.baud, id: reach.ids[0], timeout, fed: None, owed: false })
+        Ok(Self {
+            line,
+            port,
+            baud: reach.baud,
+            id: reach.ids[0],
+            timeout,
+            feeds: false,
+            fed: Instant::now(),
+            owed: false,
+        })
     }
 
     /// Opens a port again that was lost.
@@ -278,10 +289,10 @@ impl Client {
 
     /// Sends a keep-alive packet once one is due.
     fn feed(&mut self) -> io::Result<()> {
-        if self.fed.is_none_or(|fed| fed.elapsed() < FEED) {
+        if !self.feeds || self.fed.elapsed() < FEED {
             return Ok(());
         }
-        self.fed = Some(Instant::now());
+        self.fed = Instant::now();
         // A Sync Write to no device is a broadcast: it feeds all bus watchdogs.
         self.line.write(&packet(BROADCAST, instruction::SYNC_WRITE, &[0; 4]))
     }

@@ -23,7 +23,7 @@ const CLIENTS: Environment = Environment {
 };
 
 /// Installs GNU parallel, and a Python environment with DuckDB and PyYAML. Returns the environment's interpreter.
-pub fn ensure(console: &mut Console) -> Result<PathBuf> {
+fn ensure(console: &mut Console) -> Result<PathBuf> {
     install::packages(&["parallel"], "the test of the examples for clusters", console)?;
     install::environment(&CLIENTS, console)
 }

@@ -134,7 +134,7 @@ fn table(page: &str) -> String {
 }
 
 /// Makes sure of the emulators.
-pub fn ensure(console: &mut Console) -> Result<()> {
+fn ensure(console: &mut Console) -> Result<()> {
     ensure_m4(console)?;
     match host::find_program(RISCV_PROGRAM) {
         Some(_) => Ok(()),

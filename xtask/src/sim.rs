@@ -93,14 +93,15 @@ pub fn demo(args: &DemoArgs, choice: Choice, console: &mut Console) -> Result<()
 
 /// Serves a scene's finger on the native core, or the flash image on the emulated board.
 pub fn serve(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
+    // Neither program takes the flag that selects it.
+    let board = ["--board", "native", "virtual", "--board=native", "--board=virtual"];
+    let words = args.arguments.iter().filter(|word| !board.contains(&word.as_str()));
     if !wants_image(&args.arguments) {
-        return start(host::SERVE.build(console)?.args(&args.arguments));
+        return start(host::SERVE.build(console)?.args(words));
     }
     let image = image::firmware(choice, console)?;
     console.say(&image.summary());
     let mut command = host::BOARD.build(console)?;
     command.args(["serve", "--image"]).arg(std::path::absolute(&image.elf)?);
-    // The board takes no flag that selects it.
-    let board = ["--board", "virtual", "--board=virtual"];
-    start(command.args(args.arguments.iter().filter(|word| !board.contains(&word.as_str()))))
+    start(command.args(words))
 }

@@ -10,16 +10,16 @@ use std::time::Instant;
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  cargo xtask test\n  cargo xtask test --long    (the cases that the usual size leaves out)\n  \
+    after_help = "Examples:\n  cargo xtask test\n  cargo xtask test --long    (larger sizes and other cases)\n  \
     cargo test    (core and host only, needs nothing but Rust)"
 )]
 pub struct Args {
-    /// Run the cases that the usual size leaves out, and the campaigns of proofs and fits, instead
+    /// Run larger sizes and the cases that the usual size leaves out, and the campaigns of proofs and fits, instead
     #[arg(long)]
     long: bool,
 }
 
-/// Runs every test at its usual size, or what that leaves out.
+/// Runs every test at its usual size, or larger sizes and what that leaves out.
 pub fn run(args: &Args, choice: Choice) -> Result<()> {
     let mut stages = Stages::default();
     if args.long {
@@ -65,7 +65,7 @@ pub fn run(args: &Args, choice: Choice) -> Result<()> {
     stages.finish("test")
 }
 
-/// Runs the remaining cases of the tests with two sizes (their names begin with `long_`), and checks the tables of proofs
+/// Runs the larger sizes or remaining cases of the tests with two sizes (their names begin with `long_`), and checks the tables of proofs
 /// and fits.
 fn long(mut stages: Stages, choice: Choice) -> Result<()> {
     stages.stage("long core and host tests", |console| {

@@ -99,7 +99,7 @@ pub fn measure(image: &Path, argument: Option<&Path>, console: &mut Console) -> 
 }
 
 /// Makes sure of an emulator with the plugin interface.
-pub fn ensure(console: &mut Console) -> Result<()> {
+fn ensure(console: &mut Console) -> Result<()> {
     if version().is_some_and(|version| version >= VERSION_MIN) {
         return Ok(());
     }

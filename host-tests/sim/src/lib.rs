@@ -50,7 +50,7 @@ pub fn encode<const ROWS: usize, const COLUMNS: usize>(
     fingertip::store::words(record, sequence).flat_map(u32::to_le_bytes).collect()
 }
 
-/// Defines the test `name` of the usual size, and `name::long_` of what that leaves out.
+/// Defines the test `name` of the usual size, and `name::long_` of a larger size or of the other cases.
 ///
 /// `cargo xtask test --long` runs the latter.
 #[macro_export]

@@ -37,6 +37,7 @@ const SETUP: &str = "fingertip.setup";
 const END: &str = "fingertip.end";
 /// Entry that states if a replay is possible.
 const WHOLE: &str = "whole";
+
 fn topic(finger: usize, what: &str) -> String {
     format!("/finger{finger}/{what}")
 }

@@ -1,11 +1,12 @@
 //! The microcontroller's temperature and the analogue supply as the board measures them while it runs, and the drift that
 //! it computes from them.
 
-use crate::common::{image, poke, read_u16, read_u32, write_and_run_ms, write_goal, write_param, write_u8};
+use crate::common::{image, poke, read_u16, read_u32, running, write_and_run_ms, write_goal, write_param, write_u8};
 use fingertip::chip::Factory;
 use fingertip::params::Params;
 use fingertip::shipped::{Record, address};
 use sim::encode;
+use sim::plant::Setup;
 use virtual_board::flash::SECTOR;
 use virtual_board::scene::finger::{Clock, Finger};
 use virtual_board::{Error, Options, Rig, converter};
@@ -127,4 +128,14 @@ fn without_the_factory_s_codes_there_is_no_temperature_and_no_term() {
     assert_eq!((chip_mc(rig), drift_mn(rig)), (UNMEASURED_MC, 0));
     assert_eq!(read_u16(rig, address::ANALOGUE_SUPPLY_MV), 0);
     assert!(read_u32(rig, address::PRESENT_FORCE_MN) > 900, "it holds its goal all the same");
+}
+
+#[test]
+fn a_low_analogue_supply_is_reported_and_does_not_change_the_temperature() {
+    let mut setup = Setup::default();
+    setup.array.reference_v = 3.1;
+    let mut rig = running(&setup, &Options::default());
+    rig.run_ms(20).expect("it runs");
+    let (mv, chip) = (read_u16(&mut rig, address::ANALOGUE_SUPPLY_MV), chip_mc(&mut rig));
+    assert!((3_095..=3_105).contains(&mv) && (chip - 25_000).abs() < 500, "{mv} mV, {chip} mC");
 }

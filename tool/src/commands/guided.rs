@@ -7,7 +7,6 @@ use super::{Interrupt, aside, params, report, say};
 use crate::{Client, Error, numbers, table, whole};
 use fingertip::params::Params;
 use fingertip::pressure::GAIN_ONE;
-use fingertip::shipped::address;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::{Errno, read};
 use rustix::termios::{QueueSelector, tcflush};
@@ -189,8 +188,8 @@ pub(super) struct Settings {
 
 impl Settings {
     fn read(client: &mut Client) -> Result<Self, Error> {
-        let bytes = client.again(|client| client.read(address::PARAMS, 4 * Params::COUNT as u16))?;
-        Ok(Self { params: params::of_bytes(&bytes), gains: params::read_gains(client)? })
+        let stored = client.again(params::Stored::read)?;
+        Ok(Self { params: stored.params(), gains: stored.gains })
     }
 
     fn named(&self) -> impl Iterator<Item = (&'static str, i32)> {
@@ -403,21 +402,24 @@ impl Procedure<'_> {
         if !self.run.json {
             self.show();
         }
-        // As after a session that is run once more.
-        let now = self.settings()?;
-        let after = self.after(&now);
-        let is_set = after == now;
-        let nothing = self.found.rows.is_empty() && self.found.gains.is_none();
-        let wanted = !self.found.blocked
-            && !nothing
-            && (is_set
+        let mut after = None;
+        if !self.found.blocked && (!self.found.rows.is_empty() || self.found.gains.is_some()) {
+            let now = self.settings()?;
+            let wanted = self.after(&now);
+            // As after a session that is run once more.
+            let is_set = wanted == now;
+            if is_set
                 || self.run.options.apply
-                || !self.run.json && { self.run.yes("write these values to the controller?", "--apply")? });
+                || !self.run.json && self.run.yes("write these values to the controller?", "--apply")?
+            {
+                after = Some((wanted, is_set));
+            }
+        }
         self.run.interrupt.check()?;
-        let done = if wanted { self.write(&after, is_set) } else { Ok(()) };
+        let done = after.as_ref().map_or(Ok(()), |(after, is_set)| self.write(after, *is_set));
         if self.run.json {
             say(self.as_json());
-        } else if !wanted {
+        } else if after.is_none() {
             say("no result was written");
         }
         let Found { blocked, refused, .. } = self.found;
@@ -446,26 +448,29 @@ impl Procedure<'_> {
             written.push(after.json());
             self.session.done(WRITTEN, written.into())?;
         }
-        let values = after.named().map(|(name, value)| Ok((table::find(name)?, value.into())));
+        // Only commissioning confirms the direction.
+        let confirms = self.found.rows.iter().any(|row| row.name == DIRECTION);
+        let values = after.named().filter(|(name, _)| confirms || *name != DIRECTION);
+        let values = values.map(|(name, value)| Ok((table::find(name)?, value.into())));
         let values: Vec<params::Value> = values.collect::<Result<_, String>>()?;
         let meant = params::set(&values, Some(after.gains.clone()), self.client)?.meant;
         if !is_set {
             self.run.report("written; `fingertip params save` or --save keeps them over a reset");
         }
         // The zeros of the old gains are wrong under new ones: the controller asks for a tare.
-        let mut done = Ok(());
+        let mut failed = Vec::new();
         if self.found.gains.is_some() && !self.is_tared()? {
-            let why = |why| format!("the values are written, but the tare that new gains need failed: {why}").into();
-            done = self.zeros().map_err(why);
+            let why = |why| format!("the values are written, but the tare that new gains need failed: {why}");
+            failed.extend(self.zeros().err().map(why));
         }
         if self.run.options.save {
             let saved = params::save(&meant, self.client, self.run.json);
             self.found.saved = saved.is_ok();
-            done = done.and(saved);
+            failed.extend(saved.err().map(|why| why.to_string()));
         }
-        let has = meant.check(self.client);
-        self.found.applied = has.is_ok();
-        done.and(has)
+        meant.check(self.client)?;
+        self.found.applied = true;
+        if failed.is_empty() { Ok(()) } else { Err(failed.join("; ").into()) }
     }
 
     fn show(&self) {

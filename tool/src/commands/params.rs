@@ -98,11 +98,7 @@ pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Err
             let Backup { mut values, gains } = read_backup(file)?;
             // Who moves a device to another address or speed means it, and says so by `set`.
             values.retain(|(register, _)| !is_bus(register));
-            let set = set(&values, gains, client)?;
-            if set.before.gains != set.meant.gains && !json {
-                say("the taxels' gains are others now: tare");
-            }
-            conclude(&set, *save, client, json)
+            conclude(&set(&values, gains, client)?, *save, client, json)
         }
         Command::Diff { file } => diff(file.as_deref(), client, json),
     }
@@ -140,8 +136,9 @@ fn read_all(client: &mut Client) -> Result<Vec<Value>, Error> {
 /// Reports the changes, and saves them on request.
 fn conclude(set: &Set, save_too: bool, client: &mut Client, json: bool) -> Result<(), Error> {
     let changed = || set.before.values.iter().zip(&set.meant.values).filter(|(from, to)| from != to);
-    let lines: Vec<String> =
-        changed().map(|((register, from), (_, to))| format!("{}: {from} -> {to}", name(register))).collect();
+    let gains = (set.before.gains != set.meant.gains).then(|| "the taxels' gains are others now: tare".into());
+    let lines = changed().map(|((register, from), (_, to))| format!("{}: {from} -> {to}", name(register)));
+    let lines: Vec<String> = lines.chain(gains).collect();
     let now: Vec<Value> = changed().map(|(_, to)| *to).collect();
     let what = if lines.is_empty() { "nothing differs: nothing was changed".into() } else { lines.join("\n") };
     told(json, &now, &what);
@@ -264,17 +261,18 @@ fn told(json: bool, values: &[Value], text: &str) {
 #[derive(Clone, PartialEq)]
 pub(super) struct Stored {
     values: Vec<Value>,
-    gains: Vec<Vec<u16>>,
+    pub gains: Vec<Vec<u16>>,
 }
 
 impl Stored {
-    fn read(client: &mut Client) -> Result<Self, Error> {
+    pub fn read(client: &mut Client) -> Result<Self, Error> {
         Ok(Self { values: read_all(client)?, gains: read_gains(client)? })
     }
 
     /// Fails if the controller has something else.
     pub fn check(&self, client: &mut Client) -> Result<(), Error> {
-        let now = client.again(Self::read)?;
+        let unsure = "Whether all is set is not known: `fingertip params get` shows it";
+        let now = client.again(Self::read).map_err(|why| Error::Other(format!("{why}. {unsure}")))?;
         let differs = self.values.iter().zip(&now.values).filter(|(meant, now)| meant != now);
         let names = differs.map(|((register, _), _)| name(register));
         let names: Vec<String> = names.chain((self.gains != now.gains).then(|| GAINS.into())).collect();
@@ -284,9 +282,17 @@ impl Stored {
         Err(format!("{RESTARTED}, or was set by another host: {} changed. Set them again", names.join(", ")).into())
     }
 
-    fn params(&self) -> Vec<u8> {
+    fn bytes(&self) -> Vec<u8> {
         let params = self.values.iter().filter(|(register, _)| is_param(register));
         params.flat_map(|(register, value)| table::encode(register, *value)).collect()
+    }
+
+    pub fn params(&self) -> Params {
+        let mut values = [0; Params::COUNT];
+        for (value, bytes) in values.iter_mut().zip(self.bytes().as_chunks::<4>().0) {
+            *value = i32::from_le_bytes(*bytes);
+        }
+        Params::from_array(&values)
     }
 }
 
@@ -310,7 +316,7 @@ impl Packet {
                 let bytes: Vec<u8> = to.gains.iter().flatten().flat_map(|gain| gain.to_le_bytes()).collect();
                 client.again(|client| client.write(address::GAINS, &bytes))
             }
-            Self::Params => client.again(|client| client.write(address::PARAMS, &to.params())),
+            Self::Params => client.again(|client| client.write(address::PARAMS, &to.bytes())),
             Self::One(at) => set_one(to.values[*at], client),
         }
     }
@@ -345,10 +351,9 @@ pub(super) fn set(values: &[Value], gains: Option<Vec<Vec<u16>>>, client: &mut C
         return Err(why.into());
     }
     // Parameters that contradict each other are refused by the core's own check.
-    let config = Config::shipped(&of_bytes(&meant.params()));
+    let config = Config::shipped(&meant.params());
     let config = config.map_err(|why| format!("these do not go together: {why}; nothing was changed"))?;
     config.warnings(|warning| eprintln!("warning: {warning}"));
-    torque_is_off(client)?;
     let changed = before.values.iter().zip(&meant.values).enumerate().filter(|(_, (from, to))| from != to);
     let (params, mut others): (Vec<_>, Vec<_>) =
         changed.map(|(at, (_, to))| (at, *to)).partition(|(_, (register, _))| is_param(register));
@@ -364,6 +369,9 @@ pub(super) fn set(values: &[Value], gains: Option<Vec<Vec<u16>>>, client: &mut C
     let params = (!params.is_empty()).then_some(Packet::Params);
     let others = others.into_iter().map(|(at, _)| Packet::One(at));
     let packets: Vec<Packet> = gains.into_iter().chain(params).chain(others).collect();
+    if !packets.is_empty() {
+        torque_is_off(client)?;
+    }
     for (at, packet) in packets.iter().enumerate() {
         if let Err(why) = packet.send(&meant, client) {
             // What a packet sets may be set also where its answer was lost.
@@ -404,15 +412,6 @@ fn wrong((register, value): &Value) -> Option<String> {
         return Some(format!("{} is no parameter: it is not stored", name(register)));
     }
     (!(min..=max).contains(value)).then(|| format!("{} of {value}: {min} to {max} are allowed", name(register)))
-}
-
-/// The parameters of their registers' bytes.
-pub(super) fn of_bytes(bytes: &[u8]) -> Params {
-    let mut values = [0; Params::COUNT];
-    for (value, bytes) in values.iter_mut().zip(bytes.as_chunks::<4>().0) {
-        *value = i32::from_le_bytes(*bytes);
-    }
-    Params::from_array(&values)
 }
 
 /// Parameters by their names.
@@ -524,7 +523,7 @@ fn read_backup(path: &Path) -> Result<Backup, Error> {
 // The taxels' gains, which outlive a reset beside the parameters.
 
 /// All of them, in rows.
-pub(super) fn read_gains(client: &mut Client) -> Result<Vec<Vec<u16>>, Error> {
+fn read_gains(client: &mut Client) -> Result<Vec<Vec<u16>>, Error> {
     let columns = (client.number(address::MODEL_INFORMATION)? >> 8 & 0xFF).max(1) as usize;
     let gains = client.block(address::GAINS, address::GAINS)?.numbers(address::GAINS);
     // The registers have 16 bits.

@@ -131,7 +131,7 @@ pub fn run(args: &Args, reach: &Reach, json: bool) -> Result<(), Error> {
         // One try at a time: an absent one takes a time-out each, and packets of clients go between them.
         let next = lock(&bus).ending.keys().next().copied();
         if let Some(id) = next {
-            turn(&bus, true).end(id);
+            turn(&bus, false).end(id);
         }
         if let Ok(why) = losses.recv_timeout(if next.is_some() { Duration::ZERO } else { super::INTERRUPT_EVERY }) {
             ended = Err(why);
@@ -230,10 +230,11 @@ fn converse(mut stream: TcpStream, bus: &Mutex<Bus>, lost: &Outbox<Error>) {
 }
 
 impl Bus {
-    /// Ends the command of clients that left or are silent. Fingers that this packet reaches are stopped before it.
+    /// Ends the command of clients that left or are silent. The one finger of a packet is stopped before it, except by a stop.
     fn settle(&mut self, from: SocketAddr, packet: &Packet<'_>) {
         // Reads of others would feed the watchdogs of a silent client.
-        let slack = self.client.timeout;
+        // Its packet may wait while a finger is stopped.
+        let slack = self.client.timeout + Duration::from_secs_f64(RELEASE_S);
         let silent = |one: &Connection| {
             let most = one.watchdogs.values().min().zip(one.heard);
             most.is_some_and(|(most, heard)| heard.elapsed() > *most + slack)
@@ -245,9 +246,8 @@ impl Bus {
         for (other, why) in self.connections.iter().filter_map(ended).collect::<Vec<_>>() {
             self.end_command(other, why);
         }
-        // A read of all shows them as they are.
-        if packet.id != BROADCAST || !READS.contains(&packet.instruction) {
-            parts(packet).into_iter().flat_map(|part| part.ids).for_each(|id| self.end(id));
+        if !is_stop(packet, &parts(packet)) {
+            self.end(packet.id);
         }
     }
 
@@ -281,6 +281,8 @@ impl Bus {
                 let refusal = client::packet(packet.id, instruction::STATUS, &[StatusError::Access as u8]);
                 return Ok(if packet.id == BROADCAST { Vec::new() } else { refusal.to_vec() });
             }
+            // Its next commander stops a finger that was still to be stopped.
+            self.ending.retain(|id, _| !ids.clone().any(|own| own == *id));
             own.ids.extend(ids);
             let reset = (packet.instruction == instruction::REBOOT).then_some(0);
             for part in &parts {
@@ -327,9 +329,9 @@ impl Bus {
         }
         // A client that wrote by broadcast: absent IDs would take a time-out each.
         if ids.len() > GOALS {
-            self.client.fed = (why != SILENT).then(Instant::now);
+            self.client.feeds = why != SILENT;
             let found = self.client.ping_all().unwrap_or_default();
-            self.client.fed = None;
+            self.client.feeds = false;
             ids.retain(|id| found.iter().any(|pong| pong.id == *id));
         }
         self.ending.extend(ids.into_iter().map(|id| (id, (why, TRIES))));
@@ -338,7 +340,7 @@ impl Bus {
     /// Tries to stop a finger whose client's command ended; does nothing with another one.
     fn end(&mut self, id: u8) {
         let Some((why, tries)) = self.ending.remove(&id) else { return };
-        self.client.fed = (why != SILENT).then(Instant::now);
+        self.client.feeds = why != SILENT;
         let own = std::mem::replace(&mut self.client.id, id);
         match stop(&mut self.client) {
             Ok(true) => aside(format_args!("ID {id} was stopped: {why}")),
@@ -348,7 +350,7 @@ impl Bus {
             }
             Err(error) => aside(format_args!("stopping ID {id} failed ({why}): {error}")),
         }
-        (self.client.id, self.client.fed) = (own, None);
+        (self.client.id, self.client.feeds) = (own, false);
     }
 }
 

@@ -386,6 +386,9 @@ fn absent_fingers_of_who_left_keep_nobody_from_the_bus() {
     for goal_mn in [900, 800, 700] {
         press.set(address::GOAL_FORCE_MN, goal_mn).expect("it still commands");
     }
+    // A stop of all waits for none of them.
+    sync_write(&mut press, address::TORQUE_ENABLE, 1, &(1..60).flat_map(|id| [id, 0]).collect::<Vec<u8>>());
+    while press.number(address::TORQUE_ENABLE).expect("it answers") != 0 {}
 }
 
 /// The broker stops the finger at its new ID, and does not wait for answers of the old one.

@@ -170,32 +170,11 @@ impl Readout {
         if slot < ROWS {
             self.add_row(stages, slot, time_s, kpa, &mut volts);
         }
-        if let Some(faults) = self.faults {
-            self.break_rows(&faults, stages, slot, &mut volts);
-        }
         stages.volts(slot, time_s, &mut volts);
         let mut codes = volts.map(|volts| volts * self.codes_per_volt);
         stages.codes(slot, time_s, &mut codes);
         // The conversion to an integer rounds down, and negative values become 0.
         codes.map(|code| (code as u16).min(Array::CODES as u16 - 1))
-    }
-
-    /// Adds rows that are stuck in the driven state, removes those that are never driven, and saturates the amplifiers.
-    #[cold]
-    fn break_rows(&self, faults: &ArrayFaults, stages: &mut impl Stages, slot: usize, volts: &mut Row) {
-        for (row, state) in faults.rows.iter().enumerate() {
-            let sign = match state {
-                plant::Row::StuckHigh if row != slot => 1.0,
-                plant::Row::StuckLow if row == slot => -1.0,
-                _ => continue,
-            };
-            let mut seen = self.siemens[row];
-            stages.network(row, &self.siemens, &mut seen);
-            volts.iter_mut().zip(seen).for_each(|(volts, siemens)| *volts += sign * siemens * self.volts_per_siemens);
-        }
-        if faults.saturated {
-            *volts = [self.array.reference_v; COLUMNS];
-        }
     }
 
     /// Adds the voltages of a driven row under these pressures.

@@ -228,14 +228,17 @@ fn driven(name: &str, count: usize, task: Task, changes: &[(&str, &str)]) -> usi
     let fingers = fingers(&replaced(include_str!("drives.toml"), changes), 1, 0..count);
     let made = make_all(&fingers, task, None);
     print(name, &made);
+    let mut solved = 0;
     for (finger, made) in fingers.iter().zip(&made).filter(|_| task == Task::Strokes) {
         let strokes = record::strokes(&made.record, &finger.scene.params()).expect("strokes");
         let Ok(solve::strokes::MeasuredDrive { torque_constant, .. }) = solve::strokes::solve(&strokes) else {
             continue;
         };
+        solved += 1;
         let true_k = 1e-3 * drawn(finger, "torque_mnm_per_a").expect("it is drawn");
         assert!((torque_constant.value / true_k - 1.0).abs() < 0.05, "{name}: {torque_constant}, not {true_k}");
     }
+    assert!(solved > 0 || task != Task::Strokes || !changes.is_empty(), "{name}");
     let [travel_mm, force_n] = [largest(&made, |made| made.travel_mm), largest(&made, |made| made.force_n)];
     assert!(travel_mm < STROKES_MM && force_n < 0.3, "{name}: {travel_mm} mm, {force_n} N");
     made.iter().filter(|made| made.status.state == MeasureState::Done).count()

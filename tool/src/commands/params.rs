@@ -257,7 +257,7 @@ fn told(json: bool, values: &[Value], text: &str) {
 // The gains have a packet, and the parameters another one: the controller takes each whole or not at all. The few other
 // registers have a packet each. If a packet is refused, the earlier ones are undone.
 
-/// All that outlives a reset, once it is saved.
+/// Registers and gains that a save keeps over a reset.
 #[derive(Clone, PartialEq)]
 pub(super) struct Stored {
     values: Vec<Value>,
@@ -289,9 +289,8 @@ impl Stored {
 
     pub fn params(&self) -> Params {
         let mut values = [0; Params::COUNT];
-        for (value, bytes) in values.iter_mut().zip(self.bytes().as_chunks::<4>().0) {
-            *value = i32::from_le_bytes(*bytes);
-        }
+        let params = self.values.iter().filter(|(register, _)| is_param(register));
+        values.iter_mut().zip(params).for_each(|(to, (_, value))| *to = *value as i32);
         Params::from_array(&values)
     }
 }

@@ -232,8 +232,7 @@ fn converse(mut stream: TcpStream, bus: &Mutex<Bus>, lost: &Outbox<Error>) {
 impl Bus {
     /// Ends the command of clients that left or are silent. The one finger of a packet is stopped before it, except by a stop.
     fn settle(&mut self, from: SocketAddr, packet: &Packet<'_>) {
-        // Reads of others would feed the watchdogs of a silent client.
-        // Its packet may wait while a finger is stopped.
+        // Reads of others would feed the watchdogs of a silent client. One whose packet waits for a stop is not silent.
         let slack = self.client.timeout + Duration::from_secs_f64(RELEASE_S);
         let silent = |one: &Connection| {
             let most = one.watchdogs.values().min().zip(one.heard);
@@ -281,7 +280,7 @@ impl Bus {
                 let refusal = client::packet(packet.id, instruction::STATUS, &[StatusError::Access as u8]);
                 return Ok(if packet.id == BROADCAST { Vec::new() } else { refusal.to_vec() });
             }
-            // Its next commander stops a finger that was still to be stopped.
+            // From now on this client's end stops these fingers.
             self.ending.retain(|id, _| !ids.clone().any(|own| own == *id));
             own.ids.extend(ids);
             let reset = (packet.instruction == instruction::REBOOT).then_some(0);

@@ -379,8 +379,9 @@ fn answers_come_after_their_question_and_a_signal_ends_half_of_one() {
     let command = command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
     let mut child = command.spawn().expect("it starts");
     served::line_with("towards the object?", child.stderr.take().expect("a pipe"));
-    child.stdin.as_mut().expect("a pipe").write_all(b"y").expect("it reads");
-    std::thread::sleep(Duration::from_millis(200));
+    let pipe = child.stdin.as_mut().expect("a pipe");
+    pipe.write_all(b"y").expect("it reads");
+    Served::wait_for(|| rustix::io::ioctl_fionread(&*pipe).expect("a pipe") == 0);
     Served::interrupt(&child);
     let until = Instant::now() + Duration::from_secs(60);
     while child.try_wait().expect("it was started").is_none() {

@@ -325,7 +325,7 @@ fn the_other_fingers_of_a_stopped_commander_are_stopped_once_it_has_left() {
     }
 }
 
-/// As a script does: one program after the other.
+/// A script starts one program after the other.
 #[test]
 fn once_a_commander_has_left_the_next_client_writes() {
     let shared = Shared::begin("wall");
@@ -386,7 +386,7 @@ fn absent_fingers_of_who_left_keep_nobody_from_the_bus() {
     for goal_mn in [900, 800, 700] {
         press.set(address::GOAL_FORCE_MN, goal_mn).expect("it still commands");
     }
-    // A stop of all waits for none of them.
+    // A stop of all fingers does not wait for the absent ones.
     sync_write(&mut press, address::TORQUE_ENABLE, 1, &(1..60).flat_map(|id| [id, 0]).collect::<Vec<u8>>());
     while press.number(address::TORQUE_ENABLE).expect("it answers") != 0 {}
 }

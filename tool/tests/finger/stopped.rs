@@ -192,6 +192,18 @@ fn stop_stops_every_mode() {
 }
 
 /// The release has begun, nobody feeds the watchdog, and torque is still on.
+/// Sends a signal to a command while the line stalls in this mode: the command leaves the finger at rest.
+fn is_signalled_in(mode: &str, finger: &Served, arguments: &[&str], signal: Signal) {
+    finger.command(&format!("stall at {mode}: -1"));
+    let child = finger.start(arguments);
+    Served::wait_for(|| finger.command("stalled") == "true");
+    Served::signal(&child, signal);
+    finger.command("go on");
+    let (code, said) = ended(&child.wait_with_output().expect("it ends"));
+    assert_eq!(code, Some(130), "{signal:?}: {said}");
+    is_at_rest(finger, arguments[0]);
+}
+
 #[test]
 fn a_signal_does_not_end_a_stop_before_torque_is_off() {
     let finger = Served::patient("wall");
@@ -199,14 +211,7 @@ fn a_signal_does_not_end_a_stop_before_torque_is_off() {
         finger.done(&["tare"]);
         finger.set(&[(address::TORQUE_ENABLE, 1), (address::GOAL_FORCE_MN, 1_000)]);
         finger.until_alone("Force:");
-        finger.command("stall at Release: -1");
-        let child = finger.start(&["stop"]);
-        Served::wait_for(|| finger.command("stalled") == "true");
-        Served::signal(&child, signal);
-        finger.command("go on");
-        let (code, said) = ended(&child.wait_with_output().expect("it ends"));
-        assert_eq!(code, Some(130), "{signal:?}: {said}");
-        is_at_rest(&finger, "stop");
+        is_signalled_in("Release", &finger, &["stop"], signal);
     }
 }
 
@@ -215,15 +220,9 @@ fn a_signal_does_not_end_a_stop_before_torque_is_off() {
 fn a_signal_during_the_tare_of_a_capture_keeps_torque_off() {
     let finger = Served::patient("wall");
     let file = finger.file("tare.mcap");
-    finger.command("stall at Tare: -1");
     finger.command(&format!("trap Release: {REBOOT}"));
-    let child = finger.start(&["capture", "--press", "1", "--within-s", "3600", "--out", &file]);
-    Served::wait_for(|| finger.command("stalled") == "true");
-    Served::interrupt(&child);
-    finger.command("go on");
-    let (code, said) = ended(&child.wait_with_output().expect("it ends"));
-    assert_eq!(code, Some(130), "{said}");
-    is_at_rest(&finger, "capture");
+    let capture = ["capture", "--press", "1", "--within-s", "3600", "--out", &file];
+    is_signalled_in("Tare", &finger, &capture, Signal::INT);
 }
 
 #[test]

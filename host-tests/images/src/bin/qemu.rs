@@ -1,9 +1,9 @@
 //! The core on an emulated Cortex-M4F: replays a recording, then gives random inputs to every function with instructions
 //! of its own, and reports digests of the results.
 //!
-//! Not for a board: it talks to the emulator by semihosting. The command line is `FILE [panic|hardfault|hang]`: replays the
-//! recording, counts instructions, and fails half way on request. Each failure prints a line that begins with `FAILED:`
-//! and ends the emulator with an error.
+//! Not for a board: it talks to the emulator by semihosting. Its command line `FILE [panic|hardfault|hang]` names the
+//! recording, and a failure to cause in the middle. Each failure prints a line that begins with `FAILED:` and ends the
+//! emulator with an error.
 //!
 //! SysTick is stopwatch and watchdog in one: it restarts before each step, and if it ever runs out, the step hangs.
 //! A loop of known length measures the instructions in a tick, so the counts do not depend on the emulator's clocks.

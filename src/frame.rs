@@ -1,9 +1,9 @@
 //! One scan of the array: a row's codes in pairs, as two converters read them at the same instant.
 //!
 //! Every type that depends on the array's shape has the rows and columns as parameters: `ROWS` driven rows and
-//! `COLUMNS` sensed columns, a [`Shape`]. A scan has a slot for each row and one with no row driven. The last slot
-//! reads the columns with nothing selected: it shows the amplifiers' offsets, and a row that is stuck in the driven
-//! state.
+//! `COLUMNS` sensed columns, a [`Shape`]. A scan has a slot with no row driven, then one for each row. The first slot
+//! shows the amplifiers' offsets, and a row that is stuck in the driven state; with it the rows can be read while later
+//! ones are still being scanned.
 
 use crate::units::{Celsius, CoreCycles};
 pub use lanes::Codes;

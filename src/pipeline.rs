@@ -373,13 +373,15 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         }
     }
 
-    /// Checks the first `rows` of a frame that is still being scanned. Returns true if, with the later rows of the last
-    /// step, the array seems broken: the caller must then short the motor. A taxel that fails just after it was read is
-    /// seen a frame later; without this check the motor would be driven until that frame's end. The step decides if it is
-    /// a fault.
-    pub fn check_part(&mut self, frame: &Frame<ROWS, COLUMNS>, rows: usize) -> bool {
-        let broken = self.activity.drives()
-            && self.array.bad_taxels(frame, rows, &self.config) > self.config.params.bad_taxels_max.max(0) as u32;
+    /// Reads the first `rows` of a frame whose later rows are still being scanned, so that the step with the frame takes
+    /// less time. It may be left out: the step gives the same result.
+    ///
+    /// Returns true if, with the later rows of the last step, the array seems broken: the caller must then short the
+    /// motor. A taxel that fails just after it was read is seen a frame later; without this check the motor would be
+    /// driven until that frame's end. The step decides if it is a fault.
+    pub fn begin(&mut self, frame: &Frame<ROWS, COLUMNS>, rows: usize) -> bool {
+        let bad_taxels = self.array.begin(frame, rows, &self.config);
+        let broken = self.activity.drives() && bad_taxels > self.config.params.bad_taxels_max.max(0) as u32;
         if broken {
             self.motion.drive.block();
             self.status.duty = Duty::ZERO;
@@ -391,6 +393,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     /// again, as does the contact's fit.
     pub fn configure(&mut self, config: &Shaped<ROWS, COLUMNS>) {
         self.config = config.clone();
+        self.array.begin_again();
         self.restart();
     }
 

@@ -151,6 +151,20 @@ pub struct Array<const ROWS: usize, const COLUMNS: usize> {
     baseline_row: usize,
     /// True if the image holds loads by a characteristic, not readings.
     loads: bool,
+    so_far: SoFar,
+}
+
+/// Part of a frame that has been read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct SoFar {
+    /// Number of the frame.
+    sequence: u32,
+    /// Number of rows, from the first; after all of them the next frame begins.
+    rows: usize,
+    /// Sums over these rows.
+    total: Total,
+    /// Highest undriven level of a column.
+    undriven_max: u16,
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Default for Array<ROWS, COLUMNS> {
@@ -174,6 +188,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
             touched: Touched::NONE,
             baseline_row: 0,
             loads: false,
+            so_far: SoFar { sequence: 0, rows: ROWS, total: Total::ZERO, undriven_max: 0 },
         }
     }
 
@@ -193,21 +208,66 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         self.rows.iter().map(|row| &row.tare)
     }
 
+    /// Reads the first rows of a frame whose later rows are still being scanned; [`Array::read`] of the frame continues
+    /// behind them, with the same result. Returns the number of taxels that these rows show as dead or saturated, and
+    /// that the last frame showed in the other rows, without masked ones.
+    pub fn begin(&mut self, frame: &Frame<ROWS, COLUMNS>, rows: usize, config: &Config) -> u32 {
+        let rows = rows.min(ROWS);
+        self.begin_again();
+        self.read_rows(frame, rows, config);
+        let mut count = 0;
+        let limits = CodeLimits::new(self.so_far.undriven_max, config);
+        if limits.suspects(larger_lane(self.so_far.total.largest)) {
+            let Codes { rows: codes, undriven } = &frame.codes;
+            for ((codes, row), mask) in codes.iter().zip(&self.rows).zip(&self.mask).take(rows) {
+                if limits.suspects(larger_lane(row.largest)) {
+                    count += (bad_columns([codes, undriven], config) & !mask).count_ones();
+                }
+            }
+        }
+        if self.picture.bad_count != 0 {
+            let others = self.picture.bad.iter().zip(&self.mask).skip(rows);
+            count += others.map(|(bad, mask)| (bad & !mask).count_ones()).sum::<u32>();
+        }
+        count
+    }
+
+    /// Lets the next frame be read from its first row on: rows that were read with another configuration or calibration
+    /// do not count.
+    pub fn begin_again(&mut self) {
+        self.so_far.rows = ROWS;
+    }
+
+    /// Reads the rows of a frame before row `to` that have not been read.
+    #[inline(never)]
+    fn read_rows(&mut self, frame: &Frame<ROWS, COLUMNS>, to: usize, config: &Config) {
+        let Frame { codes, sequence } = frame;
+        let mut so_far = self.so_far;
+        if so_far.rows >= ROWS || so_far.sequence != *sequence {
+            let undriven_max = highest(&codes.undriven);
+            so_far = SoFar { sequence: *sequence, rows: 0, total: Total::ZERO, undriven_max };
+        }
+        // A tare learns what the taxels read, not their loads.
+        let curve = if self.tare_frames >= Self::TARE_FRAMES { config.curve } else { Curve::LINE };
+        self.loads = curve.growth != 0;
+        let common = Common { dead: both(config.dead_codes), sag: both(config.sag_q32), curve };
+        let SoFar { rows, total, .. } = so_far;
+        let total = lanes::pass(codes, &mut self.rows, &common, &mut self.picture.taxels, rows..to, total);
+        self.so_far = SoFar { rows: to, total, ..so_far };
+    }
+
     /// Reads a frame: every taxel, their sums, the peak and the flags. Any codes are accepted: a code that a sound
     /// array cannot show makes its taxel bad.
     pub fn read(&mut self, frame: &Frame<ROWS, COLUMNS>, config: &Config) -> &TactileImage<ROWS, COLUMNS> {
+        self.read_rows(frame, ROWS, config);
         // Without a bad taxel in the last frame none is bad again.
         let mut before = None;
         if self.picture.bad_count != 0 {
             before = Some(self.picture.bad);
             (self.picture.bad, self.picture.bad_count, self.picture.bad_again) = (self.mask, 0, 0);
         }
-        // A tare learns what the taxels read, not their loads.
-        let curve = if self.tare_frames >= Self::TARE_FRAMES { config.curve } else { Curve::LINE };
-        self.loads = curve.growth != 0;
-        let common = Common { dead: both(config.dead_codes), sag: both(config.sag_q32), curve };
-        let total = lanes::pass(&frame.codes, &mut self.rows, &common, &mut self.picture.taxels);
-        let limits = CodeLimits::new(&frame.codes.undriven, config);
+        let total = &self.so_far.total;
+        let limits = CodeLimits::new(self.so_far.undriven_max, config);
         let largest = larger_lane(total.largest);
         self.picture.peak = total.peak;
         self.picture.undriven_max = limits.undriven_max;
@@ -215,7 +275,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         let [sum, moment_x, moment_y] = if self.loads {
             [total.first, total.second, moment_y::<ROWS>(total.first, total.running)]
         } else {
-            let [sum, moment_x, moment_y] = sixteenths::<ROWS, COLUMNS>(&total);
+            let [sum, moment_x, moment_y] = sixteenths::<ROWS, COLUMNS>(total);
             let [tare, tare_x, tare_y] = self.tare_sums;
             [sum.wrapping_sub(tare), moment_x.wrapping_sub(tare_x), moment_y.wrapping_sub(tare_y)]
         };
@@ -263,24 +323,6 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         }
     }
 
-    /// Number of taxels that the first `new` rows of a frame show as dead or saturated, and that [`Array::read`] found in
-    /// the other rows, without masked ones.
-    pub fn bad_taxels(&self, frame: &Frame<ROWS, COLUMNS>, new: usize, config: &Config) -> u32 {
-        let Codes { rows, undriven } = &frame.codes;
-        let limits = CodeLimits::new(undriven, config);
-        let mut count = 0;
-        for (codes, mask) in rows.iter().zip(&self.mask).take(new) {
-            if limits.suspects(limits.largest([codes, undriven])) {
-                count += (bad_columns([codes, undriven], config) & !mask).count_ones();
-            }
-        }
-        if self.picture.bad_count != 0 {
-            let others = self.picture.bad.iter().zip(&self.mask).skip(new);
-            count += others.map(|(bad, mask)| (bad & !mask).count_ones()).sum::<u32>();
-        }
-        count
-    }
-
     /// Resets everything but the gains and the mask.
     pub fn renew(&mut self) {
         let (rows, mask) = (self.rows, self.mask);
@@ -299,6 +341,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         }
         self.mask = *mask;
         (self.picture.bad, self.picture.bad_count, self.picture.bad_again) = (*mask, 0, 0);
+        self.begin_again();
         self.touched = Touched::NONE;
         self.start_tare();
     }
@@ -309,43 +352,32 @@ const COARSER: u32 = 32 - BOOST_BITS;
 
 /// Limits of sound codes of a frame, between dead and saturated.
 struct CodeLimits {
-    /// Least sound code above the undriven level, in both lanes.
-    dead: u32,
     /// The highest undriven level.
     undriven_max: u16,
-    /// The smallest sum of [`CodeLimits::largest`] and the highest undriven level that may belong to a bad taxel.
+    /// The smallest sum of a row's [`Row::largest`] and the highest undriven level that may belong to a bad taxel.
     suspect: u32,
 }
 
 impl CodeLimits {
-    /// Computes the limits from the slot with no row driven.
     #[inline(always)]
-    pub fn new<const COLUMNS: usize>(undriven: &[u16; COLUMNS], config: &Config) -> Self {
-        let Config { dead_codes, saturated_codes, .. } = *config;
-        let suspect = u32::from(saturated_codes) - u32::from(dead_codes);
-        Self { dead: both(dead_codes), undriven_max: highest::<COLUMNS>(|at| codes_at(undriven, at)), suspect }
+    fn new(undriven_max: u16, config: &Config) -> Self {
+        Self { undriven_max, suspect: u32::from(config.saturated_codes) - u32::from(config.dead_codes) }
     }
 
     /// Returns true if a taxel may be dead or saturated, from the largest of the codes less the code of a dead taxel.
     /// A code below that of a dead taxel is huge as an unsigned number.
     #[inline(always)]
-    pub fn suspects(&self, largest: u16) -> bool {
+    fn suspects(&self, largest: u16) -> bool {
         u32::from(largest) + u32::from(self.undriven_max) >= self.suspect
-    }
-
-    /// Returns this largest number of a row.
-    #[inline(always)]
-    pub fn largest<const COLUMNS: usize>(&self, [codes, undriven]: [&[u16; COLUMNS]; 2]) -> u16 {
-        highest::<COLUMNS>(|at| lanes::sub(lanes::sub(codes_at(codes, at), codes_at(undriven, at)), self.dead))
     }
 }
 
-/// Returns the highest of all lanes of a row, unsigned.
+/// Returns the highest code of a row.
 #[inline(always)]
-fn highest<const COLUMNS: usize>(of: impl Fn(usize) -> u32) -> u16 {
+fn highest<const COLUMNS: usize>(codes: &[u16; COLUMNS]) -> u16 {
     let mut most = 0;
     each_pair::<COLUMNS>(|at| {
-        let pair = filled::<COLUMNS>(of(at), at);
+        let pair = filled::<COLUMNS>(codes_at(codes, at), at);
         most = if at == 0 { pair } else { lanes::larger(pair, most) };
     });
     larger_lane(most)

@@ -186,9 +186,9 @@ pub fn hold(name: &str, torque: bool, goal_mn: i32, codes: u16, most: u64) -> (O
     panic!("{name}: still changes after {taken} steps")
 }
 
-/// Every field of the pipeline, but the frames' number.
+/// Every field of the pipeline, but the number of the frame.
 fn state(pipeline: &Pipeline, sequence: u32) -> String {
-    format!("{pipeline:?}").replacen(&format!("sequence: {sequence},"), "", 1)
+    format!("{pipeline:?}").replace(&format!("sequence: {sequence},"), "")
 }
 
 /// Steps within which a machine must come to its cycle.

@@ -205,7 +205,7 @@ fn a_part_of_a_frame_shorts_only_a_driven_motor_and_only_if_it_is_broken() {
     let allowed = board.pipeline().config().params.bad_taxels_max as usize;
     for count in [0, allowed] {
         let frame = dead(board.frame(), 0..count);
-        assert!(!board.pipeline().check_part(&frame, ROWS), "{count} dead taxels");
+        assert!(!board.pipeline().begin(&frame, ROWS), "{count} dead taxels");
         assert_eq!(*board.status(), before, "{count} dead taxels");
     }
     // Those of the last step count in the rows that are still to come.
@@ -213,13 +213,13 @@ fn a_part_of_a_frame_shorts_only_a_driven_motor_and_only_if_it_is_broken() {
     let record = board.record();
     board.pipeline().step(&last, &record.sense, &record.command);
     let frame = dead(&last, 0..1);
-    assert!(!board.pipeline().check_part(&frame, 0));
-    assert!(board.pipeline().check_part(&frame, 1));
+    assert!(!board.pipeline().begin(&frame, 0));
+    assert!(board.pipeline().begin(&frame, 1));
     let after = *board.status();
     assert_eq!((after.mode, after.fault, after.duty.0), (Mode::Force, None, 0));
     board.command().torque = false;
     assert_eq!(board.step().mode, Mode::Off);
-    assert!(!board.pipeline().check_part(&frame, ROWS), "the bridge is off");
+    assert!(!board.pipeline().begin(&frame, ROWS), "the bridge is off");
 }
 
 type End = fn(&mut Bench);

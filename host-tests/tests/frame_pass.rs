@@ -105,7 +105,10 @@ proptest! {
             }
         }
         prop_assert_eq!(u32::from(picture.bad_count), count);
-        prop_assert_eq!(array.bad_taxels(&frame, new, &config), count);
+        let mut begun = array.clone();
+        prop_assert_eq!(begun.begin(&frame, new, &config), count);
+        prop_assert_eq!(begun.read(&frame, &config), array.read(&frame, &config));
+        prop_assert!(begun == array);
         let above = places().map(|(row, column)| frame.code(row, column).saturating_sub(frame.code(ROWS, column)));
         let sound = (0..ROWS).all(|row| bad(&frame, row, &config) == 0);
         prop_assert_eq!(picture.peak_codes, if sound { above.max().unwrap_or(0) } else { 0 });
@@ -153,7 +156,7 @@ proptest! {
         array.read(&frame, &config);
         array.continue_tare();
         let count = array.read(&frame, &config).bad_count;
-        prop_assert_eq!(array.bad_taxels(&frame, ROWS, &config), u32::from(count));
+        prop_assert_eq!(array.begin(&frame, ROWS, &config), u32::from(count));
     }
 }
 
@@ -217,7 +220,7 @@ fn a_masked_taxel_reads_as_nothing_and_is_no_fault() {
     mask[7] = 0x3ff;
     let array = |frame: &Frame| {
         let mut array = tared(&Calibration::new(&GAINS, &mask).unwrap(), &blank, &config);
-        (*array.read(frame, &config), array.bad_taxels(frame, ROWS, &config))
+        (*array.read(frame, &config), array.begin(frame, ROWS, &config))
     };
     let (sound, _) = array(&pressed);
     assert_eq!((sound.taxels[4][5], sound.taxels[7], sound.bad, sound.bad_count), (0, [0; COLUMNS], mask, 0));

@@ -3,6 +3,8 @@
 //! [`portable_pass`] is the pass to read; [`pass`] gives the same bits, for rows of ten columns by the target's
 //! instructions.
 
+use core::ops::Range;
+
 use super::{high, low, pair, portable};
 
 /// Fractional bits of a taxel.
@@ -220,7 +222,7 @@ pub struct Common {
 
 /// Sums over the rows. With a curve `first` sums the taxels, `second` weights each by twice its column's distance from
 /// the middle, and `running` accumulates `first` after each row.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Total {
     /// Sum of the rows' sums, each less [`sum_drop`] bits times its boost; upper half of the product.
     pub first: i32,
@@ -232,6 +234,11 @@ pub struct Total {
     pub largest: u32,
     /// The highest taxel, at least 0.
     pub peak: i32,
+}
+
+impl Total {
+    /// The total of no row.
+    pub const ZERO: Self = Self { first: 0, second: 0, running: 0, largest: 0, peak: 0 };
 }
 
 /// 1 / (1 - x) in Q28, for x in Q32 from -0.32 to 0.32.
@@ -254,17 +261,24 @@ fn taxel(net: i16, gain: i16, boost: i32, tare: i32) -> i32 {
 }
 
 /// Converts codes to `taxels`, row by row: net codes times column gain and row boost, less the tare; the row's sag, by
-/// the sum of its codes, gives the boost. Also sums the rows with the same factors, without rounding taxel by taxel.
+/// the sum of its codes, gives the boost. Also adds the rows to `total` with the same factors, without rounding taxel by
+/// taxel.
+///
+/// Reads the rows in `range` only. A pass over some rows and one over the next ones, which continues its total, give the
+/// same bits as one pass over all.
 #[inline(always)]
 pub fn portable_pass<const ROWS: usize, const COLUMNS: usize>(
     codes: &Codes<ROWS, COLUMNS>,
     rows: &mut [Row<COLUMNS>; ROWS],
     common: &Common,
     taxels: &mut [[i32; COLUMNS]; ROWS],
+    range: Range<usize>,
+    mut total: Total,
 ) -> Total {
     let (pairs, drop) = (const { pairs(COLUMNS) }, const { sum_drop(ROWS, COLUMNS) });
-    let (mut total, undriven) = (Total::default(), &codes.undriven);
-    for ((codes, row), taxels) in codes.rows.iter().zip(rows).zip(taxels) {
+    let undriven = &codes.undriven;
+    let all = codes.rows.iter().zip(rows).zip(taxels);
+    for ((codes, row), taxels) in all.take(range.end).skip(range.start) {
         // One for each pair; the rest is not used.
         let mut nets = [0; COLUMNS];
         let (mut sag, mut sum, mut moment) = (0, 0, 0_i32);

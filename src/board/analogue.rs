@@ -1,8 +1,8 @@
 //! ADC1, which the scan leaves alone: the bridge's supply, and behind each conversion of it, as the
 //! injected group, the internal reference and the microcontroller's temperature.
 //!
-//! Software starts it once a frame and takes its codes in the next. All three take 51 us, the supply the first 5; where
-//! a frame is shorter than that, it is started in every other.
+//! Software starts it in the middle of a frame and takes its codes in the middle of the next. All three take 51 us, the
+//! supply the first 5; where a frame is shorter than that, it is started in every other.
 //!
 //! Clock, power and sampling time are set alike for all three converters.
 
@@ -67,13 +67,13 @@ impl Analogue {
         Self { chip: Chip::new(Factory { reference, sensor: [cold, hot] }), supply_mv: 0, waited: false }
     }
 
-    /// The supply's last conversion in mV, and starts the next. A converter that is not done within two frames reads as
-    /// no supply, which stops the motor.
-    pub fn read_mv(&mut self) -> u16 {
+    /// Takes the last conversions and starts the next. A converter that is not done within two frames reads as no supply,
+    /// which stops the motor.
+    pub fn take(&mut self) {
         let status = pac::ADC1.sr().read();
         self.waited = !status.jeoc() && !self.waited;
         if self.waited {
-            return self.supply_mv;
+            return;
         }
         let code = u32::from(pac::ADC1.dr().read().data());
         let codes = status.jeoc().then(|| [0, 1].map(|place| pac::ADC1.jdr(place).read().jdata()));
@@ -82,6 +82,10 @@ impl Analogue {
         if self.chip.observe(codes) {
             health::set_analogue_mv(self.chip.analogue_mv());
         }
+    }
+
+    /// The supply's last conversion in mV.
+    pub fn supply_mv(&self) -> u16 {
         self.supply_mv
     }
 

@@ -107,7 +107,7 @@ impl ControlTask {
         self.calibrate();
         self.capture();
         self.take_frame();
-        self.check_part();
+        self.begin_frame();
         self.save();
     }
 
@@ -134,23 +134,25 @@ impl ControlTask {
         if core::mem::take(&mut self.discard_next) {
             return;
         }
-        if follows {
-            let frame = guard::frame(self.parts.pipeline.config().timing);
-            health::note_interval(Stopwatch(newest.stamp.wrapping_sub(before).saturating_sub(frame)));
-        }
         // A frame that is not whole counts as missed: the guard runs on.
         if self.parts.scan.copy(newest, &mut self.frame) {
             self.step(newest);
         }
+        if follows {
+            let frame = guard::frame(self.parts.pipeline.config().timing);
+            health::note_interval(Stopwatch(newest.stamp.wrapping_sub(before).saturating_sub(frame)));
+        }
     }
 
-    /// Looks at the rows that are already there, half a frame before the step does.
-    fn check_part(&mut self) {
+    /// In the middle of a frame: reads the rows that are already there, and all that the step needs beside the frame and
+    /// that may be half a frame old.
+    fn begin_frame(&mut self) {
         if !super::scan::take_halfway() || self.discard_next {
             return;
         }
-        let slots = self.parts.scan.copy_so_far(&mut self.frame);
-        if self.parts.pipeline.check_part(&self.frame, slots) {
+        self.parts.analogue.take();
+        let rows = self.parts.scan.copy_so_far(&mut self.frame);
+        if self.parts.pipeline.begin(&self.frame, rows) {
             self.parts.bridge.apply(Requested::Brakes);
             self.keeper.end(Ended::Cut);
             self.publish();
@@ -162,7 +164,7 @@ impl ControlTask {
         let Heard { command, packets } = HEARD.get();
         let sense = Sense {
             encoder: parts.encoder.read(),
-            supply_mv: parts.analogue.read_mv(),
+            supply_mv: parts.analogue.supply_mv(),
             bus_silent_ms: self.bus.silent_ms(packets),
             bridge_fault: parts.bridge.fault(),
             chip: parts.analogue.chip(),

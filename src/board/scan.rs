@@ -123,7 +123,7 @@ impl Scan {
         pac::GPIOB.bsrr().write(|w| w.0 = ALL_PINS << 16);
     }
 
-    /// Restarts from the first row. The first frame must not be used: the converters have just woken.
+    /// Restarts from the first slot. The first frame must not be used: the converters have just woken.
     pub fn start(&mut self, timing: ScanTiming) {
         const { assert!(CLOCKS.frame_ns.is_none(), "this scan has no idle time") };
         self.stop();
@@ -171,8 +171,8 @@ impl Scan {
         whole
     }
 
-    /// Replaces the first slots of `frame` by those that both banks have completed in the scan under way. Returns their
-    /// number.
+    /// Replaces the first slots of `frame` by those that both banks have completed in the scan under way, and its number by
+    /// that of this scan. Returns the number of rows.
     pub fn copy_so_far(&mut self, frame: &mut Frame) -> usize {
         // First: a number that is too old lets the whole frame be copied again.
         let sequence = newest().sequence.wrapping_add(1);
@@ -184,9 +184,13 @@ impl Scan {
         let stored = u32::min(now.stored[0] % HALF_LEN, now.stored[1] % HALF_LEN);
         let slots = stored as usize / BANK_COLUMNS;
         copy_slots(half_a, 0..slots, frame);
+        frame.sequence = sequence;
         // A frame's lowest bit is its half.
-        self.early = (sequence, if sequence as usize & 1 == half_a { slots } else { 0 });
-        slots
+        if sequence as usize & 1 != half_a {
+            return 0;
+        }
+        self.early = (sequence, slots);
+        slots.saturating_sub(1)
     }
 }
 
@@ -228,16 +232,14 @@ pub fn note_transfers() {
 fn copy_slots(half: usize, slots: Range<usize>, frame: &mut Frame) {
     let [bank_a, bank_b] = [&BUFFERS[0][half], &BUFFERS[1][half]];
     let Codes { rows, undriven } = &mut frame.codes;
-    let driven = slots.start..slots.end.min(ROWS);
-    if let (Some(a), Some(b), Some(rows)) =
-        (bank_a.get(driven.clone()), bank_b.get(driven.clone()), rows.get_mut(driven))
-    {
-        for ((a, b), row) in a.iter().zip(b).zip(rows) {
+    if slots.start == 0 {
+        copy_slot([&bank_a[0], &bank_b[0]], undriven);
+    }
+    let driven = slots.start.max(1)..slots.end;
+    if let (Some(a), Some(b)) = (bank_a.get(driven.clone()), bank_b.get(driven.clone())) {
+        for ((a, b), row) in a.iter().zip(b).zip(rows.iter_mut().skip(driven.start - 1)) {
             copy_slot([a, b], row);
         }
-    }
-    if slots.end > ROWS {
-        copy_slot([&bank_a[ROWS], &bank_b[ROWS]], undriven);
     }
     fence(Ordering::Acquire);
 }
@@ -298,15 +300,15 @@ const SCANNING: [Adc; 2] = [pac::ADC3, pac::ADC2];
 const HALF_LEN: u32 = (SLOTS * BANK_COLUMNS) as u32;
 const BUFFER_LEN: u32 = 2 * HALF_LEN;
 
-/// Words that the slots write to the port's set/reset register. A slot sets its row and resets all others; the last
-/// slot resets all rows and sets the frame's trace pin.
+/// Words that the slots write to the port's set/reset register. The first slot resets all rows and sets the frame's
+/// trace pin; each later one sets its row and resets all others.
 ///
 /// Atomic so that it lies in RAM: a flash that is being programmed would make the DMA wait.
 static ROW_WORDS: [AtomicU32; SLOTS] = {
     let mut words = [const { AtomicU32::new(0) }; SLOTS];
     let mut slot = 0;
     while slot < SLOTS {
-        let set = if slot < ROWS { 1 << slot } else { 1 << trace::FRAME };
+        let set = if slot > 0 { 1 << (slot - 1) } else { 1 << trace::FRAME };
         words[slot] = AtomicU32::new((ALL_PINS & !set) << 16 | set);
         slot += 1;
     }
@@ -387,7 +389,7 @@ fn set_timer(timing: ScanTiming) {
     timer.egr().write(|w| w.set_ug(true));
 }
 
-/// Starts the timer at the first row.
+/// Starts the timer at the first slot.
 fn start_timer() {
     let timer = pac::TIM8;
     timer.dier().write(|w| w.set_ude(true));

@@ -100,10 +100,16 @@ const FUNCTIONS: [Function; 11] = [
             let common = Common { dead: source.word(), sag: source.word() & 0x7fff_7fff, curve };
             let mut rows = [Row { tare, ..Row::new(signed(gains), signed(moments)) }; 2];
             let mut taxels = [[0; COLUMNS]; 2];
-            let Total { first, second, running, largest, peak } = lanes::pass(&codes, &mut rows, &common, &mut taxels);
-            [first, second, running, peak, rows[0].boost, rows[1].boost].into_iter().for_each(|number| mix.add(number));
+            let mut total = Total::ZERO;
+            // The first row, the other one, and both in one pass.
+            for range in [0..1, 1..2, 0..2] {
+                total = lanes::pass(&codes, &mut rows, &common, &mut taxels, range, total);
+                let Total { first, second, running, largest, peak } = total;
+                [first, second, running, peak].into_iter().for_each(|number| mix.add(number));
+                [largest, rows[0].largest, rows[1].largest].into_iter().for_each(|number| mix.add(number));
+            }
+            rows.iter().for_each(|row| mix.add(row.boost));
             taxels.into_iter().flatten().for_each(|taxel| mix.add(taxel));
-            [largest, rows[0].largest, rows[1].largest].into_iter().for_each(|number| mix.add(number));
             rows.iter().for_each(|row| (0..COLUMNS).for_each(|column| mix.add(row.reading(column))));
         }
     }),

@@ -281,13 +281,13 @@ impl Board {
     fn sample(&mut self, slots: Range<usize>, slot_s: f64) {
         for (finger, unit) in self.units.iter_mut().enumerate() {
             let mut places = [unit.shown; SLOTS];
-            // The last slot drives no row.
-            let rows = slots.start..slots.end.min(ROWS);
+            // The first slot drives no row.
+            let driven = slots.start.max(1)..slots.end;
             let rests = self.world.rests(finger);
             if rests {
-                places[rows.clone()].fill(self.world.place(finger, f64::INFINITY));
+                places[driven.clone()].fill(self.world.place(finger, f64::INFINITY));
             } else {
-                for slot in rows.clone() {
+                for slot in driven.clone() {
                     let gone = slot + 1 - slots.start;
                     let since_s = if gone == slots.len() { f64::INFINITY } else { slot_s * gone as f64 };
                     places[slot] = self.world.place(finger, since_s);
@@ -297,34 +297,39 @@ impl Board {
                 // After two scans of a contact the frame holds its codes.
                 let known = unit.same_slots >= 2 * SLOTS;
                 let compared = if rests { 1 } else { SLOTS };
-                let same = places[rows.clone()].iter().take(compared).all(|place| *place == unit.shown);
+                let same = places[driven.clone()].iter().take(compared).all(|place| *place == unit.shown);
                 unit.same_slots = if same { unit.same_slots + slots.len() } else { 0 };
                 if known && same {
-                    unit.sensor.repeat(rows.len() as i64, slots.len() as i64);
+                    unit.sensor.repeat(driven.len() as i64, slots.len() as i64);
                     continue;
                 }
                 if known {
                     // The effects remember the last slot.
-                    let slot = (slots.start + SLOTS - 1) % SLOTS;
-                    let row = slot.min(ROWS - 1);
-                    let kpa = self.world.placed_kpa(finger, &unit.shown, row);
-                    unit.readout.codes(&mut unit.sensor, slot, self.clock.since(self.start), &kpa);
-                    unit.sensor.repeat(-i64::from(slot < ROWS), -1);
+                    let row = row_of((slots.start + SLOTS - 1) % SLOTS);
+                    let kpa = self.world.placed_kpa(finger, &unit.shown, row.min(ROWS - 1));
+                    unit.readout.codes(&mut unit.sensor, row, self.clock.since(self.start), &kpa);
+                    unit.sensor.repeat(-i64::from(row < ROWS), -1);
                 }
             }
-            unit.shown = places[slots.end.min(ROWS) - 1];
+            unit.shown = places[slots.end - 1];
             let mut clock = self.clock;
             for slot in slots.clone() {
                 clock.go_on(slot_s);
-                let kpa = if slot < ROWS { self.world.placed_kpa(finger, &places[slot], slot) } else { [0.0; COLUMNS] };
-                let codes = unit.readout.codes(&mut unit.sensor, slot, clock.since(self.start), &kpa);
+                let row = row_of(slot);
+                let kpa = if row < ROWS { self.world.placed_kpa(finger, &places[slot], row) } else { [0.0; COLUMNS] };
+                let codes = unit.readout.codes(&mut unit.sensor, row, clock.since(self.start), &kpa);
                 for (column, code) in codes.into_iter().enumerate() {
-                    unit.frame.set_code(slot, column, code);
+                    unit.frame.set_code(row, column, code);
                 }
             }
         }
         slots.for_each(|_| self.clock.go_on(slot_s));
     }
+}
+
+/// Row that is driven in a slot of the scan; [`ROWS`], that is none, in the first one.
+fn row_of(slot: usize) -> usize {
+    slot.checked_sub(1).unwrap_or(ROWS)
 }
 
 // Virtual time is exact: in whole 21sts of a femtosecond a tick of the timer (168 MHz) has 125 million.

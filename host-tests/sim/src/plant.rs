@@ -118,7 +118,7 @@ impl Plant {
     }
 }
 
-/// Rows that are driven in a slot of the scan: one, or none in the last slot.
+/// Drive of the rows while the codes of a row are sampled: that row alone, or no row for [`ROWS`].
 fn driven_in(slot: usize) -> [bool; ROWS] {
     core::array::from_fn(|row| row == slot)
 }

@@ -175,7 +175,7 @@ fn leaves_out<const ROWS: usize, const COLUMNS: usize>() {
             let picture = *array.read(&spoilt, &config);
             let mut bad = [0; ROWS];
             bad[row] = 1 << column;
-            assert_eq!((picture.bad, picture.bad_count, array.bad_taxels(&spoilt, ROWS, &config)), (bad, 1, 1));
+            assert_eq!((picture.bad, picture.bad_count, array.begin(&spoilt, ROWS, &config)), (bad, 1, 1));
             assert_eq!(picture.taxels[row][column], 0);
             let sound = picture.taxels.iter().flatten().filter(|taxel| **taxel > 0).count();
             assert!(picture.peak > 0 && sound + 1 == ROWS * COLUMNS);
@@ -242,7 +242,7 @@ fn takes_anything<const ROWS: usize, const COLUMNS: usize>(cases: u32) {
         for (frame, sense, fit_level) in &steps {
             command.fit_level = FitLevel::from_number(*fit_level);
             for _ in 0..ROWS + 2 {
-                pipeline.check_part(frame, ROWS / 2);
+                pipeline.begin(frame, ROWS / 2);
                 let (duty, status) = pipeline.step(frame, sense, &command);
                 assert_eq!(duty, status.duty);
                 command.torque = status.fault.is_none();

@@ -7,7 +7,7 @@
 //! several ranks without DMA, an injected group with a separate trigger, continuous and discontinuous mode, analogue
 //! watchdog, resolutions other than 12 bits; a request for one is reported as a gap.
 
-use crate::front_end::{Shared, Slot};
+use crate::front_end::{LAST_ROW, Shared, Slot};
 use crate::timers::COMPARE_1;
 use fingertip::chip::Factory;
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
@@ -89,7 +89,7 @@ impl Converter {
             (0..length).map(|rank| sampling_cycles(registers, input(registers, rank)) + CONVERSION_CYCLES).sum();
         let begun_ns = slot.map_or(context.now().0, |slot| slot.begun_ns);
         let done = VirtualNanos(self.after(begun_ns, cycles));
-        let event = slot.is_none_or(|slot| slot.rows == 0).then(|| context.schedule(done));
+        let event = slot.is_none_or(|slot| slot.rows == LAST_ROW).then(|| context.schedule(done));
         self.status = sr::STRT.set(self.status, 1);
         self.running = Some(Running { event, begun_ns, slot });
     }

@@ -32,7 +32,7 @@ struct RowDrive {
 pub struct Slot {
     /// Start time of the conversions, ns.
     pub begun_ns: u64,
-    /// Bits of the driven rows; 0 in the last slot of a frame.
+    /// Bits of the driven rows; 0 in the first slot of a frame.
     pub rows: u16,
 }
 
@@ -60,6 +60,9 @@ impl Scan {
         (moved + self.due_ns.len() + updates) % round.max(1)
     }
 }
+
+/// The drive of a frame's last slot.
+pub const LAST_ROW: u16 = 1 << (ROWS - 1);
 
 /// Index of a row drive, with the settled voltages of the columns under it and under the drive before it.
 type Settled = Option<(usize, [f64; COLUMNS], [f64; COLUMNS])>;
@@ -207,7 +210,8 @@ impl FrontEnd {
     pub fn expect(&mut self, updates_ns: impl Iterator<Item = u64>) {
         if let (Some(scan), Surroundings::Scene(finger)) = (&self.scan, &mut self.world) {
             let slots = (0..).map(|updates| scan.slot_after(updates));
-            let rows = slots.map(|slot| if slot < ROWS { 1 << slot } else { 0 });
+            // The first slot drives no row.
+            let rows = slots.map(|slot| (1 << slot) >> 1);
             finger.expect(updates_ns.map(|at_ns| at_ns + scan.edge_ns).zip(rows));
         }
     }
@@ -262,9 +266,9 @@ impl FrontEnd {
         (volts / self.world.reference_v() * CODES).floor().clamp(0.0, CODES - 1.0) as u16
     }
 
-    /// A scanning converter's sequence is complete: with no row driven after one was, so is the frame.
+    /// A scanning converter's sequence is complete: with the last row driven, so is the frame.
     pub fn sequence_done(&mut self, at_ns: u64, slot: Option<Slot>) {
-        if slot.map_or(self.drives[0].rows == 0 && self.drives[1].rows != 0, |slot| slot.rows == 0) {
+        if slot.map_or(self.drives[0].rows, |slot| slot.rows) == LAST_ROW {
             self.counts.frames += 1;
             self.counts.frame_end_ns = at_ns;
             if let Surroundings::Scene(finger) = &mut self.world {

@@ -1,5 +1,7 @@
 //! The pass by instructions: SSUB16, SMLAD, UQSUB16, SMMLA, SMULxy, SMMULR, SMMLAR, USAT, SSAT.
 
+use core::ops::Range;
+
 use super::{BOOST_DROP, CODE_BITS, Codes, Common, Curve, Row, TARE_BITS, Total, portable_pass, sum_drop};
 
 /// Columns of a row that the instructions take.
@@ -17,15 +19,31 @@ pub fn pass<const ROWS: usize, const COLUMNS: usize>(
     rows: &mut [Row<COLUMNS>; ROWS],
     common: &Common,
     taxels: &mut [[i32; COLUMNS]; ROWS],
+    range: Range<usize>,
+    total: Total,
 ) -> Total {
-    const { assert!(ROWS > 0) };
     if COLUMNS != WRITTEN_OUT || const { sum_drop(ROWS, COLUMNS) } != 0 {
-        return portable_pass(codes, rows, common, taxels);
+        return portable_pass(codes, rows, common, taxels, range, total);
     }
-    let (first, second, running, largest, peak);
+    let Codes { rows: all, undriven } = codes;
+    let (Some(codes), Some(rows), Some(taxels)) =
+        (all.get(range.clone()), rows.get_mut(range.clone()), taxels.get_mut(range))
+    else {
+        return total;
+    };
+    if codes.is_empty() {
+        return total;
+    }
+    let mut second = total.second;
+    if common.curve.growth != 0 {
+        // The sum of sums from which the last instructions compute `second` again. What is halved is even.
+        let both = total.first.wrapping_mul(9).wrapping_add(second);
+        second = total.running.wrapping_mul(5).wrapping_sub(both >> 1);
+    }
+    let (first, running, largest, peak);
     // SAFETY: the rows have as many columns as the offsets suppose, and the codes begin on a word's border. Reads the
-    // codes, the rows and what is common, writes each row's boost, nets and largest, and the taxels; the types hold
-    // their lengths and places, and the codes' end ends the loop. The stack is as it was at the end, and so are r6 and
+    // codes, the rows and what is common, writes each row's boost, nets and largest, and the taxels; the slices are
+    // equally long and not empty, and the codes' end ends the loop. The stack is as it was at the end, and so are r6 and
     // r7, which an operand cannot be. The flag that it can set (Q) is sticky and read nowhere.
     unsafe {
         core::arch::asm!(
@@ -83,17 +101,14 @@ pub fn pass<const ROWS: usize, const COLUMNS: usize>(
             ".endm",
             // On the stack: what is common, the place among the codes, the totals, r6 and r7, the codes' end.
             "push {{r6, r7, r9}}",
-            "movs r4, #0",
-            "movs r5, #0",
-            "movs r6, #0",
-            "movs r7, #0",
+            "mov r6, r10",
+            "mov r7, r11",
             "mov r8, #0",
             "push {{r0, r4-r8}}",
             "ldm r3, {{r4-r7}}",
             "push {{r4-r7}}",
-            "ldm r9, {{r4-r8}}", // the undriven codes are behind the others
+            "ldm lr, {{r4-r8}}", // the undriven codes
             "push {{r4-r8}}",
-            "mov r12, #0", // the peak
             "2:",
             "ldm r0!, {{r3-r7}}", // codes, then net codes
             "str r0, [sp, #36]",
@@ -189,13 +204,14 @@ pub fn pass<const ROWS: usize, const COLUMNS: usize>(
             boost_drop = const BOOST_DROP,
             fine_drop = const TARE_BITS - Curve::FINE_BITS,
             largest_bits = const Curve::LARGEST_BITS,
-            inout("r0") codes.rows.as_ptr() => largest,
+            inout("r0") codes.as_ptr() => largest,
             inout("r1") rows.as_mut_ptr() => _,
             inout("r2") taxels.as_mut_ptr() => _,
             inout("r3") common => first,
-            out("r4") second, out("r5") running,
-            out("r8") _, in("r9") codes.rows.as_ptr_range().end,
-            out("r10") _, out("r11") _, out("r12") peak, out("lr") _,
+            inout("r4") total.first => second, inout("r5") second => running,
+            out("r8") _, in("r9") codes.as_ptr_range().end,
+            inout("r10") total.running => _, inout("r11") total.largest => _, inout("r12") total.peak => peak,
+            inout("lr") undriven.as_ptr() => _,
         );
     }
     Total { first, second, running, largest, peak }

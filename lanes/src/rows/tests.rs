@@ -60,8 +60,12 @@ fn is_what_its_parts_say<const ROWS: usize, const COLUMNS: usize>(mix: &mut Mix,
     let (codes, mut rows, common) = bench::<ROWS, COLUMNS>(mix, top);
     let mut taxels = [[0; COLUMNS]; ROWS];
     let mut again = (rows, taxels);
-    let total = pass(&codes, &mut rows, &common, &mut taxels);
-    assert_eq!(portable_pass(&codes, &mut again.0, &common, &mut again.1), total);
+    let total = pass(&codes, &mut rows, &common, &mut taxels, 0..ROWS, Total::ZERO);
+    let split = mix.below(ROWS as u32 + 1) as usize;
+    let parts = [0..split, split..ROWS]
+        .into_iter()
+        .fold(Total::ZERO, |total, range| portable_pass(&codes, &mut again.0, &common, &mut again.1, range, total));
+    assert_eq!(parts, total);
     assert_eq!(again, (rows, taxels));
     let (drop, undriven) = (sum_drop(ROWS, COLUMNS), &codes.undriven);
     let (mut first, mut second, mut running, mut peak, mut all) = (0, 0, 0, 0, [0; 2]);
@@ -135,8 +139,12 @@ fn a_pass_with_a_curve_is_its_formula() {
         for _ in 0..50 {
             let (codes, mut rows, common) = bench::<ROWS, COLUMNS>(&mut mix, false);
             let (mut line, mut taxels) = ([[0; COLUMNS]; ROWS], [[0; COLUMNS]; ROWS]);
-            pass(&codes, &mut rows, &common, &mut line);
-            let total = pass(&codes, &mut rows, &Common { curve: Curve::new(PERMILLE), ..common }, &mut taxels);
+            pass(&codes, &mut rows, &common, &mut line, 0..ROWS, Total::ZERO);
+            let common = Common { curve: Curve::new(PERMILLE), ..common };
+            let split = mix.below(ROWS as u32 + 1) as usize;
+            let total = [0..split, split..ROWS]
+                .into_iter()
+                .fold(Total::ZERO, |total, range| pass(&codes, &mut rows, &common, &mut taxels, range, total));
             let (mut first, mut second, mut running) = (0, 0, 0);
             for ((row, line), taxels) in rows.iter().zip(line).zip(taxels) {
                 for (column, taxel) in taxels.into_iter().enumerate() {
@@ -166,7 +174,7 @@ fn a_half_of_the_array_at_the_top_fits() {
     fn upper<const ROWS: usize, const COLUMNS: usize>() {
         let (mut codes, mut rows, common) = bench::<ROWS, COLUMNS>(&mut Mix(1), true);
         codes.rows.iter_mut().take(ROWS / 2).for_each(|row| *row = [0; COLUMNS]);
-        let total = pass(&codes, &mut rows, &common, &mut [[0; COLUMNS]; ROWS]);
+        let total = pass(&codes, &mut rows, &common, &mut [[0; COLUMNS]; ROWS], 0..ROWS, Total::ZERO);
         let weighted = |row: usize| 2 * row as i64 + 1 - ROWS as i64;
         let line = i64::from(total.first) / (ROWS - ROWS / 2) as i64;
         let exact = (ROWS / 2..ROWS).map(|row| weighted(row) * line).sum::<i64>() / 4;

@@ -100,7 +100,7 @@ fn make_all(fingers: &[Finger], task: Task, place_mm: Option<fn(f64, f64) -> f64
     })
 }
 
-sim::sizes!(valid_presses_complete, presses_complete(10), presses_complete(30));
+sim::sizes!(valid_presses_complete, presses_complete(10), presses_complete(60));
 
 /// Every press completes and gives a modulus: most within two reported sigmas, and with errors that are not smaller
 /// than noise allows.
@@ -126,7 +126,9 @@ fn presses_complete(count: usize) {
     errors_percent.sort_by(f64::total_cmp);
     let (median, worst) = (errors_percent[count / 2], errors_percent[count - 1]);
     println!("error of the modulus: median {median:.2} %, worst {worst:.2} %; {within} of {count} within two sigmas");
-    assert!((0.1..4.0).contains(&median) && worst < 10.0 && 10 * within >= 9 * count);
+    assert!((0.1..4.0).contains(&median) && worst < 10.0);
+    // A share of ten presses says little: 95 of 100 are expected.
+    assert!(count < 60 || 10 * within >= 9 * count);
     let rms = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>().sqrt();
     let honest = rms(&sigmas_percent) / rms(&errors_percent);
     assert!((0.5..3.0).contains(&honest), "the uncertainty is {honest:.2} times the error");

@@ -159,7 +159,7 @@ pub struct Array<const ROWS: usize, const COLUMNS: usize> {
 struct SoFar {
     /// Number of the frame.
     sequence: u32,
-    /// Number of rows, from the first; after all of them the next frame begins.
+    /// Number of rows, from the first. After none and after all of them a frame is read from its start.
     rows: usize,
     /// Sums over these rows.
     total: Total,
@@ -243,7 +243,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
     fn read_rows(&mut self, frame: &Frame<ROWS, COLUMNS>, to: usize, config: &Config) {
         let Frame { codes, sequence } = frame;
         let mut so_far = self.so_far;
-        if so_far.rows >= ROWS || so_far.sequence != *sequence {
+        if !(1..ROWS).contains(&so_far.rows) || so_far.sequence != *sequence {
             let undriven_max = highest(&codes.undriven);
             so_far = SoFar { sequence: *sequence, rows: 0, total: Total::ZERO, undriven_max };
         }

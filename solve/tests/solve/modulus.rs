@@ -36,9 +36,10 @@ fn summary(name: &str, errors: &[[f64; 2]]) -> [f64; 5] {
     summary
 }
 
-#[test]
-fn three_presses_give_a_better_one() {
-    let [median, worst, _, sigma, within] = summary("three presses", &errors(200..203, 3, &plan()));
+sim::sizes!(three_presses_give_a_better_one, better(200..202), better(200..203));
+
+fn better(seeds: std::ops::Range<u64>) {
+    let [median, worst, _, sigma, within] = summary("three presses", &errors(seeds, 3, &plan()));
     assert!(median < 1.0 && worst < 4.0 && within >= 2.0 && sigma < 1.4, "{median} {worst} {within} {sigma}");
 }
 
@@ -126,9 +127,10 @@ fn press(draw: &Draw, moves_mm_per_s: f64, plan: &[Part]) -> Press {
     finger.press(plan, 8.0)
 }
 
-#[test]
-fn a_soft_plate_is_measured() {
-    for seed in 0..2 {
+sim::sizes!(a_soft_plate_is_measured, soft_plates(0..1), soft_plates(1..2));
+
+fn soft_plates(seeds: std::ops::Range<u64>) {
+    for seed in seeds {
         for yields_mm_per_n in [0.0, 0.03, 0.06] {
             let draw = drawn(seed, yields_mm_per_n);
             let (found, [error, _]) = solved(&draw, &[press(&draw, 0.0, &plan())]);

@@ -149,9 +149,10 @@ fn every_fault_of_a_series_is_named() {
     );
 }
 
-/// A press of the core with wrong numbers in any place, under a right check.
-#[test]
-fn a_press_with_changed_bytes_is_solved_or_refused() {
+// A press of the core with wrong numbers in any place, under a right check.
+sim::sizes!(a_press_with_changed_bytes_is_solved_or_refused, changed_bytes(&[4]), changed_bytes(&[1, 7]));
+
+fn changed_bytes(seeds: &[u64]) {
     let mut bench: Bench = Bench::default();
     bench.tare();
     bench.run(0.05);
@@ -160,7 +161,7 @@ fn a_press_with_changed_bytes_is_solved_or_refused() {
     let length = step_bytes(100);
     let records = ((bytes.len() - HEAD) / length) as u32;
     assert!(modulus(&[press(bytes, PARAMS).expect("a press")]).is_ok());
-    for seed in [1, 4, 7] {
+    for &seed in seeds {
         let mut rng = fastrand::Rng::with_seed(seed);
         let mut body = bytes[HEAD..].to_vec();
         for _ in 0..10 << seed {

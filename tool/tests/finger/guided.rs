@@ -8,7 +8,6 @@ use serde_json::{Value, json};
 use std::fs;
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::process::Stdio;
-use std::time::{Duration, Instant};
 
 /// Options of a calibration without questions and without the pause of a real sensor.
 const QUICK: [&str; 6] = ["calibrate", "--no-wait", "--pause-s", "0", "--within-s", "3600"];
@@ -125,9 +124,11 @@ fn a_killed_session_resumes_where_it_was() {
     finger.refuses(&calibrate, &["press-1.fts: the series has"]);
 }
 
-/// KILL after each packet of a session that has all records: what is left are the write and the tare.
-#[test]
-fn a_write_that_is_killed_leaves_old_or_new_parameters_and_is_completed() {
+// KILL after packets of a session that has all records: what is left are the write and the tare. Usually after each odd number of
+// packets, one of which lies between the gains and the parameters.
+sim::sizes!(a_write_that_is_killed_leaves_old_or_new_parameters_and_is_completed, write_killed(2), write_killed(1));
+
+fn write_killed(every: usize) {
     let finger = Served::patient("wall");
     let session = finger.file("written");
     let calibrate = [&QUICK[..], &["--presses", "1", "--no-scale", "--session", &session]].concat();
@@ -135,7 +136,7 @@ fn a_write_that_is_killed_leaves_old_or_new_parameters_and_is_completed() {
     let wanted = finger.json(&calibrate)["after"].clone();
     let applied = [&calibrate[..], &["--apply"]].concat();
     let (mut seen, mut completed) = ([0; 2], 0);
-    for packets in 0.. {
+    for packets in (every as u64 - 1..).step_by(every) {
         if !finger.killed_after(packets, &applied) {
             break;
         }
@@ -159,9 +160,10 @@ fn a_write_that_is_killed_leaves_old_or_new_parameters_and_is_completed() {
     assert_eq!((&parameters(&finger)["modulus_pa"], gains(&finger)), (&wanted["modulus_pa"], wanted["gains"].clone()));
 }
 
-/// A restart before every third packet of a write that is saved: flash has all of it or nothing, and a run that ends well has it.
-#[test]
-fn a_restart_amid_a_write_is_no_success_and_saves_no_half() {
+// A restart before packets of a write that is saved: flash has all of it or nothing, and a run that ends well has it.
+sim::sizes!(a_restart_amid_a_write_is_no_success_and_saves_no_half, restarted_every(12), restarted_every(3));
+
+fn restarted_every(every: usize) {
     let finger = Served::patient("wall");
     let [session, old, new] = ["restarted", "old.toml", "new.toml"].map(|name| finger.file(name));
     finger.done(&["params", "save"]);
@@ -173,7 +175,7 @@ fn a_restart_amid_a_write_is_no_success_and_saves_no_half() {
     let is = |file: &str| finger.json(&["params", "diff", file]) == json!({});
     for arguments in [&calibrate[..], &["params", "restore", &new, "--save"]] {
         let mut seen = [0; 3];
-        for packets in (0..).step_by(3) {
+        for packets in (0..).step_by(every) {
             finger.done(&["params", "restore", &old, "--save"]);
             finger.command(&format!("restart after {packets}"));
             let (code, found, said) = output(&finger, arguments);
@@ -383,11 +385,8 @@ fn answers_come_after_their_question_and_a_signal_ends_half_of_one() {
     pipe.write_all(b"y").expect("it reads");
     Served::wait_for(|| rustix::io::ioctl_fionread(&*pipe).expect("a pipe") == 0);
     Served::interrupt(&child);
-    let until = Instant::now() + Duration::from_secs(60);
-    while child.try_wait().expect("it was started").is_none() {
-        assert!(Instant::now() < until, "a signal is not seen");
-        std::thread::sleep(Served::LOOK);
-    }
+    // Not `wait`, which would close the pipe and so end the answer.
+    Served::wait_for(|| child.try_wait().expect("it was started").is_some());
     assert_eq!(child.wait().expect("it ends").code(), Some(130));
 }
 

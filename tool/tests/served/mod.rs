@@ -323,7 +323,7 @@ impl Served {
     }
 
     /// Waits for what another program does, and leaves the core to it between two looks.
-    pub fn wait_for(happened: impl Fn() -> bool) {
+    pub fn wait_for(mut happened: impl FnMut() -> bool) {
         while !happened() {
             std::thread::sleep(Self::LOOK);
         }

@@ -1,6 +1,6 @@
 """Ends every moving method and every moving example at instants drawn by a fixed seed, and looks at the true force.
 
-`INSTANTS=10` tries ten instants of each end.
+One end of each program; `INSTANTS=10` tries ten instants of every end.
 """
 
 import os
@@ -42,7 +42,7 @@ PROGRAMS: Dict[str, List[str]] = {
 }
 # Signals, and a cable that is pulled out.
 ENDS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL, None]
-INSTANTS = int(os.environ.get("INSTANTS", "1"))
+INSTANTS = int(os.environ.get("INSTANTS", "0"))
 LATEST_S = 1.5  # between the first motion and the end
 
 
@@ -58,9 +58,10 @@ class Interrupted(OnServed):
         return child
 
     def test_ends_leave_no_force(self) -> None:
-        for name in PROGRAMS:
+        for number, name in enumerate(PROGRAMS):
+            ends = ENDS * INSTANTS or [ENDS[number % len(ENDS)]]
             draw, most_n, running = random.Random(name), 0.0, 0
-            for end in ENDS * INSTANTS:
+            for end in ends:
                 with self.subTest(name, end=end):
                     self.served.stop()
                     self.served = self.serve(*self.ARGUMENTS)
@@ -80,7 +81,7 @@ class Interrupted(OnServed):
                     most_n = max(most_n, self.served.truths()[1].force_n)
                     self.assert_released(f"{name} {end!r} {told}")
             self.assertGreater(running, 0, f"{name} never ran")
-            print(f"{name}: {len(ENDS) * INSTANTS} ends, {running} while it ran; at most {most_n} N left", flush=True)
+            print(f"{name}: {len(ends)} ends, {running} while it ran; at most {most_n} N left", flush=True)
 
     def test_every_example_tells_its_options(self) -> None:
         for path in sorted((PYTHON / "examples").glob("*.py")):

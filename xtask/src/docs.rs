@@ -107,7 +107,8 @@ pub const PACKAGES: [&str; 2] = ["fingertip-lanes", "fingertip"];
 /// Version of the packages, as in the workspace's manifest.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// Makes the packages and runs the tests of `host-tests/outside`, which depends on them.
+/// Makes the packages and runs the tests of `host-tests/outside`, which depends on them; checks the Python package's types
+/// and wheel.
 pub fn package(console: &mut Console) -> Result<()> {
     let mut package = console::cargo("package");
     // The project outside compiles them.
@@ -133,7 +134,15 @@ pub fn package(console: &mut Console) -> Result<()> {
     let lock = outside.join("Cargo.lock");
     fs::copy(host::root().join("Cargo.lock"), &lock).with_context(|| format!("cannot write {}", host::shown(&lock)))?;
     test.arg("--manifest-path").arg(outside.join("Cargo.toml")).arg("--target-dir").arg(host::target().join("outside"));
-    console.run(&mut test)
+    console.run(&mut test)?;
+
+    let python = install::bus_python(console)?;
+    // The wheel's builder reads the sources of every platform, also those that no build here needs.
+    console.prepare(console::cargo("fetch").args(["--locked", "--quiet"]))?;
+    let serve = host::SERVE.build(console)?;
+    let mut test = std::process::Command::new(python);
+    test.args(["-B", "-m", "unittest", "test_package"]).current_dir(host::root().join("python").join("tests"));
+    console.run(test.env("PYTHONPATH", "..").env("FINGERTIP_SERVE", serve.get_program()))
 }
 
 // The checker of licences and sources, installed in the build folder.

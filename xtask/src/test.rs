@@ -53,9 +53,7 @@ pub fn run(args: &Args, choice: Choice) -> Result<()> {
     });
     stages.stage("Python package on a served finger", |console| {
         let python = install::bus_python(console)?;
-        // The wheel's builder reads the sources of every platform, also those that no build here needs.
-        console.prepare(console::cargo("fetch").args(["--locked", "--quiet"]))?;
-        let mut command = host::tests(&["--test", "served", "--", "--ignored"]);
+        let mut command = host::tests(&["--test", "served", "--", "--ignored", "--skip", "long_"]);
         host::test(command.env("FINGERTIP_PYTHON", &python), console)
     });
     stages.stage("reports in a browser", |console| {
@@ -69,7 +67,9 @@ pub fn run(args: &Args, choice: Choice) -> Result<()> {
 /// and fits.
 fn long(mut stages: Stages, choice: Choice) -> Result<()> {
     stages.stage("long core and host tests", |console| {
-        host::test(&mut host::tests(&["--no-fail-fast", "--", "--ignored", "long_"]), console)
+        let python = install::bus_python(console)?;
+        let mut command = host::tests(&["--no-fail-fast", "--", "--ignored", "long_"]);
+        host::test(command.env("FINGERTIP_PYTHON", &python), console)
     });
     stages.stage("long tests on the virtual board", |console| {
         let image = image::firmware(choice, console)?;

@@ -169,16 +169,21 @@ fn moved_while_held(board: &mut Bench, goal_mn: i32, moved_mm: f64) {
     lets_go(board, 2.0, &format!("goal {goal_mn} mN, {moved_mm} mm, held {held:.3} N"));
 }
 
-/// The loop follows a held object that is pushed towards it; a release to the surface of the first touch would hold it.
-#[test]
-fn an_object_that_came_along_while_it_was_held_is_let_go() {
-    for goal_mn in [300, 1_000, 3_000] {
+// The loop follows a held object that is pushed towards it; a release to the surface of the first touch would hold it.
+sim::sizes!(
+    an_object_that_came_along_while_it_was_held_is_let_go,
+    let_go_of_what_came_along(&[1_000]),
+    let_go_of_what_came_along(&[300, 3_000])
+);
+
+fn let_go_of_what_came_along(goals_mn: &[i32]) {
+    for &goal_mn in goals_mn {
         for moved_mm in [1.0, 1.5, 2.0, 2.5] {
             moved_while_held(&mut ready(), goal_mn, moved_mm);
         }
     }
     for seed in 0..6 {
-        for goal_mn in [1_000, 3_000] {
+        for &goal_mn in goals_mn.iter().filter(|goal_mn| **goal_mn >= 1_000) {
             moved_while_held(&mut ordinary(seed, 1.0, 4, 2), goal_mn, 2.5);
         }
     }

@@ -202,16 +202,11 @@ fn holds<const ROWS: usize, const COLUMNS: usize>(pitch_um: i32) {
     }
 }
 
-#[test]
-fn an_array_of_any_shape_holds_a_force() {
-    holds::<3, 3>(4_000);
-    holds::<3, 5>(4_000);
-    holds::<4, 4>(3_500);
-    holds::<8, 8>(1_750);
-    holds::<10, 10>(1_500);
-    holds::<16, 16>(900);
-    holds::<16, 32>(900);
-}
+sim::sizes!(
+    an_array_of_any_shape_holds_a_force,
+    (holds::<3, 3>(4_000), holds::<3, 5>(4_000), holds::<16, 32>(900)),
+    (holds::<4, 4>(3_500), holds::<8, 8>(1_750), holds::<10, 10>(1_500), holds::<16, 16>(900))
+);
 
 /// The sum is too low for a contact partly off the array: the fit estimates the rest. Returns the share that is off.
 fn over_the_edge<const ROWS: usize, const COLUMNS: usize>(
@@ -229,9 +224,14 @@ fn over_the_edge<const ROWS: usize, const COLUMNS: usize>(
     hidden
 }
 
-#[test]
-fn the_fit_finds_what_an_edge_hides() {
-    for fit_level in [FitLevel::OneRow, FitLevel::TwoRows, FitLevel::FiveRows, FitLevel::AllRows] {
+sim::sizes!(
+    the_fit_finds_what_an_edge_hides,
+    find_what_an_edge_hides(&[FitLevel::OneRow]),
+    find_what_an_edge_hides(&[FitLevel::TwoRows, FitLevel::FiveRows, FitLevel::AllRows])
+);
+
+fn find_what_an_edge_hides(levels: &[FitLevel]) {
+    for &fit_level in levels {
         let hidden = [
             over_the_edge::<8, 8>(1_500, [4.5, 0.0], fit_level),
             over_the_edge::<8, 8>(1_500, [-2.0, -4.0], fit_level),
@@ -265,9 +265,10 @@ fn held<const ROWS: usize, const COLUMNS: usize>(pitch_um: i32, frames_per_s: u3
 /// A population's promise: no force is more than 150 mN above the goal, and 300 mN for each N of it.
 const OVER_N: f64 = 0.45;
 
-#[test]
-fn a_force_is_held_at_every_rate() {
-    for frames_per_s in [100, 200, 500, 1_000, 2_000, 5_000, 10_000] {
+sim::sizes!(a_force_is_held_at_every_rate, hold_at(&[100, 1_000]), hold_at(&[200, 500, 2_000, 5_000, 10_000]));
+
+fn hold_at(rates: &[u32]) {
+    for &frames_per_s in rates {
         let mut runs = vec![held::<6, 4>(2_000, frames_per_s, 2), held::<10, 10>(1_500, frames_per_s, 2)];
         if frames_per_s <= 1_000 {
             runs.push(held::<16, 32>(900, frames_per_s, 1));
@@ -365,11 +366,12 @@ fn fingers<const ROWS: usize, const COLUMNS: usize>(pitch_um: i32, frames_per_s:
     (inside, worst)
 }
 
-/// More with `FINGERS=100 cargo test -p host-tests --test all the_envelope -- --nocapture`.
-#[test]
-fn the_envelope_holds_for_other_arrays_and_rates() {
+// More with `FINGERS=100 cargo test -p host-tests --test all the_envelope -- --include-ignored --nocapture`.
+sim::sizes!(the_envelope_holds_for_other_arrays_and_rates, envelope(&[1_000]), envelope(&[2_000, 5_000]));
+
+fn envelope(rates: &[u32]) {
     let count = std::env::var("FINGERS").map_or(4, |count| count.parse().expect("a number of fingers"));
-    for frames_per_s in [1_000, 2_000, 5_000] {
+    for &frames_per_s in rates {
         let mut all = vec![fingers::<4, 4>(3_500, frames_per_s, count), fingers::<6, 4>(2_000, frames_per_s, count)];
         // With the shipped converters a scan of 17 slots takes longer than 200 us.
         if frames_per_s < 5_000 {

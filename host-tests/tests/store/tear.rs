@@ -140,7 +140,7 @@ fn step(words: usize) -> impl Strategy<Value = Step> {
     prop_oneof![(0..8usize).prop_map(Step::Live), dies]
 }
 
-sim::sizes!(a_board_has_the_old_values_or_the_new_ones, live(2_000), live(60_000));
+sim::sizes!(a_board_has_the_old_values_or_the_new_ones, live(500), live(60_000));
 
 /// Boards with records of any firmware in both sectors, which start, save and lose their power.
 fn live(boards: u32) {

@@ -47,8 +47,8 @@ fn interrupted((yield_mm_per_n, goal_n, losses): Held, happens: &str, interrupt:
 
 sim::sizes!(
     goal_zero_releases_soft_objects_after_a_torque_interruption,
-    torque_interrupted(0..20),
-    torque_interrupted(20..56)
+    torque_interrupted(0..6),
+    torque_interrupted(6..56)
 );
 
 fn torque_interrupted(seeds: Range<u64>) {
@@ -67,11 +67,16 @@ fn torque_interrupted(seeds: Range<u64>) {
     judge("soft objects, torque interrupted", "N", &cases);
 }
 
-/// Goal 0 for the first time, another goal for the second one, and 0 for good.
-#[test]
-fn goal_zero_releases_soft_objects_after_a_goal_interruption() {
+// Goal 0 for the first time, another goal for the second one, and 0 for good.
+sim::sizes!(
+    goal_zero_releases_soft_objects_after_a_goal_interruption,
+    goal_interrupted(100..106),
+    goal_interrupted(106..135)
+);
+
+fn goal_interrupted(seeds: Range<u64>) {
     let fixed = with_and_without_losses([(0.7, 5.0), (1.0, 7.0)]).map(|held| (held, 0.5, [0.003; 2]));
-    let drawn = (100..135).map(|seed| {
+    let drawn = seeds.map(|seed| {
         let mut rng = Rng::with_seed(seed);
         let held = drawn(&mut rng);
         (held, uniform(&mut rng, 0.1, 1.0) * held.1, [0; 2].map(|_| log_uniform(&mut rng, 0.001, 0.03)))
@@ -227,35 +232,34 @@ fn a_push_against_a_released_tip_does_not_change_the_next_goal() {
     judge("a push against a released tip, then 1 N: off by", "N", &cases);
 }
 
-/// A residual reading after a contact does not move a tip that touches nothing.
-#[test]
-fn a_residual_reading_does_not_drive_the_tip_through_the_air() {
+// A residual reading after a contact does not move a tip that touches nothing.
+sim::sizes!(a_residual_reading_does_not_drive_the_tip_through_the_air, residual_after(0.5), residual_after(2.0));
+
+fn residual_after(hold_s: f64) {
     let remembering = "[effects.hysteresis]\nwidth_percent = 2\n[effects.creep]\nrate_percent_per_decade = 2\n";
     let mut cases = Vec::new();
-    for hold_s in [0.5, 2.0] {
-        for away_s in [0.0, 0.001, 0.003, 0.01, 0.03, 0.1] {
-            for goal_n in [1.0, 3.0] {
-                let mut finger = finger(&(object(5.0, 0.0) + LOSSES + remembering));
-                press(&mut finger, goal_n, hold_s);
-                finger.place_object(8.0);
-                let begun_s = finger.time_s();
-                let (mut ended_s, mut fastest) = (begun_s, 0.0_f64);
-                while finger.time_s() < begun_s + 2.0 {
-                    if finger.time_s() >= begun_s + away_s {
-                        set_goal(&mut finger, 0.0);
-                    }
-                    finger.step();
-                    let truth = finger.truth();
-                    if truth.force_n > 0.0 {
-                        ended_s = finger.time_s();
-                    } else if finger.time_s() > ended_s + 0.02 {
-                        fastest = fastest.max(truth.speed_mm_per_s.abs());
-                    }
+    for away_s in [0.0, 0.001, 0.003, 0.01, 0.03, 0.1] {
+        for goal_n in [1.0, 3.0] {
+            let mut finger = finger(&(object(5.0, 0.0) + LOSSES + remembering));
+            press(&mut finger, goal_n, hold_s);
+            finger.place_object(8.0);
+            let begun_s = finger.time_s();
+            let (mut ended_s, mut fastest) = (begun_s, 0.0_f64);
+            while finger.time_s() < begun_s + 2.0 {
+                if finger.time_s() >= begun_s + away_s {
+                    set_goal(&mut finger, 0.0);
                 }
-                let fault = finger.status().fault;
-                let what = format!("{goal_n} N for {hold_s} s, goal 0 {away_s} s after the object is away, {fault:?}");
-                cases.push(Case::new(what, fastest, 1.5 * APPROACH_MM_PER_S));
+                finger.step();
+                let truth = finger.truth();
+                if truth.force_n > 0.0 {
+                    ended_s = finger.time_s();
+                } else if finger.time_s() > ended_s + 0.02 {
+                    fastest = fastest.max(truth.speed_mm_per_s.abs());
+                }
             }
+            let fault = finger.status().fault;
+            let what = format!("{goal_n} N for {hold_s} s, goal 0 {away_s} s after the object is away, {fault:?}");
+            cases.push(Case::new(what, fastest, 1.5 * APPROACH_MM_PER_S));
         }
     }
     judge("speed without contact", "mm/s", &cases);
@@ -301,10 +305,11 @@ fn a_tare_while_something_presses_does_not_change_the_force() {
     judge("torque after a tare while something presses: the largest force", "N", &cases);
 }
 
-/// Hysteresis makes the reading stay while the tip follows the object: the array is not frozen.
-#[test]
-fn hysteresis_on_a_moving_object_is_no_frozen_array() {
-    let cases = cores::map(0..80, |seed| {
+// Hysteresis makes the reading stay while the tip follows the object: the array is not frozen.
+sim::sizes!(hysteresis_on_a_moving_object_is_no_frozen_array, is_not_frozen(0..20), is_not_frozen(20..80));
+
+fn is_not_frozen(seeds: Range<u64>) {
+    let cases = cores::map(seeds, |seed| {
         let mut rng = Rng::with_seed(seed);
         let (width_percent, goal_n) = (uniform(&mut rng, 2.0, 10.0), uniform(&mut rng, 0.5, 4.0));
         let (mm_per_s, way_mm) = (uniform(&mut rng, 10.0, 60.0), uniform(&mut rng, 0.5, 2.0));

@@ -185,7 +185,7 @@ const TROUBLES: [Trouble; 7] = [
 
 sim::sizes!(
     what_moves_yields_or_vanishes_ends_a_press_within_its_limits,
-    presses_end_within_limits(2),
+    presses_end_within_limits(1),
     presses_end_within_limits(12)
 );
 
@@ -246,14 +246,14 @@ fn driven(name: &str, count: usize, task: Task, changes: &[(&str, &str)]) -> usi
     made.iter().filter(|made| made.status.state == MeasureState::Done).count()
 }
 
-sim::sizes!(strokes_in_free_air_stay_near_the_origin_and_complete, strokes_complete(4), strokes_complete(40));
+sim::sizes!(strokes_in_free_air_stay_near_the_origin_and_complete, strokes_complete(2), strokes_complete(40));
 
 fn strokes_complete(count: usize) {
     let done = driven("free air", count, Task::Strokes, &[]);
     assert!(10 * done >= 9 * count, "{done}");
 }
 
-sim::sizes!(jogs_complete, complete_jogs(8), complete_jogs(20));
+sim::sizes!(jogs_complete, complete_jogs(4), complete_jogs(20));
 
 fn complete_jogs(count: usize) {
     let done = driven("jogs", count, Task::Jog, &[("direction_confirmed = 1", "direction_confirmed = 0")]);
@@ -262,7 +262,7 @@ fn complete_jogs(count: usize) {
 
 sim::sizes!(
     an_object_in_the_way_is_pressed_with_no_more_than_300_mn,
-    strokes_stop_at_an_object(2),
+    strokes_stop_at_an_object(1),
     strokes_stop_at_an_object(20)
 );
 

@@ -1,6 +1,6 @@
 //! Random sequences of requests and of motions of the object, judged by the true force and the table of modes.
 //!
-//! The first sequences that fail are shortened and printed. `SEQUENCES=n` tries n in all, the first 75 of them without
+//! The first sequences that fail are shortened and printed. `SEQUENCES=n` tries n in all, the first 40 of them without
 //! `--ignored`. The core checks its arithmetic for overflow:
 //! `SEQUENCES=2000 cargo test -p sim --test fingers sequences -- --ignored --nocapture`
 
@@ -149,8 +149,8 @@ fn shortened(mut sequence: Sequence, mut reason: String) -> (Sequence, String) {
 
 sim::sizes!(
     random_sequences_keep_the_force_in_bounds_and_the_table_of_modes,
-    keep_the_rules(0..USUAL / 8),
-    keep_the_rules(USUAL / 8..number("SEQUENCES", USUAL).max(USUAL / 8))
+    keep_the_rules(0..USUAL / 15),
+    keep_the_rules(USUAL / 15..number("SEQUENCES", USUAL).max(USUAL / 15))
 );
 
 fn keep_the_rules(seeds: Range<u64>) {

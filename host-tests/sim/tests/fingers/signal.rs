@@ -31,11 +31,12 @@ fn lost(modulus_kpa: f64, goal_n: f64, freezes: bool, before_touch_s: Option<f64
     Case::new(format!("{what}: {:?}", finger.status().fault), peak_n, most_n(goal_n))
 }
 
-#[test]
-fn a_signal_that_is_lost_stops_the_motor_in_time() {
+sim::sizes!(a_signal_that_is_lost_stops_the_motor_in_time, stops_in_time(&[250.0]), stops_in_time(&[150.0, 400.0]));
+
+fn stops_in_time(moduli_kpa: &[f64]) {
     let ways = [(false, None), (false, Some(0.002)), (false, Some(0.03)), (true, Some(0.002)), (true, Some(0.03))];
     let mut tasks = Vec::new();
-    for modulus_kpa in [150.0, 250.0, 400.0] {
+    for &modulus_kpa in moduli_kpa {
         for goal_n in [0.5, 1.0, 3.0, 7.0] {
             tasks.extend(ways.map(|(freezes, before_touch_s)| (modulus_kpa, goal_n, freezes, before_touch_s)));
         }
@@ -119,7 +120,7 @@ fn a_taxel_at_the_edge_of_saturation_does_not_shake_the_motor() {
     judge("a taxel at the edge of saturation", "% or mN", &cases.into_iter().flatten().collect::<Vec<_>>());
 }
 
-sim::sizes!(a_tilted_contact_near_the_edge_is_not_pressed_too_hard, tilted_contacts(0..35), tilted_contacts(35..100));
+sim::sizes!(a_tilted_contact_near_the_edge_is_not_pressed_too_hard, tilted_contacts(0..12), tilted_contacts(12..100));
 
 fn tilted_contacts(seeds: Range<u64>) {
     let cases = cores::map(seeds, |seed| {
@@ -223,14 +224,16 @@ fn leave_a_third(seeds: Range<u64>) {
 }
 
 #[test]
-fn a_taxel_on_the_brink_of_being_dead_does_not_end_a_press() {
+#[ignore = "long: cargo xtask test --long"]
+fn long_a_taxel_on_the_brink_of_being_dead_does_not_end_a_press() {
     // Its preload is as low as the least that counts: with the noise it is bad in a frame of fifty.
     let calibrated = Calibrated::of(&worn(11, OFF)).expect("it ends");
     assert!(!calibrated.refused.iter().any(|why| why.starts_with("press")), "{:?}", calibrated.refused);
 }
 
 #[test]
-fn dead_taxels_under_the_contact_do_not_keep_the_scale_from_being_found() {
+#[ignore = "long: cargo xtask test --long"]
+fn long_dead_taxels_under_the_contact_do_not_keep_the_scale_from_being_found() {
     // An array that reads a tenth too much, with nothing but noise, dead taxels and friction.
     let text = [
         ("rms_percent = 10.0", "rms_percent = 0.0"),
@@ -285,11 +288,12 @@ fn long_ordinary_fingers_hold_closer_once_they_are_calibrated() {
     assert!(after[0] < 0.4 && after[1] < 0.47 && after[2] < 0.9 && after[0] < before[0], "{before:?} {after:?}");
 }
 
+sim::sizes!(the_term_takes_most_of_an_hour_in_the_hot_away, hot_hours(0..2), hot_hours(2..8));
+
 /// The largest error of a force that is held for an hour in the heat.
-#[test]
-fn the_term_takes_most_of_an_hour_in_the_hot_away() {
+fn hot_hours(numbers: Range<usize>) {
     // Shares of the true coefficients and of the chip's warming, its time constant over the array's 1.5 s, the bound.
-    for (share, chip, time_s, bounds) in [
+    let hours = [
         (0.0, 1.0, 1.5, 238.0..250.0),
         (1.0, 1.0, 1.5, 0.0..30.0),
         (0.8, 1.0, 1.5, 0.0..70.0),
@@ -298,7 +302,8 @@ fn the_term_takes_most_of_an_hour_in_the_hot_away() {
         (1.0, 1.2, 1.5, 0.0..70.0),
         (1.0, 1.0, 0.75, 0.0..100.0),
         (1.0, 1.0, 3.0, 0.0..100.0),
-    ] {
+    ];
+    for (share, chip, time_s, bounds) in &hours[numbers] {
         let keys = [
             format!("controller.array_gain_ppm_per_k={}", 3_600.0 * share),
             format!("controller.array_zero_pa_per_k={}", 10.0 * share),

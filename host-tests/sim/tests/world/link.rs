@@ -141,15 +141,16 @@ fn after(steps: u32, step_s: f64) -> Clock {
     clock
 }
 
-#[test]
-fn after_more_than_a_day_of_frames_it_is_what_the_timer_says_to_the_last_bit() {
-    let slot_s = SLOT_TICKS / TIMER_HZ;
-    // In as many slots as there are ticks in a second, 1523 s are whole. In six times as many frames, of 11 slots, 28
-    // hours.
-    assert_eq!(after(168_000_000, slot_s), Clock::from_start(1523.0));
-    let day = after(6 * 168_000_000, 11.0 * slot_s);
-    assert_eq!(day, Clock::from_start(100_518.0));
-    assert_eq!(day.time_s(), 100_518.0);
+// In as many slots as there are ticks in a second, 1523 s are whole. In six times as many frames, of 11 slots, 28 hours.
+sim::sizes!(
+    after_more_than_a_day_of_frames_it_is_what_the_timer_says_to_the_last_bit,
+    is_after(168_000_000, 1.0, 1523.0),
+    is_after(6 * 168_000_000, 11.0, 100_518.0)
+);
+
+fn is_after(frames: u32, slots: f64, seconds: f64) {
+    let clock = after(frames, slots * SLOT_TICKS / TIMER_HZ);
+    assert_eq!((clock, clock.time_s()), (Clock::from_start(seconds), seconds));
 }
 
 #[test]

@@ -14,7 +14,7 @@ const ALERT: u8 = 0x80;
 /// Wait for a device that is not expected to be there.
 const PROBE: Duration = Duration::from_secs(1);
 /// Attempts on a noisy line for requests that may be repeated.
-pub const TRIES: usize = 3;
+const TRIES: usize = 3;
 /// A status packet to a broadcast Ping, and bits of a byte: what each ID waits for those below.
 const PING_BITS: u32 = 14 * 10;
 /// No bus is slower: all IDs would take minutes to answer.

@@ -6,7 +6,7 @@
 //! Packets of the commander, and writes, go before reads of others: they wait for one exchange at most.
 
 use super::{Interrupt, aside, say, stop};
-use crate::client::{self, ID_MAX, Reach, TRIES};
+use crate::client::{self, ID_MAX, Reach};
 use crate::{Client, Error, table};
 use fingertip::link::packet::{BROADCAST, Event, HEADER, Packet, REPLY_MAX, Receiver, StatusError, instruction};
 use fingertip::shipped::address;
@@ -36,6 +36,8 @@ const STOPS: [u16; 5] =
     [address::TORQUE_ENABLE, address::MEASURE, address::GOAL_FORCE_MN, address::SHORT_GOAL_MN, address::MIRROR_GOAL_MN];
 /// Number of goals that fit in one Sync Write: an ID and four bytes each, beside 14 bytes.
 const GOALS: usize = (REPLY_MAX - 14) / 5;
+/// Status return level at which all instructions are answered.
+const ALL_ANSWERED: u8 = 2;
 /// Reason for a stop during which the bus watchdogs are not fed.
 const SILENT: &str = "its client is silent";
 const LEFT: &str = "its client left";
@@ -43,6 +45,8 @@ const LEFT: &str = "its client left";
 const RELEASE_S: f64 = 0.5;
 /// Longest wait for a client that does not take its answers.
 const SLOW: Duration = Duration::from_secs(1);
+/// Average time between two repeated tries to stop a finger. The end of `share` takes two of them.
+const RETRY: Duration = Duration::from_secs(1);
 /// More bytes than any packet has: without a packet in them they are dropped.
 const JUNK: usize = 4096;
 /// Time after which a waiting packet checks again if it may go.
@@ -69,8 +73,13 @@ pub struct Args {
 struct Bus {
     client: Client,
     connections: BTreeMap<SocketAddr, Connection>,
-    /// Fingers that got goal 0 and are still to be stopped: why, and how often that is tried.
-    ending: BTreeMap<u8, (&'static str, usize)>,
+    /// Bus watchdogs by ID, whoever set them.
+    watchdogs: BTreeMap<u8, Duration>,
+    /// IDs that answered a client.
+    answered: BTreeSet<u8>,
+    /// Fingers that got goal 0 and are neither seen idle yet nor commanded again: why, and when the next try is due, if not
+    /// at once.
+    ending: BTreeMap<u8, (&'static str, Option<Instant>)>,
     /// True if the last packet was urgent.
     urgent: bool,
 }
@@ -79,8 +88,6 @@ struct Bus {
 struct Connection {
     /// IDs that it wrote to: they are stopped once it leaves or is silent, except those of the next commander.
     ids: BTreeSet<u8>,
-    /// Bus watchdogs that it set, by ID.
-    watchdogs: BTreeMap<u8, Duration>,
     /// Instant of its last packet.
     heard: Option<Instant>,
     /// True once another client stopped one of its fingers: it writes no more.
@@ -111,8 +118,14 @@ pub fn run(args: &Args, reach: &Reach, json: bool) -> Result<(), Error> {
         say(format_args!("shares {} at tcp:{address}; Ctrl-C ends it", client.port));
         say(format_args!("next, in other terminals: fingertip --port tcp:{address} view"));
     }
-    let bus =
-        Arc::new(Mutex::new(Bus { client, connections: BTreeMap::new(), ending: BTreeMap::new(), urgent: false }));
+    let bus = Arc::new(Mutex::new(Bus {
+        client,
+        connections: BTreeMap::new(),
+        watchdogs: BTreeMap::new(),
+        answered: BTreeSet::new(),
+        ending: BTreeMap::new(),
+        urgent: false,
+    }));
     let (lost, losses) = channel();
     let shared = Arc::clone(&bus);
     std::thread::spawn(move || {
@@ -128,21 +141,30 @@ pub fn run(args: &Args, reach: &Reach, json: bool) -> Result<(), Error> {
     });
     let mut ended = Ok(());
     while !interrupt.came() && ended.is_ok() {
-        // One try at a time: an absent one takes a time-out each, and packets of clients go between them.
-        let next = lock(&bus).ending.keys().next().copied();
-        if let Some(id) = next {
-            turn(&bus, false).end(id);
-        }
-        if let Ok(why) = losses.recv_timeout(if next.is_some() { Duration::ZERO } else { super::INTERRUPT_EVERY }) {
+        // One try at a time: an absent one takes a time-out, and packets of clients go between them.
+        let mut free = turn(&bus, false);
+        free.end_commands(None);
+        ended = free.due().map_or(Ok(()), |id| free.end(id));
+        drop(free);
+        if let Ok(why) = losses.recv_timeout(super::INTERRUPT_EVERY) {
             ended = Err(why);
         }
     }
     let mut bus = turn(&bus, true);
+    // All fingers get goal 0: while an absent one is waited for, the watchdogs of the others shall not trip.
+    bus.client.feeds = bus.ending.values().all(|(why, _)| *why != SILENT);
     for from in bus.connections.keys().copied().collect::<Vec<_>>() {
         bus.end_command(from, "`fingertip share` ends");
     }
-    while let Some(id) = bus.ending.keys().next().copied() {
-        bus.end(id);
+    let (until, mut line) = (Instant::now() + 2 * RETRY, Ok(()));
+    while line.is_ok() && !bus.ending.is_empty() && Instant::now() < until {
+        let ids: Vec<u8> = bus.ending.keys().copied().collect();
+        line = ids.into_iter().try_for_each(|id| bus.end(id));
+    }
+    if !bus.ending.is_empty() {
+        let ids = bus.ending.keys().map(u8::to_string).collect::<Vec<_>>().join(", ");
+        let why = ended.and(line).err().map_or(String::new(), |why| format!("{why}; "));
+        ended = Err(format!("{why}could not stop ID {ids}: `fingertip stop` does once they answer").into());
     }
     // Until the process exits, no client may move what was stopped.
     std::mem::forget(bus);
@@ -203,7 +225,6 @@ fn converse(mut stream: TcpStream, bus: &Mutex<Bus>, lost: &Outbox<Error>) {
             }
             let (reads, came) = (READS.contains(&packet.instruction), Instant::now());
             let mut free = turn(bus, commands || !reads);
-            free.settle(from, &packet);
             if reads && came.elapsed() > STALE * free.client.timeout {
                 continue;
             }
@@ -230,33 +251,36 @@ fn converse(mut stream: TcpStream, bus: &Mutex<Bus>, lost: &Outbox<Error>) {
 }
 
 impl Bus {
-    /// Ends the command of clients that left or are silent. The one finger of a packet is stopped before it, except by a stop.
-    fn settle(&mut self, from: SocketAddr, packet: &Packet<'_>) {
+    /// Ends the command of clients that left or are silent, except the one whose packet is next.
+    fn end_commands(&mut self, next: Option<SocketAddr>) {
         // Reads of others would feed the watchdogs of a silent client. One whose packet waits for a stop is not silent.
         let slack = self.client.timeout + Duration::from_secs_f64(RELEASE_S);
         let silent = |one: &Connection| {
-            let most = one.watchdogs.values().min().zip(one.heard);
+            let most = one.ids.iter().filter_map(|id| self.watchdogs.get(id)).min().zip(one.heard);
             most.is_some_and(|(most, heard)| heard.elapsed() > *most + slack)
         };
-        let ended = |(other, one): (&SocketAddr, &Connection)| {
+        let ended = |(from, one): (&SocketAddr, &Connection)| {
             let why = if one.left() { LEFT } else { silent(one).then_some(SILENT)? };
-            (*other != from && !one.ids.is_empty()).then_some((*other, why))
+            (Some(*from) != next && !one.ids.is_empty()).then_some((*from, why))
         };
-        for (other, why) in self.connections.iter().filter_map(ended).collect::<Vec<_>>() {
-            self.end_command(other, why);
-        }
-        if !is_stop(packet, &parts(packet)) {
-            self.end(packet.id);
+        for (from, why) in self.connections.iter().filter_map(ended).collect::<Vec<_>>() {
+            self.end_command(from, why);
         }
     }
 
-    /// Passes a client's packet on, where it may, and returns the answers.
+    /// Passes a client's packet on, where it may, and returns the answers. A finger is stopped before its next commander's
+    /// first write.
     fn pass(&mut self, from: SocketAddr, packet: &Packet<'_>, raw: &[u8]) -> Result<Vec<u8>, Error> {
-        let (commander, parts) = (self.commander(), parts(packet));
+        self.end_commands(Some(from));
+        let (reads, parts) = (READS.contains(&packet.instruction), parts(packet));
+        let (stops, commander, mut first) = (is_stop(packet, &parts), self.commander(), false);
+        if !reads && !stops && commander.is_none_or(|other| other == from) {
+            self.end(packet.id)?;
+        }
         let mut ids = parts.iter().flat_map(|part| part.ids.clone());
         let own = self.connections.entry(from).or_default();
         own.heard = Some(Instant::now());
-        if commander != Some(from) && is_stop(packet, &parts) {
+        if commander != Some(from) && stops {
             // A stopped client stops its own fingers before it exits, torque off last. That takes the command from nobody;
             // what it stops later does.
             let cleans = ids.clone().all(|id| own.ids.contains(&id));
@@ -265,12 +289,15 @@ impl Bus {
             if let Some(other) = commander.and_then(|other| self.connections.get_mut(&other)) {
                 other.stopped = !cleans && ids.any(|id| other.ids.contains(&id));
             }
-        } else if !READS.contains(&packet.instruction) {
+        } else if !reads {
             let stopped = own.stopped || commander.is_some_and(|other| other != from);
-            // The bus speed is fixed. A Reg Write acts only at an Action, so `share` would not know which watchdog time holds.
+            // The bus speed is fixed, and a finger without answers is not seen to stop. A Reg Write acts only at an Action, so
+            // `share` would not know which watchdog time holds.
             let later = packet.instruction == instruction::REG_WRITE;
             let fixed = |part: &Part<'_>| {
-                part.byte(address::BAUD_RATE).is_some() || later && part.byte(address::BUS_WATCHDOG).is_some()
+                part.byte(address::BAUD_RATE).is_some()
+                    || part.byte(address::STATUS_RETURN_LEVEL).is_some_and(|level| level != ALL_ANSWERED)
+                    || later && part.byte(address::BUS_WATCHDOG).is_some()
             };
             // A write to no device feeds the watchdogs. A stopped client keeps its other fingers alive by it.
             let refused = if parts.is_empty() { own.ids.is_empty() } else { stopped || parts.iter().any(fixed) };
@@ -282,30 +309,52 @@ impl Bus {
             }
             // From now on this client's end stops these fingers.
             self.ending.retain(|id, _| !ids.clone().any(|own| own == *id));
+            first = !own.ids.contains(&packet.id);
             own.ids.extend(ids);
             let reset = (packet.instruction == instruction::REBOOT).then_some(0);
             for part in &parts {
-                let Some(steps) = reset.or(part.byte(address::BUS_WATCHDOG)) else { continue };
-                own.watchdogs.retain(|id, _| !part.ids.contains(id));
-                if steps > 0 {
-                    let most = Duration::from_millis(20 * u64::from(steps));
-                    own.watchdogs.extend(part.ids.clone().map(|id| (id, most)));
+                // Fingers refuse more steps.
+                if let Some(steps @ ..=127) = reset.or(part.byte(address::BUS_WATCHDOG)) {
+                    self.watch(part.ids.clone(), steps.into());
                 }
             }
         }
         let answer = self.client.pass(raw, Some(packet.id).filter(|id| *id != BROADCAST), answers(packet))?;
-        // Once a write of the ID is accepted (no error in byte 8, whose top bit is the alert), only the new ID answers.
+        // Byte 8 of an answer is its error, whose top bit is the alert. A packet to all IDs is no finger's.
+        let Some(error) = answer.get(8).filter(|_| packet.id != BROADCAST) else { return Ok(answer) };
+        let mut id = packet.id;
+        // Once a write of the ID is accepted, only the new ID answers.
         if packet.instruction == instruction::WRITE
-            && answer.get(8).is_some_and(|error| error & 0x7F == 0)
-            && let Some(id) = parts.iter().find_map(|part| part.byte(address::ID))
+            && error & 0x7F == 0
+            && let Some(new) = parts.iter().find_map(|part| part.byte(address::ID))
         {
             for one in self.connections.values_mut() {
-                one.ids = one.ids.iter().map(|known| if *known == packet.id { id } else { *known }).collect();
-                let watchdog = one.watchdogs.remove(&packet.id);
-                one.watchdogs.extend(watchdog.map(|most| (id, most)));
+                one.ids = one.ids.iter().map(|known| if *known == id { new } else { *known }).collect();
+            }
+            self.answered.remove(&id);
+            (id, first) = (new, true);
+        }
+        self.answered.insert(id);
+        if first {
+            // The client may rely on a watchdog that another one set, or `recover` may have reset it.
+            self.client.id = id;
+            if let Ok(steps) = self.client.again(|client| client.number(address::BUS_WATCHDOG)) {
+                self.watch(id..=id, steps);
             }
         }
+        // It can be stopped now, and reads would feed its watchdog.
+        if let Some((_, due)) = self.ending.get_mut(&id) {
+            *due = None;
+        }
         Ok(answer)
+    }
+
+    /// Notes the bus watchdog of these IDs: 0 is off, and less has tripped.
+    fn watch(&mut self, ids: RangeInclusive<u8>, steps: i64) {
+        self.watchdogs.retain(|id, _| !ids.contains(id));
+        if let Ok(steps @ 1..) = u64::try_from(steps) {
+            self.watchdogs.extend(ids.map(|id| (id, Duration::from_millis(20 * steps))));
+        }
     }
 
     /// The client that may write: it wrote and was not stopped.
@@ -315,9 +364,7 @@ impl Bus {
 
     /// Ends the command of a client: its fingers get goal 0 at once, and are to be stopped.
     fn end_command(&mut self, from: SocketAddr, why: &'static str) {
-        let Some(Connection { ids, watchdogs, .. }) = self.connections.get_mut(&from) else { return };
-        watchdogs.clear();
-        let ids = std::mem::take(ids);
+        let ids = self.connections.get_mut(&from).map(|one| std::mem::take(&mut one.ids)).unwrap_or_default();
         let next = self.commander().map(|next| &self.connections[&next].ids);
         let mut ids: Vec<u8> = ids.into_iter().filter(|id| next.is_none_or(|next| !next.contains(id))).collect();
         let [low, high] = address::GOAL_FORCE_MN.to_le_bytes();
@@ -328,46 +375,68 @@ impl Bus {
         }
         // A client that wrote by broadcast: absent IDs would take a time-out each.
         if ids.len() > GOALS {
-            self.client.feeds = why != SILENT;
-            let found = self.client.ping_all().unwrap_or_default();
-            self.client.feeds = false;
-            ids.retain(|id| found.iter().any(|pong| pong.id == *id));
+            self.answered.extend(self.client.ping_all().unwrap_or_default().iter().map(|pong| pong.id));
+            ids.retain(|id| self.answered.contains(id));
         }
-        self.ending.extend(ids.into_iter().map(|id| (id, (why, TRIES))));
+        self.ending.extend(ids.into_iter().map(|id| (id, (why, None))));
     }
 
-    /// Tries to stop a finger whose client's command ended; does nothing with another one.
-    fn end(&mut self, id: u8) {
-        let Some((why, tries)) = self.ending.remove(&id) else { return };
-        self.client.feeds = why != SILENT;
-        let own = std::mem::replace(&mut self.client.id, id);
-        match stop(&mut self.client) {
-            Ok(true) => aside(format_args!("ID {id} was stopped: {why}")),
-            Ok(false) => {}
-            Err(error) if error.is_noise() && tries > 1 => {
-                self.ending.insert(id, (why, tries - 1));
+    /// The finger to be stopped whose next try is due first.
+    fn due(&self) -> Option<u8> {
+        let due = self.ending.iter().filter(|(_, (_, due))| due.is_none_or(|due| due <= Instant::now()));
+        due.min_by_key(|(_, (_, due))| *due).map(|(id, _)| *id)
+    }
+
+    /// Tries to stop a finger whose client's command ended; does nothing with another one. Fails once the port is lost.
+    fn end(&mut self, id: u8) -> Result<(), Error> {
+        let Some((why, due)) = self.ending.get(&id).copied() else { return Ok(()) };
+        // Keep-alive packets reach all fingers. While this one may be absent, they are sent for a commander just heard.
+        let heard = self.commander().and_then(|from| self.connections[&from].heard);
+        let client = &mut self.client;
+        let fed = client.feeds;
+        client.feeds |= heard.is_some_and(|heard| heard.elapsed().as_secs_f64() < RELEASE_S);
+        client.id = id;
+        let stopped = client.ping().and_then(|pong| {
+            client.feeds = why != SILENT;
+            stop(client, pong.is_fingertip())
+        });
+        client.feeds = fed;
+        let Err(error) = stopped else {
+            self.ending.remove(&id);
+            if stopped.is_ok_and(|driven| driven || due.is_some()) {
+                aside(format_args!("ID {id} was stopped: {why}"));
             }
-            Err(error) => aside(format_args!("stopping ID {id} failed ({why}): {error}")),
+            return Ok(());
+        };
+        if due.is_none() {
+            aside(format_args!("ID {id} is not stopped yet ({why}): {error}"));
         }
-        (self.client.id, self.client.feeds) = (own, false);
+        self.ending.insert(id, (why, Some(Instant::now() + RETRY * self.ending.len() as u32)));
+        if matches!(error, Error::Port(..)) { Err(error) } else { Ok(()) }
     }
 }
 
 /// Stops a device that is driven. Returns whether it was.
-fn stop(client: &mut Client) -> Result<bool, Error> {
-    if client.ping()?.is_fingertip() {
-        if stop::is_idle(client.again(|client| client.number(address::PRESENT_MODE))?) {
-            return Ok(false);
-        }
-        let released = stop::release(RELEASE_S, client);
-        stop::halt(client)?;
-        return released.map(|_| true);
+fn stop(client: &mut Client, is_fingertip: bool) -> Result<bool, Error> {
+    if is_fingertip {
+        // The level before decides whether this write is answered.
+        let _ = client.set(address::STATUS_RETURN_LEVEL, ALL_ANSWERED.into());
     }
     let drives = client.again(|client| client.number(address::TORQUE_ENABLE))? != 0;
-    if drives {
-        client.again(|client| client.set(address::TORQUE_ENABLE, 0))?;
+    if !is_fingertip {
+        if drives {
+            client.again(|client| client.set(address::TORQUE_ENABLE, 0))?;
+        }
+        return Ok(drives);
     }
-    Ok(drives)
+    if !drives && stop::is_idle(client.again(|client| client.number(address::PRESENT_MODE))?) {
+        return Ok(false);
+    }
+    match stop::release(RELEASE_S, client) {
+        // The next try releases it: with torque off, friction would keep the force.
+        Err(why) if why.is_noise() => Err(why),
+        _ => stop::halt(client).map(|()| true),
+    }
 }
 
 /// True if a packet with these parts only stops fingers.

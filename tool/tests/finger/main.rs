@@ -3,6 +3,7 @@
 
 mod failed;
 mod guided;
+mod left;
 mod recorded;
 #[path = "../served/mod.rs"]
 mod served;

@@ -10,15 +10,16 @@ use fingertip_cli::client::packet;
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
 use std::process::{Child, Output, Stdio};
+use std::time::Duration;
 
 /// Time that a client of the broker waits by its `--timeout-ms`.
 const TIMEOUT: &str = "6000";
 
 /// A served finger and a broker in front of it.
-struct Shared {
-    finger: Served,
-    broker: Child,
-    address: String,
+pub struct Shared {
+    pub finger: Served,
+    pub broker: Child,
+    pub address: String,
 }
 
 /// Starts a broker; it and its address, once it listens. The address is in a line of JSON.
@@ -31,26 +32,26 @@ fn broker(finger: &Served, listen: &str, timeout: &str) -> (Child, String) {
 }
 
 /// Writes `length` bytes of several devices: `values` has each ID and its bytes. No device answers.
-fn sync_write(client: &mut Client, register: u16, length: u8, values: &[u8]) {
+pub fn sync_write(client: &mut Client, register: u16, length: u8, values: &[u8]) {
     let params = [&register.to_le_bytes()[..], &[length, 0], values].concat();
     client.pass(&packet(BROADCAST, instruction::SYNC_WRITE, &params), None, 0).expect("it listens");
 }
 
 impl Shared {
-    fn begin(scene: &str) -> Self {
+    pub fn begin(scene: &str) -> Self {
         Self::of(Served::patient(scene))
     }
 
-    fn of(finger: Served) -> Self {
+    pub fn of(finger: Served) -> Self {
         Self::within(TIMEOUT, finger)
     }
 
-    fn within(timeout: &str, finger: Served) -> Self {
+    pub fn within(timeout: &str, finger: Served) -> Self {
         let (broker, address) = broker(&finger, "127.0.0.1:0", timeout);
         Self { finger, broker, address }
     }
 
-    fn client(&self) -> Client {
+    pub fn client(&self) -> Client {
         client(&format!("tcp:{}", self.address))
     }
 
@@ -61,12 +62,12 @@ impl Shared {
         command.spawn().expect("it starts")
     }
 
-    fn output(&self, arguments: &[&str]) -> Output {
+    pub fn output(&self, arguments: &[&str]) -> Output {
         self.start(arguments).wait_with_output().expect("it ends")
     }
 
     /// Tares, and presses until the force is held.
-    fn press(&self) -> Child {
+    pub fn press(&self) -> Child {
         assert!(self.output(&["tare"]).status.success());
         let press = self.start(&["press", "1", "--seconds", "1000000", "--within-s", "3600"]);
         self.finger.until("Force:");
@@ -74,14 +75,14 @@ impl Shared {
     }
 
     /// Ends the broker. Returns the number of its packets meanwhile.
-    fn packets_at_its_end(&mut self) -> u64 {
+    pub fn packets_at_its_end(&mut self) -> u64 {
         let before = self.finger.heard();
         Served::interrupt(&self.broker);
         self.broker.wait().expect("it ends");
         self.finger.heard() - before
     }
 
-    fn until_released(&self) {
+    pub fn until_released(&self) {
         let begun = std::time::Instant::now();
         while self.finger.true_force_n() > RESIDUAL_N || !self.finger.command("look").contains(": Off") {
             assert!(begun.elapsed().as_secs() < 60, "{}", self.finger.command("look"));
@@ -172,36 +173,11 @@ fn a_press_that_measures_is_stopped_by_every_stop() {
 }
 
 #[test]
-fn a_killed_commander_is_stopped_though_others_read() {
-    let shared = Shared::begin("wall");
-    let mut reader = shared.client();
-    for round in 0..2 {
-        let mut press = shared.press();
-        let signal = [rustix::process::Signal::KILL, rustix::process::Signal::STOP][round];
-        Served::signal(&press, signal);
-        let begun = std::time::Instant::now();
-        while reader.number(address::PRESENT_MODE).expect("it answers") != 0 {
-            assert!(begun.elapsed().as_secs() < 60, "{}", shared.finger.command("look"));
-        }
-        shared.until_released();
-        let _ = press.kill();
-        press.wait().expect("it ends");
-        let fault = reader.number(address::FAULT).expect("it answers");
-        assert_eq!(fault, 0, "{signal:?}: the broker stopped it, not the watchdog");
-    }
-    // The end of the broker, too.
-    let mut press = shared.press();
-    Served::interrupt(&shared.broker);
-    shared.until_released();
-    press.wait().expect("it ends");
-}
-
-#[test]
 fn clients_that_send_junk_or_read_nothing_block_nobody() {
     let shared = Shared::begin("wall");
     let connect = || TcpStream::connect(&shared.address).expect("it listens");
     let mut client = shared.client();
-    client.timeout = std::time::Duration::from_secs(60);
+    client.timeout = Duration::from_secs(60);
     client.set(address::TARE, 1).expect("it obeys");
     let mut random = fastrand::Rng::with_seed(7);
     let mut half = connect();
@@ -228,7 +204,7 @@ fn clients_that_send_junk_or_read_nothing_block_nobody() {
         assert_eq!(client.ping().expect("it answers").id, 1);
     }
     client.set(address::TARE, 1).expect("it obeys");
-    client.timeout = std::time::Duration::from_secs(5);
+    client.timeout = Duration::from_secs(5);
     assert_eq!(client.ping_all().expect("it answers").len(), 1);
 }
 
@@ -263,81 +239,6 @@ fn a_stop_takes_the_command_except_to_clean_up_or_of_another_finger() {
     assert_eq!(shared.packets_at_its_end(), 0, "no finger is left to stop");
 }
 
-/// The clock of the finger waits for packets, so its watchdog does not trip: the keep-alive packets are counted.
-#[test]
-fn the_end_feeds_all_fingers_and_asks_many_ids_by_one_ping() {
-    for (last, packets) in [(9, 8..60), (9 + 80, 2..8)] {
-        let mut shared = Shared::within("900", Served::patient("wall"));
-        let mut client = shared.client();
-        let steps: Vec<u8> = (9..=last).flat_map(|id| [id, 25]).collect();
-        sync_write(&mut client, address::BUS_WATCHDOG, 1, &steps);
-        client.ping().expect("it answers");
-        let sent = shared.packets_at_its_end();
-        assert!(packets.contains(&sent), "{sent} packets, IDs 9 to {last}");
-    }
-}
-
-#[test]
-fn a_finger_of_a_group_is_stopped_once_its_commander_has_left() {
-    let finger = Served::patient("grasp");
-    drop(finger.tared(1));
-    finger.tared(2).set(address::TORQUE_ENABLE, 1).expect("it obeys");
-    let shared = Shared::of(finger);
-    let mut commander = shared.client();
-    sync_write(&mut commander, address::TORQUE_ENABLE, 1, &[1, 1]);
-    while commander.number(address::TORQUE_ENABLE).expect("it answers") != 1 {}
-    drop(commander);
-    shared.until_released();
-    let mut client = shared.client();
-    client.id = 2;
-    assert_eq!(client.number(address::TORQUE_ENABLE).expect("it answers"), 1, "nobody commanded it");
-}
-
-/// Another client stops one of two fingers. The commander feeds the watchdog of the other one until it leaves.
-#[test]
-fn the_other_fingers_of_a_stopped_commander_are_stopped_once_it_has_left() {
-    let finger = Served::patient("grasp");
-    for id in [1, 2] {
-        drop(finger.tared(id));
-    }
-    let shared = Shared::of(finger);
-    let (mut first, mut second) = (shared.client(), shared.client());
-    for id in [1, 2] {
-        first.id = id;
-        first.set(address::TORQUE_ENABLE, 1).expect("it obeys");
-    }
-    first.set(address::BUS_WATCHDOG, 50).expect("it obeys");
-    sync_write(&mut second, address::GOAL_FORCE_MN, 4, &[1, 0, 0, 0, 0]);
-    second.number(address::TORQUE_ENABLE).expect("it answers");
-    first.set(address::GOAL_FORCE_MN, 500).expect_err("it was stopped");
-    first.id = 1;
-    let begun_s = shared.finger.now_s();
-    while shared.finger.now_s() < begun_s + 3.0 {
-        sync_write(&mut first, 0, 0, &[]);
-        first.ping().expect("it answers");
-    }
-    second.id = 2;
-    assert_eq!(second.number(address::TORQUE_ENABLE).expect("it answers"), 1, "{}", shared.finger.command("look"));
-    drop(first);
-    let begun = std::time::Instant::now();
-    while second.number(address::TORQUE_ENABLE).expect("it answers") != 0 {
-        assert!(begun.elapsed().as_secs() < 60, "{}", shared.finger.command("look"));
-    }
-}
-
-/// A script starts one program after the other.
-#[test]
-fn once_a_commander_has_left_the_next_client_writes() {
-    let shared = Shared::begin("wall");
-    let mut clients: Vec<Client> = std::iter::repeat_with(|| shared.client()).take(100).collect();
-    for client in &mut clients {
-        client.ping().expect("it answers");
-    }
-    for mut client in clients {
-        client.set(address::BUS_WATCHDOG, 25).expect("it obeys");
-    }
-}
-
 /// Each of their packets waits for nothing, for 4 s.
 #[test]
 fn clients_that_ask_an_absent_id_do_not_starve_a_press() {
@@ -345,7 +246,7 @@ fn clients_that_ask_an_absent_id_do_not_starve_a_press() {
     assert!(shared.output(&["tare"]).status.success());
     let mut press = shared.client();
     // What is left of `TIMEOUT` is for its own answer: a USB port may delay it.
-    press.timeout = std::time::Duration::from_millis(5_500);
+    press.timeout = Duration::from_millis(5_500);
     for (register, value) in [(address::BUS_WATCHDOG, 25), (address::TORQUE_ENABLE, 1), (address::GOAL_FORCE_MN, 1_000)]
     {
         press.set(register, value).expect("it obeys");
@@ -354,7 +255,7 @@ fn clients_that_ask_an_absent_id_do_not_starve_a_press() {
     let _pollers: Vec<Client> = std::iter::repeat_with(|| {
         let mut client = shared.client();
         client.id = 9;
-        client.timeout = std::time::Duration::from_millis(1);
+        client.timeout = Duration::from_millis(1);
         client.ping().expect_err("it is absent");
         client
     })
@@ -367,28 +268,6 @@ fn clients_that_ask_an_absent_id_do_not_starve_a_press() {
         press.number(address::PRESENT_MODE).expect("it is answered in time");
     }
     press.set(address::GOAL_FORCE_MN, 900).expect("it still commands");
-}
-
-/// An unplugged hand: each of its fingers takes three time-outs of 2 s.
-#[test]
-fn absent_fingers_of_who_left_keep_nobody_from_the_bus() {
-    let shared = Shared::begin("wall");
-    assert!(shared.output(&["tare"]).status.success());
-    let (mut first, mut press) = (shared.client(), shared.client());
-    let goals: Vec<u8> = (1..60).flat_map(|id| [id, 1, 0, 0, 0]).collect();
-    sync_write(&mut first, address::GOAL_FORCE_MN, 4, &goals);
-    press.timeout = std::time::Duration::from_millis(5_500);
-    for (register, value) in [(address::TORQUE_ENABLE, 0), (address::TORQUE_ENABLE, 1), (address::GOAL_FORCE_MN, 1_000)]
-    {
-        press.set(register, value).expect("it obeys");
-    }
-    drop(first);
-    for goal_mn in [900, 800, 700] {
-        press.set(address::GOAL_FORCE_MN, goal_mn).expect("it still commands");
-    }
-    // A stop of all fingers does not wait for the absent ones.
-    sync_write(&mut press, address::TORQUE_ENABLE, 1, &(1..60).flat_map(|id| [id, 0]).collect::<Vec<u8>>());
-    while press.number(address::TORQUE_ENABLE).expect("it answers") != 0 {}
 }
 
 /// The broker stops the finger at its new ID, and does not wait for answers of the old one.

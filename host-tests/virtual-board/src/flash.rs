@@ -2,8 +2,8 @@
 //!
 //! The crate's flash interface times operations but keeps nothing: its memory map has no device that programs the
 //! flash. The part therefore shows the emulator a map of its own while that lays out memory ([`layout`]), and the run
-//! then programs and erases here, under the interface's registers. While a word is programmed the core stalls, as one
-//! that runs from the same bank does. Errors that the interface would flag are not modelled.
+//! then programs and erases here, under the interface's registers. While a word is programmed or a sector erased the core
+//! stalls, as one that runs from the same bank does. Errors that the interface would flag are not modelled.
 
 use crate::faults::program;
 use crate::part::Part;
@@ -22,6 +22,8 @@ pub const SECTOR: Range<u64> = 0x0806_0000..0x0808_0000;
 /// Sector 6: the other one.
 pub const OTHER_SECTOR: Range<u64> = 0x0804_0000..0x0806_0000;
 pub const SECTORS: Range<u64> = OTHER_SECTOR.start..SECTOR.end;
+/// Time of a sector's erase at 32 bits, ns. The crate takes as long.
+pub const ERASE_NS: u64 = 1_000_000_000;
 /// Flash of the F446, which has less than the emulated part.
 const FLASH_BYTES: u64 = 512 << 10;
 
@@ -66,15 +68,12 @@ impl Programmer {
             return;
         }
         let control = session.mcu().registers("FLASH").map_or(0, |registers| registers.get(Register::Cr));
-        if to_sectors && cr::PG.is_set(control) {
+        let stall_ns = if to_sectors && cr::PG.is_set(control) {
             // Programming only clears bits.
             let before = host.read(access.address, access.width).unwrap_or(0);
             program(host, access.address, access.width, before & access.value);
             self.words += 1;
-            let until_ns = access.virtual_time.0 + self.word_ns;
-            self.stands_until_ns = Some(until_ns);
-            host.hold(true);
-            session.pause_at(Some(VirtualNanos(until_ns)));
+            self.word_ns
         } else if !to_sectors && cr::STRT.is_set(control) && cr::SER.is_set(control) {
             let erased = match cr::SNB.get(control) {
                 6 => OTHER_SECTOR,
@@ -83,11 +82,18 @@ impl Programmer {
             };
             self.erases += 1;
             erased.step_by(8).for_each(|address| program(host, address, Width::W64, u64::MAX));
-        }
+            ERASE_NS
+        } else {
+            return;
+        };
+        let until_ns = access.virtual_time.0 + stall_ns;
+        self.stands_until_ns = Some(until_ns);
+        host.hold(true);
+        session.pause_at(Some(VirtualNanos(until_ns)));
     }
 
-    /// Returns true if the programming of a word ends at this time, so that the core runs on.
-    pub fn word_done(&mut self, now_ns: u64) -> bool {
+    /// Returns true if a stall of the core ends at this time, so that the core runs on.
+    pub fn stall_done(&mut self, now_ns: u64) -> bool {
         let done = self.stands_until_ns.is_some_and(|until_ns| until_ns <= now_ns);
         self.stands_until_ns = self.stands_until_ns.filter(|_| !done);
         done

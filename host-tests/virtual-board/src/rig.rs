@@ -271,7 +271,7 @@ impl Hall {
 impl Driver<Part> for Hall {
     fn on_settled(&mut self, session: &mut Session<Part>, host: &mut dyn Host, settled: Settled) {
         if let Settled::Stop(stop) = &settled
-            && self.bench.flash.word_done(stop.at.0)
+            && self.bench.flash.stall_done(stop.at.0)
         {
             host.hold(self.bench.core_held);
         }

@@ -11,7 +11,7 @@ use fingertip::store::SLOT_BYTES;
 use rigless::soc::Width;
 use sim::encode;
 use sim::plant::Setup;
-use virtual_board::flash::{OTHER_SECTOR, SECTOR};
+use virtual_board::flash::{ERASE_NS, OTHER_SECTOR, SECTOR};
 use virtual_board::rig::Stand;
 use virtual_board::{Options, Rig};
 
@@ -23,8 +23,8 @@ const SLOTS: usize = SECTOR_BYTES / SLOT_BYTES;
 const START_MS: u64 = 100;
 /// Longest time to program a word, ns (DS10693).
 const WORD_MAX_NS: u64 = 100_000;
-/// Time of an erase at 8 bits on the emulated part, ms.
-const ERASE_MS: u64 = 2_000;
+/// Time of an erase, ms.
+const ERASE_MS: u64 = ERASE_NS / 1_000_000;
 
 fn record(pitch_um: i32) -> Record {
     let mut record = Record { return_delay_2us: 0, ..Record::DEFAULT };
@@ -126,15 +126,15 @@ fn nearly_full_sectors_take_turns(rig: &mut Rig) {
     let erases_before = words_and_erases(rig).1;
     // The newest record is the last but one of the first sector, the other sector has older ones.
     start_with(rig, filled(SLOTS - 1, 10_000), filled(SLOTS, 10_000 - SLOTS as u32));
-    // The start erases the sector with the older ones, at 32 bits: half of the time that it takes at 8.
+    // The start erases the sector with the older ones.
     let (from_ms, from) = (rig.now_ns() / 1_000_000, frames(rig));
     let mut frames_at = |ms: u64| {
         rig.run_until_ns((from_ms + ms) * 1_000_000).expect("it runs");
         frames(rig) - from
     };
     let while_it_boots = frames_at(START_MS);
-    assert_eq!(frames_at(ERASE_MS / 2 - 100), while_it_boots, "no scan while it is erased");
-    assert!(frames_at(ERASE_MS / 2 + START_MS) > while_it_boots);
+    assert_eq!(frames_at(ERASE_MS - 100), while_it_boots, "no scan while it is erased");
+    assert!(frames_at(ERASE_MS + START_MS) > while_it_boots);
     assert_eq!(words_and_erases(rig).1, erases_before + 1);
     let newest = 1_000 + SLOTS as u32 - 2;
     assert_eq!((pitch_um(rig), read_u8(rig, address::FAULT)), (newest, 0));

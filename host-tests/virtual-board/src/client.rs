@@ -8,11 +8,12 @@
 //! once, by a device that does not exist.
 
 use crate::Error;
-use crate::rig::{Rig, Stand};
+use crate::rig::Rig;
 use crate::wire::TimedByte;
 use dynamixel2::Bus;
 use serial2::SerialPort;
 use std::io::ErrorKind;
+use std::sync::mpsc;
 use std::time::Duration;
 
 /// The client's end of the bus.
@@ -51,18 +52,19 @@ impl Rig {
         self.take_received()?;
         self.send(packet)?;
         let (mut reply, mut quiet_since_ns) = (Vec::new(), self.now_ns());
-        while !is_whole(&reply) && self.now_ns() < quiet_since_ns + wait_ns {
-            self.run_until_ns(self.now_ns() + LOOK_NS)?;
-            let look = |stand: &mut Stand<'_>| {
-                (std::mem::take(&mut stand.bench.received), stand.session.board_mut().wire().pending())
-            };
-            let (received, unsent) = self.with(look)?;
-            if !received.is_empty() || unsent > 0 {
-                quiet_since_ns = self.now_ns();
+        let (answer, answered) = mpsc::channel();
+        self.run_while(LOOK_NS, move |stand| {
+            let (now_ns, received) = (stand.bench.next_ns, std::mem::take(&mut stand.bench.received));
+            if !received.is_empty() || stand.session.board_mut().wire().pending() > 0 {
+                quiet_since_ns = now_ns;
             }
             reply.extend(received.iter().map(|timed| timed.byte));
-        }
-        Ok(reply)
+            let goes_on = !is_whole(&reply) && now_ns < quiet_since_ns + wait_ns;
+            // An error means that nobody waits for the reply any more.
+            let _ = goes_on || answer.send(std::mem::take(&mut reply)).is_ok();
+            goes_on
+        })?;
+        self.answer(&answered)
     }
 
     /// Runs a client on the bus. An unanswered packet costs the wait's virtual time.

@@ -38,8 +38,12 @@ impl Options {
     /// A board whose flash holds that its motor goes the right way: torque is refused before that is known.
     pub fn confirmed() -> Self {
         let params = Params { direction_confirmed: 1, ..Params::DEFAULT };
-        let record = sim::encode(&Record { params, ..Record::DEFAULT }, 0);
-        Self { presets: vec![(SECTOR.start, record)], ..Self::default() }
+        Self::stored(&Record { params, ..Record::DEFAULT })
+    }
+
+    /// A board with a record in its flash.
+    pub fn stored(record: &Record) -> Self {
+        Self { presets: vec![(SECTOR.start, sim::encode(record, 0))], ..Self::default() }
     }
 }
 
@@ -65,11 +69,13 @@ fn images(image: &Firmware, options: &Options) -> Result<Vec<Image>, Error> {
 }
 
 type Job = Box<dyn FnOnce(&mut Stand<'_>) + Send>;
+/// A look at the run; returns true while the run goes on.
+type Look = Box<dyn FnMut(&mut Stand<'_>) -> bool + Send>;
 
 /// Orders to the emulator's thread.
 enum Order {
-    /// Run to an instant of the grid.
-    Run(u64),
+    /// Run to an instant of the grid, then on in steps of this many ns as long as a look behind each wants.
+    Run(u64, u64, Look),
     /// Do this at the present halt.
     Do(Job),
 }
@@ -95,7 +101,8 @@ impl Rig {
         let bench = Bench::new(front_end, &image);
         let (orders, ordered) = mpsc::channel();
         let (reaching, reached) = mpsc::channel();
-        let hall = Hall { until_ns: bench.next_ns, bench, orders: ordered, reached: reaching };
+        let (until_ns, look): (_, Look) = (bench.next_ns, Box::new(|_| false));
+        let hall = Hall { until_ns, step_ns: 0, look, bench, orders: ordered, reached: reaching };
         let thread = std::thread::Builder::new()
             .name("board".into())
             .spawn(move || emulator::run(session, &Start::new(&images), hall).map(drop).map_err(failure))?;
@@ -125,11 +132,22 @@ impl Rig {
     /// Sets out for an instant still to come, and does not wait: boards that share a world run side by side. What is
     /// posted or asked behind it happens there; [`Rig::await_reached`] is to be called once for each.
     pub fn set_out(&mut self, until_ns: u64) -> Result<(), Error> {
-        self.order(Order::Run(until_ns.next_multiple_of(STEP_NS)))
+        self.order(Order::Run(until_ns.next_multiple_of(STEP_NS), 0, Box::new(|_| false)))
     }
 
     pub fn run_ms(&mut self, ms: u64) -> Result<(), Error> {
         self.run_until_ns(self.now_ns + ms * 1_000_000)
+    }
+
+    /// Runs in steps of this many ns until a look behind a step returns false. The emulator's thread looks, so a step
+    /// costs no switch between threads.
+    pub fn run_while(
+        &mut self,
+        step_ns: u64,
+        look: impl FnMut(&mut Stand<'_>) -> bool + Send + 'static,
+    ) -> Result<(), Error> {
+        self.order(Order::Run(self.now_ns + step_ns, step_ns, Box::new(look)))?;
+        self.await_reached()
     }
 
     /// Executes a job at the present halt, between two instructions.
@@ -240,25 +258,30 @@ pub struct Stand<'a> {
 }
 
 /// Drives a run by orders.
-#[derive(Debug)]
 struct Hall {
     bench: Bench,
     orders: mpsc::Receiver<Order>,
     reached: mpsc::Sender<u64>,
     until_ns: u64,
+    step_ns: u64,
+    look: Look,
 }
 
 impl Hall {
     /// Executes orders until one continues the run; returns false after the last order.
     fn halt(&mut self, session: &mut Session<Part>, stop: Stop, host: &mut dyn Host) -> bool {
-        let Self { bench, orders, reached, until_ns } = self;
+        let Self { bench, orders, reached, until_ns, step_ns, look } = self;
+        if look(&mut Stand { session, host, stop, bench }) {
+            *until_ns += *step_ns;
+            return true;
+        }
         if reached.send(bench.next_ns).is_err() {
             return false;
         }
         while let Ok(order) = orders.recv() {
             match order {
-                Order::Run(until) => {
-                    *until_ns = until;
+                Order::Run(until, step, while_true) => {
+                    (*until_ns, *step_ns, *look) = (until, step, while_true);
                     return true;
                 }
                 Order::Do(job) => job(&mut Stand { session, host, stop, bench }),

@@ -20,18 +20,18 @@ pub mod host;
 
 use crate::board::Surroundings;
 use crate::rig::Stand;
-use crate::{Error, Options, Rig, flash};
+use crate::{Error, Options, Rig};
 use finger::{Clock, Finger};
 use fingertip::contact::FitLevel;
 use fingertip::params::Params;
 use fingertip::shipped::{Config, Record, TARE_FRAMES, address};
 use host::{Host, Shown};
 use rigless::soc::Width;
+use sim::SimError;
 use sim::effects::Parts;
 use sim::effects::link;
 use sim::scene::Scene;
 use sim::watch::{Controller, Summary, Watch};
-use sim::{SimError, encode};
 use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::mpsc::Receiver;
@@ -81,7 +81,7 @@ impl Boards {
         let start_ns = (BOOT_NS + tare_ns + SET_UP_NS).next_multiple_of(MS);
         let moves_from_s = -(MS as f64) * 1e-9;
         let record = Record { params, baud_code: BAUD_CODE, return_delay_2us: 0, ..Record::DEFAULT };
-        let options = Options { presets: vec![(flash::SECTOR.start, encode(&record, 0))], ..Options::default() };
+        let options = Options::stored(&record);
         let mut rigs = Vec::new();
         let clock = Clock::new(start_ns);
         for (number, finger) in Finger::all(scene, clock, moves_from_s)?.into_iter().enumerate() {

@@ -1,7 +1,9 @@
 //! What the tests of the flash image share.
 
 use dynamixel2::{ReadError, TransferError};
-use fingertip::shipped::{REGISTERS, address};
+use fingertip::params::Params;
+use fingertip::shipped::{REGISTERS, Record, address};
+use fingertip::store::BAUD_RATES;
 use rigless::emulator::{Access, AccessKind};
 use rigless::soc::Width;
 use sim::plant::{Plant, Setup};
@@ -58,12 +60,31 @@ pub fn write_goal(rig: &mut Rig, goal_mn: u32) {
     write_u32(rig, address::GOAL_FORCE_MN, goal_mn);
 }
 
+/// Turns torque on with a goal.
+pub fn drive(rig: &mut Rig, goal_mn: u32) {
+    write_u8(rig, address::TORQUE_ENABLE, 1);
+    write_goal(rig, goal_mn);
+}
+
 /// Moves back from what is touched, then turns torque off: a tare under load is refused.
 pub fn let_go(rig: &mut Rig) {
-    write_u8(rig, address::TORQUE_ENABLE, 1);
-    write_goal(rig, 0);
-    rig.run_ms(300).expect("it runs");
+    drive(rig, 0);
+    until_at_rest(rig, 300, |_| {});
     write_u8(rig, address::TORQUE_ENABLE, 0);
+}
+
+/// Runs until the tip moves by less than 0.1 um in 10 ms, or for this time, with a look behind each step.
+pub fn until_at_rest(rig: &mut Rig, limit_ms: u64, mut look: impl FnMut(&mut Rig)) {
+    let mut before_mm = f64::INFINITY;
+    for _ in 0..limit_ms / 10 {
+        rig.run_ms(10).expect("it runs");
+        look(rig);
+        let now_mm = travel_mm(rig);
+        if (now_mm - before_mm).abs() < 1e-4 {
+            return;
+        }
+        before_mm = now_mm;
+    }
 }
 
 #[track_caller]
@@ -146,11 +167,18 @@ pub fn write_param(rig: &mut Rig, name: &str, value: u32) {
 /// Tares a board whose tip touches nothing, then holds 1 N.
 pub fn tare_and_hold(rig: &mut Rig) {
     write_and_run_ms(rig, address::TARE, 1, 20);
-    write_u8(rig, address::TORQUE_ENABLE, 1);
-    write_goal(rig, 1_000);
+    drive(rig, 1_000);
     rig.run_ms(150).expect("it runs");
     let force_n = force_n(rig);
     assert!((0.99..1.01).contains(&force_n), "{force_n} N");
+}
+
+/// A board whose bus runs at 3 Mbaud and whose answers come at once, so that a long read takes little time.
+pub fn fast_bus(direction_confirmed: i32) -> Options {
+    const BAUD_CODE: u8 = 5;
+    const { assert!(BAUD_RATES[BAUD_CODE as usize] == 3_000_000) };
+    let params = Params { direction_confirmed, ..Params::DEFAULT };
+    Options::stored(&Record { params, baud_code: BAUD_CODE, return_delay_2us: 0, ..Record::DEFAULT })
 }
 
 /// A board that holds 1 N against a wall 0.5 mm away.
@@ -162,8 +190,7 @@ pub fn holding(options: &Options) -> Rig {
 
 /// Has a board hold 1 N again.
 pub fn hold_again(rig: &mut Rig) {
-    write_u8(rig, address::TORQUE_ENABLE, 1);
-    write_goal(rig, 1_000);
+    drive(rig, 1_000);
     let mut held_ms = 0;
     for _ in 0..40 {
         rig.run_ms(5).expect("it runs");
@@ -173,12 +200,6 @@ pub fn hold_again(rig: &mut Rig) {
         }
     }
     panic!("1 N is not held again within 200 ms");
-}
-
-/// Reboots a board whose tip is back where it was at power-on.
-pub fn restart(rig: &mut Rig) {
-    rig.world(|world| world.place(0.0)).expect("it runs");
-    reboot(rig, 20);
 }
 
 /// True force of the tip.

@@ -2,8 +2,8 @@
 //! The image of `cargo xtask bringup`: what the board can show passes, and all else is told.
 
 use crate::common::{
-    PING, WAIT_NS, away, force_n, image, named, read_u8, read_u16, read_u32, register, running, write_goal,
-    write_param, write_u8, write_u32,
+    PING, WAIT_NS, away, drive, force_n, image, let_go, named, read_u8, read_u16, read_u32, register, write_param,
+    write_u8, write_u32,
 };
 use bringup::judge::{Board, Verdict};
 use fingertip::params::Params;
@@ -15,8 +15,10 @@ use virtual_board::report::PinEdge;
 use virtual_board::{Fault, Options, Rig, bringup as emulated};
 
 #[test]
-fn the_image_boots_scans_and_tells_how_the_board_is() {
-    let rig = &mut running(&away(0.5), &Options::default());
+fn the_image_boots_repeats_scans_and_tells_how_the_board_is() {
+    let rig = &mut eventful(Duration::ZERO);
+    two_runs_have_one_trace_also_on_a_slow_machine(rig);
+    let_go(rig);
     its_clock_begins_at_zero_and_never_falls_back(rig);
     frames_arrive_at_the_scans_rate(rig);
     it_answers_a_ping_at_its_baud_rate(rig);
@@ -31,7 +33,7 @@ fn the_image_boots_scans_and_tells_how_the_board_is() {
 
 fn its_clock_begins_at_zero_and_never_falls_back(rig: &mut Rig) {
     // A turn of the timer behind the clock is 65.536 ms.
-    for _ in 0..400 {
+    for _ in 0..200 {
         let true_ms = rig.now_ns() / 1_000_000;
         let tick_ms = u64::from(read_u16(rig, address::REALTIME_TICK));
         assert!((true_ms.saturating_sub(5)..=true_ms + 1).contains(&tick_ms), "{tick_ms} ms at {true_ms} ms");
@@ -195,8 +197,7 @@ fn eventful(pause: Duration) -> Rig {
     write_u8(&mut rig, address::TARE, 1);
     rig.run_until_ns(150_000_000).expect("it runs");
     rig.post(move |_| std::thread::sleep(pause)).expect("it runs");
-    write_u8(&mut rig, address::TORQUE_ENABLE, 1);
-    write_goal(&mut rig, 1_000);
+    drive(&mut rig, 1_000);
     rig.run_until_ns(250_000_000).expect("it runs");
     rig.transact(&PING, WAIT_NS).expect("it runs");
     rig.run_until_ns(300_000_000).expect("it runs");
@@ -204,10 +205,8 @@ fn eventful(pause: Duration) -> Rig {
 }
 
 /// The pause of the second run is longer than the client would wait at any common baud rate.
-#[test]
-fn two_runs_have_one_trace_also_on_a_slow_machine() {
-    let mut quick = eventful(Duration::ZERO);
-    let force_n = force_n(&mut quick);
+fn two_runs_have_one_trace_also_on_a_slow_machine(quick: &mut Rig) {
+    let force_n = force_n(quick);
     assert!((0.9..1.1).contains(&force_n), "{force_n} N: the tip holds what was asked for");
     let duties = quick.latency().expect("it runs").frames;
     assert!(duties > 1_000, "{duties} duties");

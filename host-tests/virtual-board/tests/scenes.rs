@@ -28,6 +28,7 @@ struct Kept {
     goal_n: f64,
     force_n: f64,
     sensed_n: f64,
+    /// Largest difference of the two in the first 0.1 s.
     error_n: f64,
     every_frame: bool,
     /// Duty at the motor at the end of each frame in the air.
@@ -45,7 +46,9 @@ impl Watch for Kept {
         self.goal_n = step.command.goal.0.to_num();
         self.force_n = step.truth.force_n;
         self.sensed_n = step.status.contact.force.0.to_num();
-        self.error_n = self.error_n.max((self.sensed_n - self.force_n).abs());
+        if step.time_s < 0.1 {
+            self.error_n = self.error_n.max((self.sensed_n - self.force_n).abs());
+        }
         if step.truth.speed_mm_per_s > 0.0 && step.truth.force_n == 0.0 {
             self.duties.push(step.truth.duty);
         }
@@ -91,18 +94,10 @@ fn both_boards_do_the_same_and_one_that_does_otherwise_is_noticed() {
     let [(force_n, _), (travel_mm, _)] = other.beyond;
     assert!(!other.held() && (force_n > BEYOND_N || travel_mm > BEYOND_MM), "{other}");
     assert!(kept.force_n == 0.0 && kept.times_s.last().is_some_and(|time_s| *time_s > 0.79), "{kept:?}");
-}
-
-#[test]
-fn a_run_shows_a_step_nearly_each_millisecond() {
-    let mut kept = Kept::default();
-    run(&scene(WALL), &mut kept);
     // A read is answered within a millisecond, or a little later right behind a goal: none is left out.
-    assert!((99..=101).contains(&kept.steps), "{} steps", kept.steps);
+    assert!((799..=801).contains(&kept.steps), "{} steps", kept.steps);
     let regular = kept.times_s.windows(2).all(|pair| (0.7e-3..1.4e-3).contains(&(pair[1] - pair[0])));
-    assert!(regular, "{:?}", kept.times_s);
-    assert!(kept.times_s[0] < 0.0);
-    assert_eq!(kept.goal_n, 1.0);
+    assert!(regular && kept.times_s[0] < 0.0, "{:?}", kept.times_s);
     // Status and truth belong to the same frame: during the ramp of 120 N/s the force changes by 12 mN a frame.
     assert!(kept.error_n < 0.012, "{} N", kept.error_n);
 }
@@ -120,7 +115,7 @@ fn each_duty_acts_for_a_frame_and_every_frame_is_shown() {
     assert!(kept.duties.len() > 950 && twice == 0, "{twice} of {}: {:?}", kept.duties.len(), kept.duties);
 }
 
-/// Holds 1 N on a thing along which the hand then moves, with a host that reads or does not.
+/// Holds 1 N on a thing along which the hand then moves, with a host that reads this often, or never at 0.
 fn along_a_thing(read_ms: f64) -> Scene {
     let text = format!(
         "about = \"along\"\nduration_s = 0.5\n[object]\ndistance_mm = 0.5\n\
@@ -135,7 +130,7 @@ fn along_a_thing(read_ms: f64) -> Scene {
 fn the_host_s_grip_acts_on_what_it_reads_over_the_bus() {
     // A lift by 1 mm loads the grip with 1 N; at a trusted friction of 0.4 that needs 2.5 N, or somewhat more.
     let (mut blind, mut gripping, mut native) = (Kept::default(), Kept::default(), Kept::default());
-    run(&along_a_thing(0.0), &mut blind);
+    sim::simulate(&along_a_thing(0.0), &mut blind).expect("the scene runs natively");
     run(&along_a_thing(2.0), &mut gripping);
     sim::simulate(&along_a_thing(2.0), &mut native).expect("the scene runs natively");
     assert_eq!(blind.goal_n, 1.0);
@@ -169,12 +164,12 @@ fn broken(name: &str) -> Vec<String> {
     verdicts.map(|verdict| format!("{name}: {verdict:?}")).collect()
 }
 
-/// Scenes of the usual size: all effects at once, and a free object lifted by two fingers.
-const USUAL: [&str; 2] = ["everything", "grasp"];
+/// Scene of the usual size: all effects at once, on a free object that two fingers hold.
+const USUAL: &str = "everything";
 
 sim::sizes!(
     scenes_of_the_library_hold_their_bounds_on_the_image,
-    assert_eq!(cores::map(&USUAL, |name| broken(name)).concat(), [""; 0]),
+    assert_eq!(broken(USUAL), [""; 0]),
     every_other_scene()
 );
 
@@ -182,7 +177,7 @@ fn every_other_scene() {
     let mut names = scene::library_names().expect("the library is there");
     assert!(names.len() >= 14, "{names:?}");
     // Judged below, and in full by `cargo xtask docs --check`.
-    names.retain(|name| name != "demo" && !USUAL.contains(&name.as_str()));
+    names.retain(|name| name != "demo" && name != USUAL);
     // The longest begins first: it takes as long as all others together.
     names.sort_by_key(|name| name != "hot_hour");
     let broken = cores::map(&names, |name| broken(name)).concat();

@@ -1,13 +1,10 @@
 //! The microcontroller's temperature and the analogue supply as the board measures them while it runs, and the drift that
 //! it computes from them.
 
-use crate::common::{image, poke, read_u16, read_u32, running, write_and_run_ms, write_goal, write_param, write_u8};
+use crate::common::{drive, image, poke, read_u16, read_u32, write_and_run_ms, write_param, write_u8};
 use fingertip::chip::Factory;
 use fingertip::params::Params;
 use fingertip::shipped::{Record, address};
-use sim::encode;
-use sim::plant::Setup;
-use virtual_board::flash::SECTOR;
 use virtual_board::scene::finger::{Clock, Finger};
 use virtual_board::{Error, Options, Rig, converter};
 
@@ -38,24 +35,17 @@ fn warming(factory: Factory) -> Rig {
         array_zero_pa_per_k: ZERO_PA_PER_K,
         ..Params::DEFAULT
     };
-    let presets = vec![(SECTOR.start, encode(&Record { params, ..Record::DEFAULT }, 0))];
+    let options = Options { factory, ..Options::stored(&Record { params, ..Record::DEFAULT }) };
     let keys = ["effects.temperature_drift.time_constant_s=1.0".into(), "object.distance_mm=0.5".into()];
     let scene = sim::cli::load("hot_hour", &keys, None).unwrap_or_else(|error| panic!("{error}"));
     let clock = Clock::new(START_MS * 1_000_000);
     let finger = Finger::all(&scene, clock, -0.001).expect("the world is simulated").remove(0);
-    let mut rig =
-        Rig::new(&image(), finger, &Options { presets, factory, ..Options::default() }).expect("the image starts");
+    let mut rig = Rig::new(&image(), finger, &options).expect("the image starts");
     rig.run_until_ns(20_000_000).expect("it runs");
     write_u8(&mut rig, address::TARE, 1);
     rig.run_until_ns(START_MS * 1_000_000).expect("it runs");
-    hold(&mut rig);
+    drive(&mut rig, 1_000);
     rig
-}
-
-/// Asks for 1 N.
-fn hold(rig: &mut Rig) {
-    write_u8(rig, address::TORQUE_ENABLE, 1);
-    write_goal(rig, 1_000);
 }
 
 fn true_c(rig: &mut Rig) -> f64 {
@@ -69,7 +59,7 @@ fn the_board_measures_its_temperature_and_the_force_s_drift() {
     assert!(matches!(rig.world(|world| world.force_n()), Err(Error::OtherWorld)));
     codes_that_stay_away_are_no_temperature_and_the_finger_holds_on(&mut rig);
     the_means_go_on_where_the_scan_starts_again(&mut rig);
-    hold(&mut rig);
+    drive(&mut rig, 1_000);
     the_bus_tells_the_chip_s_temperature_and_the_drift(&mut rig);
     // The emulated converter reports inputs that are sampled for too short a time.
     rig.check_gaps().expect("nothing is missing");
@@ -128,14 +118,4 @@ fn without_the_factory_s_codes_there_is_no_temperature_and_no_term() {
     assert_eq!((chip_mc(rig), drift_mn(rig)), (UNMEASURED_MC, 0));
     assert_eq!(read_u16(rig, address::ANALOGUE_SUPPLY_MV), 0);
     assert!(read_u32(rig, address::PRESENT_FORCE_MN) > 900, "it holds its goal all the same");
-}
-
-#[test]
-fn a_low_analogue_supply_is_reported_and_does_not_change_the_temperature() {
-    let mut setup = Setup::default();
-    setup.array.reference_v = 3.1;
-    let mut rig = running(&setup, &Options::default());
-    rig.run_ms(20).expect("it runs");
-    let (mv, chip) = (read_u16(&mut rig, address::ANALOGUE_SUPPLY_MV), chip_mc(&mut rig));
-    assert!((3_095..=3_105).contains(&mv) && (chip - 25_000).abs() < 500, "{mv} mV, {chip} mC");
 }

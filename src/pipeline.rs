@@ -28,7 +28,7 @@ use crate::frame::{Frame, Sense, Shape};
 use crate::grip::{Goal, Grip};
 use crate::measure::strokes::{self, Kept};
 use crate::measure::{Row, press};
-use crate::pressure::{Array, Calibration};
+use crate::pressure::{Array, Calibration, TactileImage};
 use crate::safety::guard::{Guard, Seen};
 use crate::safety::monitor::{self, Monitor, MonitorInputs};
 use crate::state::{Fault, Limits};
@@ -113,8 +113,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
 
         // The tactile image and the contact in it. With a broken array a driven finger keeps the last
         // contact, and the motor gets no voltage by it.
-        self.array.read(frame, &self.config);
-        let readable = monitor::array_readable(self.array.picture(), &self.config);
+        let TactileImage { bad_count, undriven_max, .. } = *self.array.read(frame, &self.config);
+        let readable = monitor::array_readable(bad_count, undriven_max, &self.config);
         let contact = self.contact(readable);
 
         // Requests of the host, and reasons to stop.
@@ -380,8 +380,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     /// motor. A taxel that fails just after it was read is seen a frame later; without this check the motor would be
     /// driven until that frame's end. The step decides if it is a fault.
     pub fn begin(&mut self, frame: &Frame<ROWS, COLUMNS>, rows: usize) -> bool {
-        let bad_taxels = self.array.begin(frame, rows, &self.config);
-        let broken = self.activity.drives() && bad_taxels > self.config.params.bad_taxels_max.max(0) as u32;
+        let (bad_count, undriven_max) = self.array.begin(frame, rows, &self.config);
+        let broken = self.activity.drives() && !monitor::array_readable(bad_count, undriven_max, &self.config);
         if broken {
             self.motion.drive.block();
             self.status.duty = Duty::ZERO;

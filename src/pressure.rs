@@ -210,8 +210,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
 
     /// Reads the first rows of a frame whose later rows are still being scanned; [`Array::read`] of the frame continues
     /// behind them, with the same result. Returns the number of taxels that these rows show as dead or saturated, and
-    /// that the last frame showed in the other rows, without masked ones.
-    pub fn begin(&mut self, frame: &Frame<ROWS, COLUMNS>, rows: usize, config: &Config) -> u32 {
+    /// that the last frame showed in the other rows, without masked ones; and the highest undriven level.
+    pub fn begin(&mut self, frame: &Frame<ROWS, COLUMNS>, rows: usize, config: &Config) -> (u16, u16) {
         let rows = rows.min(ROWS);
         self.begin_again();
         self.read_rows(frame, rows, config);
@@ -229,7 +229,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
             let others = self.picture.bad.iter().zip(&self.mask).skip(rows);
             count += others.map(|(bad, mask)| (bad & !mask).count_ones()).sum::<u32>();
         }
-        count
+        (count as u16, self.so_far.undriven_max)
     }
 
     /// Lets the next frame be read from its first row on: rows that were read with another configuration or calibration

@@ -215,6 +215,10 @@ fn a_part_of_a_frame_shorts_only_a_driven_motor_and_only_if_it_is_broken() {
     let frame = dead(&last, 0..1);
     assert!(!board.pipeline().begin(&frame, 0));
     assert!(board.pipeline().begin(&frame, 1));
+    // A row that is stuck on shows in the slot without a row, which comes first.
+    let mut stuck = *board.frame();
+    stuck.set_code(ROWS, 3, 2_000);
+    assert!(board.pipeline().begin(&stuck, 0));
     let after = *board.status();
     assert_eq!((after.mode, after.fault, after.duty.0), (Mode::Force, None, 0));
     board.command().torque = false;

@@ -274,7 +274,7 @@ fn an_array_is_broken_from_the_very_limit_on() {
         (51, 51, stuck + 1, Some(Fault::RowStuck), false),
     ] {
         let picture = TactileImage { bad_count, bad_again, undriven_max, ..TactileImage::EMPTY };
-        let found = (array_broken(&picture, &config), array_readable(&picture, &config));
+        let found = (array_broken(&picture, &config), array_readable(bad_count, undriven_max, &config));
         assert_eq!(found, (fault, sound), "{bad_count} bad, {bad_again} again, {undriven_max} codes");
     }
 }

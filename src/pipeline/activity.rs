@@ -26,6 +26,7 @@ use crate::control::SpeedLoop;
 use crate::frame::Sense;
 use crate::grip::Grip;
 use crate::measure::{BuiltIn, Ended, MeasureState, MeasureStatus, Press, Strokes, Task};
+use crate::pressure::TactileImage;
 use crate::safety::guard::Guard;
 use crate::safety::monitor;
 use crate::state::{Fault, Mode};
@@ -233,7 +234,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     /// Returns true if a tare that is requested now is measured.
     pub(crate) fn takes_tare(&self, forced: bool) -> bool {
         // New parameters reset the record of the touch. Until the next frame renews it, the last contact decides.
-        let readable = monitor::array_readable(self.array.picture(), &self.config);
+        let TactileImage { bad_count, undriven_max, .. } = *self.array.picture();
+        let readable = monitor::array_readable(bad_count, undriven_max, &self.config);
         let touches = readable && self.status.contact.force >= self.config.contact_on;
         let unseen = self.touch.stage() == Stage::None && touches;
         let pressed = self.tared && (self.touch.held() || unseen) && !forced;

@@ -205,14 +205,11 @@ pub fn array_broken<const ROWS: usize, const COLUMNS: usize>(
     }
 }
 
-/// Returns true if a frame's array can be read. It cannot if more taxels are bad than allowed, even in this frame
-/// only.
-pub fn array_readable<const ROWS: usize, const COLUMNS: usize>(
-    picture: &TactileImage<ROWS, COLUMNS>,
-    config: &Config,
-) -> bool {
+/// Returns true if a frame's array can be read, by its number of bad taxels and its highest undriven level. It cannot if
+/// more taxels are bad than allowed, even in this frame only.
+pub fn array_readable(bad_count: u16, undriven_max: u16, config: &Config) -> bool {
     let p = &config.params;
-    i32::from(picture.undriven_max) <= p.undriven_max_codes && i32::from(picture.bad_count) <= p.bad_taxels_max
+    i32::from(undriven_max) <= p.undriven_max_codes && i32::from(bad_count) <= p.bad_taxels_max
 }
 
 fn sums<const ROWS: usize, const COLUMNS: usize>(picture: &TactileImage<ROWS, COLUMNS>) -> [i32; 3] {

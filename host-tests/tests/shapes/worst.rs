@@ -176,7 +176,7 @@ fn leaves_out<const ROWS: usize, const COLUMNS: usize>() {
             let picture = *array.read(&spoilt, &config);
             let mut bad = [0; ROWS];
             bad[row] = 1 << column;
-            assert_eq!((picture.bad, picture.bad_count, array.begin(&spoilt, ROWS, &config)), (bad, 1, 1));
+            assert_eq!((picture.bad, picture.bad_count, array.begin(&spoilt, ROWS, &config).0), (bad, 1, 1));
             assert_eq!(picture.taxels[row][column], 0);
             let sound = picture.taxels.iter().flatten().filter(|taxel| **taxel > 0).count();
             assert!(picture.peak > 0 && sound + 1 == ROWS * COLUMNS);

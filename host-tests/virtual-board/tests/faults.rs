@@ -320,25 +320,24 @@ fn world(rig: &mut Rig, change: impl FnOnce(&mut Plant) + Send + 'static) {
     rig.world(change).expect("it runs");
 }
 
-sim::sizes!(each_fault_stops_the_motor_in_time_and_the_mended_board_goes_on, each_fault(3, 6), each_fault(1, 3));
-
-/// Breaks a board in one of `fine` slots of a frame where each slot may matter, in one of `coarse` slots elsewhere.
-fn each_fault(fine: usize, coarse: usize) {
+/// Where the scan or the array breaks, each slot matters.
+#[test]
+fn each_fault_stops_the_motor_in_time_and_the_mended_board_goes_on() {
     let rig = &mut holding(&Options::confirmed());
-    break_and_time(rig, "converters stall", fine, &[Number::LostFrames], TWO_FRAMES_US, |rig| {
+    break_and_time(rig, "converters stall", 1, &[Number::LostFrames], TWO_FRAMES_US, |rig| {
         rig.inject(Fault::ConvertersStall).expect("it runs");
     });
-    break_and_time(rig, "a trigger missed by a bank", fine, &[Number::LostFrames], TWO_FRAMES_US, |rig| {
+    break_and_time(rig, "a trigger missed by a bank", 1, &[Number::LostFrames], TWO_FRAMES_US, |rig| {
         rig.inject(Fault::TriggerMissed).expect("it runs");
     });
     assert!(read_u16(rig, address::OUT_OF_STEP) > 0);
     let of_array = [Number::ArrayBroken, Number::RowStuck];
     for state in [Row::StuckLow, Row::StuckHigh] {
-        break_and_time(rig, &format!("row {state:?}"), coarse, &of_array, TWO_FRAMES_US, |rig| {
+        break_and_time(rig, &format!("row {state:?}"), 1, &of_array, TWO_FRAMES_US, |rig| {
             world(rig, move |world| world.faults.array.rows[4] = state);
         });
     }
-    break_and_time(rig, "saturated", coarse, &of_array, TWO_FRAMES_US, |rig| {
+    break_and_time(rig, "saturated", 1, &of_array, TWO_FRAMES_US, |rig| {
         world(rig, |world| world.faults.array.saturated = true);
     });
     // All over the array, or as near to each other as they can be: read first, last or in the middle of a frame.
@@ -346,8 +345,7 @@ fn each_fault(fine: usize, coarse: usize) {
         [(Taxel::Dead, 0, 7), (Taxel::Shorted, 0, 7), (Taxel::Dead, 0, 1), (Taxel::Dead, 40, 1), (Taxel::Dead, 88, 1)]
     {
         let name = format!("12 taxels {state:?} from {first}, {apart} apart");
-        let every = if apart == 1 { fine } else { coarse };
-        break_and_time(rig, &name, every, &[Number::ArrayBroken], TWO_FRAMES_US, |rig| {
+        break_and_time(rig, &name, 1, &[Number::ArrayBroken], TWO_FRAMES_US, |rig| {
             world(rig, move |world| {
                 for place in (0..12).map(|taxel| first + taxel * apart) {
                     world.faults.array.taxels[place / 10][place % 10] = state;

@@ -16,10 +16,11 @@
 //! | read | any bytes of the table, 0 where there is no register; beyond its end an access error; 1 to 256 bytes: length error otherwise |
 //! | stored registers | written with torque off only; kept over a reset only once `save_parameters` was written |
 //! | value beyond another register's limit, parameters that contradict each other | limit error |
-//! | fault | torque enable and goal force go to 0; torque enable and goals above 0 are refused (result error) until the fault is cleared: `recover` does all that this takes in one write |
+//! | fault | torque enable and goal force go to 0; torque enable is refused (result error) until the fault is cleared: `recover` does all that this takes in one write |
 //! | request that cannot be carried out in the present mode | result error: a tare in a fault that is not cleared by then, a press that measures without torque or tare, a save or Factory Reset while the loop drives or tares. A later failure shows in `tare_state`, `measure_state` and `saved_state`, also after a request without an answer |
 //! | bus watchdog | counts from the last good instruction packet for this device, broadcasts included; on a trip it reads -1, and until 0 is written to it goals are refused (range error, as X-series servos do) and torque enable is (result error) |
-//! | torque off | takes the goal back |
+//! | torque off | the goal is 0; goals above 0 are refused (result error), unless the same write enables torque |
+//! | Reg Write | dropped by a fault, torque off, a goal of 0, `measure` 0 and `recover` |
 //! | before the first tare | force and all values computed from it read 0 |
 //! | damaged packet | CRC error where it seems to be for this device, silence otherwise; nothing is done |
 //! | Sync Read, Bulk Read | answered after the status packet of the device before in the list is heard; silent where that one is |

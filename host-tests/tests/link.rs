@@ -224,6 +224,7 @@ proptest! {
         prop_assert!(settings.command.bus_watchdog_ms <= 127 * 20);
         let goal = settings.command.goal;
         prop_assert!(goal >= fingertip::units::Newtons::ZERO);
+        prop_assert!(goal == fingertip::units::Newtons::ZERO || settings.command.torque);
         prop_assert!(goal <= fingertip::config::newtons(settings.record.params.force_max_mn));
     }
 }

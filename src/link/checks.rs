@@ -96,9 +96,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Staged<'_, ROWS, COLUMNS> {
     }
 
     /// Refuses settings that no register's own range can refuse, and requests that cannot be carried out: a goal above
-    /// 0 in a fault, which releases the object; a tare in a fault that is not cleared; a press without torque or tare;
-    /// a jog or strokes with torque, in a fault or without a tare; and a save while the loop drives, is about to or
-    /// tares, when it must not wait for the flash.
+    /// 0 without torque, as in a fault; a tare in a fault that is not cleared; a press without torque or tare; a jog or
+    /// strokes with torque, in a fault or without a tare; and a save while the loop drives, is about to or tares, when
+    /// it must not wait for the flash.
     pub fn check(&self, before: &Settings<ROWS, COLUMNS>) -> Result<(), StatusError> {
         let Settings { record, command, .. } = &self.settings;
         if record.params != before.record.params {
@@ -112,7 +112,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Staged<'_, ROWS, COLUMNS> {
         }
         let (status, faulted, taring) = (&self.snapshot.status, self.snapshot.faulted(), self.taring());
         let tared = !status.limits.has(Limits::NOT_TARED);
-        let goal = command.goal == Newtons::ZERO || !faulted;
+        let goal = command.goal == Newtons::ZERO || command.torque;
         let stopped = faulted && command.clear_request == status.taken.clear;
         let tare = command.tare_request == before.command.tare_request || !stopped;
         let measure = command.measure_request == before.command.measure_request

@@ -184,13 +184,14 @@ impl<const ROWS: usize, const COLUMNS: usize> Server<ROWS, COLUMNS> {
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Device<ROWS, COLUMNS> {
-    /// Updates the settings. A fault turns torque off and sets the goal to 0; a silent bus also trips the watchdog's
-    /// register.
+    /// Updates the settings. A fault turns torque off, sets the goal to 0 and drops a registered write; a silent bus also
+    /// trips the watchdog's register.
     fn observe(&mut self, status: &Status) {
         let command = &mut self.settings.command;
         if status.fault.is_some() {
             command.torque = false;
             command.goal = Newtons::ZERO;
+            self.registered = None;
         }
         let bus_silent = status.fault == Some(Fault::BusSilent);
         if bus_silent && !self.bus_silent {

@@ -106,6 +106,8 @@ pub(super) fn check_read<const ROWS: usize, const COLUMNS: usize>(
 pub(super) struct Staged<'a, const ROWS: usize, const COLUMNS: usize> {
     pub settings: Settings<ROWS, COLUMNS>,
     pub actions: Actions,
+    /// True once a goal of 0, torque off, `measure` 0 or `recover` was written: a write that waits for its Action is dropped.
+    pub stops: bool,
     pub snapshot: &'a Snapshot<'a, ROWS, COLUMNS>,
     /// Clocks of the board, which bound some parameters.
     pub clocks: &'static Clocks,

@@ -20,6 +20,8 @@ const PING_BITS: u32 = 14 * 10;
 /// No bus is slower: all IDs would take minutes to answer.
 pub const BAUD_MIN: i64 = 1_200;
 pub const ID_MAX: u8 = 252;
+/// Most devices of a Sync Write of 4 bytes each: a finger's longest packet has 384 bytes behind its header.
+const LISTED: usize = 74;
 /// Time between two keep-alive packets.
 const FEED: Duration = Duration::from_millis(100);
 
@@ -208,6 +210,17 @@ impl Client {
     /// Writes a register of one number of all devices on the bus. None of them answers.
     pub fn set_all(&mut self, address: u16, value: i64) -> Result<(), Error> {
         self.transmit(&packet(BROADCAST, instruction::WRITE, &assignment(address, value)?))
+    }
+
+    /// Writes a register of one number of these devices, in as few packets as a device can receive. None of them answers.
+    pub fn set_each(&mut self, ids: &[u8], address: u16, value: i64) -> Result<(), Error> {
+        let assigned = assignment(address, value)?;
+        let (register, data) = assigned.split_at(2);
+        ids.chunks(LISTED).try_for_each(|ids| {
+            let entries = ids.iter().flat_map(|id| [&[*id], data].concat());
+            let params: Vec<u8> = register.iter().copied().chain([data.len() as u8, 0]).chain(entries).collect();
+            self.transmit(&packet(BROADCAST, instruction::SYNC_WRITE, &params))
+        })
     }
 
     /// Sends a packet unchanged. Returns the bytes received until this number of status packets arrived, or until the

@@ -76,8 +76,14 @@ fn say_json(value: &Value) {
     }
 }
 
-/// Runs a command for each ID of `--id`, also after an error of one. Several answers in JSON are one array.
-pub fn each(reach: &Reach, titled: bool, command: impl Fn(&mut Client) -> Result<(), Error>) -> Result<(), Error> {
+/// Runs a command for each ID of `--id`, also after an error of one. Before that, all of them get the values `first`, in one
+/// packet each, which no absent ID delays. Several answers in JSON are one array.
+pub fn each(
+    reach: &Reach,
+    titled: bool,
+    first: &[(u16, i64)],
+    command: impl Fn(&mut Client) -> Result<(), Error>,
+) -> Result<(), Error> {
     let mut client = Client::open(reach)?;
     let mut ids = reach.ids.clone();
     if ids.contains(&BROADCAST) {
@@ -87,6 +93,7 @@ pub fn each(reach: &Reach, titled: bool, command: impl Fn(&mut Client) -> Result
             return Err("no fingertip answers: is it powered, and is the baud rate right?".into());
         }
     }
+    first.iter().try_for_each(|(register, value)| client.set_each(&ids, *register, *value))?;
     if let ([id], false) = (&ids[..], reach.ids.contains(&BROADCAST)) {
         client.id = *id;
         return command(&mut client);

@@ -7,7 +7,7 @@ use fingertip::link::{Captured, Crash, CrashCause, Health, Reply, ResetCause};
 use fingertip::params::Params;
 use fingertip::pipeline::{AcknowledgedRequests, Status, Taring};
 use fingertip::pressure::TARE_BITS;
-use fingertip::shipped::{CLOCKS, COLUMNS, Frame, REGISTERS, ROWS, Record, SLOTS, Server, Snapshot};
+use fingertip::shipped::{CLOCKS, COLUMNS, Frame, REGISTERS, ROWS, Record, SLOTS, Server, Snapshot, address};
 use fingertip::state::{Fault, Mode};
 
 pub const ID: u8 = 1;
@@ -47,6 +47,13 @@ impl Bench {
     pub fn new() -> Self {
         let params = Params { direction_confirmed: 1, ..Params::DEFAULT };
         Self::with(Record { id: ID, params, ..Record::DEFAULT })
+    }
+
+    /// The same with torque.
+    pub fn on() -> Self {
+        let mut bench = Self::new();
+        bench.write(address::TORQUE_ENABLE, &[1]).expect("torque");
+        bench
     }
 
     pub fn with(record: Record) -> Self {

@@ -23,12 +23,13 @@ fn a_mirror_reads_as_what_it_mirrors() {
 
 #[test]
 fn a_mirror_is_written_by_the_rules_of_what_it_mirrors() {
-    let mut bench = Bench::new();
+    let mut bench = Bench::on();
     assert_eq!(bench.write(address::MIRROR_GOAL_MN, &1_500i32.to_le_bytes()), Ok(()));
     assert_eq!(bench.number(address::GOAL_FORCE_MN, 4), 1_500);
     assert_eq!(bench.write(address::MIRROR_GOAL_MN, &8_000i32.to_le_bytes()), Err(6));
     assert_eq!(bench.write(address::MIRROR_GOAL_MN, &[0, 0]), Err(5));
     assert_eq!(bench.write(address::MIRROR_FORCE_MN, &[0; 4]), Err(7));
+    bench.write(address::TORQUE_ENABLE, &[0]).expect("off");
     assert_eq!(bench.write(address::MIRROR_TARE, &[1]), Ok(()));
     assert_eq!(bench.server.command().tare_request, 1);
     bench.take_up();
@@ -78,6 +79,7 @@ fn a_servos_driver_finds_effort_speed_and_supply() {
     assert_eq!(bench.read(132, 4), bench.read(296, 4));
     assert_eq!(bench.read(144, 2), Ok(60u16.to_le_bytes().to_vec()));
     bench.set_fault(None);
+    bench.write(address::TORQUE_ENABLE, &[1]).expect("torque");
     assert_eq!(bench.write(102, &2_500i16.to_le_bytes()), Ok(()));
     assert_eq!(bench.number(address::GOAL_FORCE_MN, 4), 2_500);
     assert_eq!(bench.write(102, &(-1i16).to_le_bytes()), Err(4));
@@ -88,9 +90,11 @@ fn a_servos_driver_finds_effort_speed_and_supply() {
         assert_eq!(bench.read(address::SHORT_FORCE_MN, 2), Ok(expected.to_le_bytes().to_vec()), "{mn}");
     }
     assert!(param("force_fault_mn") < param("force_max_mn"));
+    bench.write(address::TORQUE_ENABLE, &[0]).expect("off");
     bench
         .write(param("force_fault_mn"), &[80_000i32, 50_000].map(i32::to_le_bytes).concat())
         .expect("a stronger finger");
+    bench.write(address::TORQUE_ENABLE, &[1]).expect("torque");
     bench.write(address::GOAL_FORCE_MN, &40_000i32.to_le_bytes()).expect("a goal");
     assert_eq!(bench.read(address::SHORT_GOAL_MN, 2), Ok(i16::MAX.to_le_bytes().to_vec()));
 }
@@ -139,9 +143,10 @@ fn a_write_reaches_whole_registers_by_their_own_rules() {
     lead(&mut bench, addresses, 5, address::PRESENT_MODE, 1);
     lead(&mut bench, addresses, 6, address::PARAMS, 4);
     let goal = |mn: i32| mn.to_le_bytes();
+    assert_eq!(bench.write(data, &goal(1_500)), Err(StatusError::Result as u8), "torque is off");
+    assert_eq!(bench.write(data, &[&goal(1_600)[..], &[1]].concat()), Ok(()), "two registers at once");
     assert_eq!(bench.write(data, &goal(1_500)), Ok(()));
     assert_eq!(bench.number(address::GOAL_FORCE_MN, 4), 1_500);
-    assert_eq!(bench.write(data, &[&goal(1_600)[..], &[1]].concat()), Ok(()), "two registers at once");
     assert!(bench.server.command().torque);
 
     for (at, bytes, error, what) in [
@@ -184,7 +189,7 @@ fn what_is_led_to_in_pieces_cannot_be_written() {
 /// One packet may say where its bytes go, and bring them.
 #[test]
 fn addresses_count_from_the_same_write_on() {
-    let mut bench = Bench::new();
+    let mut bench = Bench::on();
     let (addresses, _) = BLOCKS[0];
     let targets = (address::GOAL_FORCE_MN..).take(4).chain([0; 24]).flat_map(u16::to_le_bytes);
     let bytes: Vec<u8> = targets.chain(700i32.to_le_bytes()).collect();

@@ -15,8 +15,7 @@ fn goal(bench: &mut Bench, mn: i32) -> Result<(), u8> {
 
 /// Torque and a goal of 1 N.
 fn ordered() -> Bench {
-    let mut bench = Bench::new();
-    bench.write(address::TORQUE_ENABLE, &[1]).expect("torque");
+    let mut bench = Bench::on();
     goal(&mut bench, 1_000).expect("a goal");
     bench
 }
@@ -170,12 +169,64 @@ fn torque_off_takes_the_goal_back() {
     assert_eq!(bench.write(address::TORQUE_ENABLE, &[1]), Ok(()));
     assert_eq!(bench.write(address::TORQUE_ENABLE, &[0, 0]), Err(7));
     assert_eq!(bench.number(address::GOAL_FORCE_MN, 4), 700);
-    // A goal written while torque is off is a new one.
+    // A goal without torque would press as soon as another client enables torque.
     bench.write(address::TORQUE_ENABLE, &[0]).expect("off");
-    goal(&mut bench, 300).expect("a goal");
-    bench.write(address::TORQUE_ENABLE, &[1]).expect("on");
-    assert_eq!(bench.number(address::GOAL_FORCE_MN, 4), 300);
+    assert_eq!((goal(&mut bench, 300), goal(&mut bench, 0)), (RESULT, Ok(())));
+    // Both in one packet, in the order of a Bulk Write's entries.
+    let entries = |torque: u8| [&[ID, 64, 0, 1, 0, torque, ID, 0, 1, 4, 0][..], &300i32.to_le_bytes()].concat();
+    for (torque, expected) in [(1, 300), (0, 0)] {
+        assert_eq!(bench.ask_as(BROADCAST, instruction::BULK_WRITE, &entries(torque)), None);
+        assert_eq!(bench.number(address::GOAL_FORCE_MN, 4), expected);
+    }
 }
+
+proptest! {
+    #![proptest_config(seeded(3000, 22))]
+
+    /// No goal waits for torque, so turning torque on never moves a finger by itself.
+    #[test]
+    fn there_is_a_goal_only_with_torque(
+        steps in prop::collection::vec((0..WRITES.len(), prop::sample::select(&[0x03, 0x03, 0x04, 0x05][..]), 0..8u8), 1..40),
+    ) {
+        let mut bench = Bench::new();
+        let places = [address::SHORT_GOAL_MN, address::SHORT_GOAL_MN + 1, address::TORQUE_ENABLE, RECOVER];
+        bench.write(address::INDIRECT_ADDRESS_1, &places.map(u16::to_le_bytes).concat()).expect("torque is off");
+        for (place, instruction, event) in steps {
+            let (register, data) = WRITES[place];
+            let params = [&register.to_le_bytes()[..], data].concat();
+            bench.ask(instruction, if instruction == 0x05 { &[] } else { &params });
+            match event {
+                0 => bench.set_fault(Some(Fault::BusSilent)),
+                1 => bench.set_fault(None),
+                2 => bench.take_up(),
+                _ => {}
+            }
+            bench.ask(0x01, &[]);
+            let Command { torque, goal, .. } = bench.server.command();
+            prop_assert!(torque || goal == Newtons::ZERO, "{register} {data:?}");
+        }
+    }
+}
+
+/// Writes that torque and goal depend on.
+const WRITES: [(u16, &[u8]); 14] = [
+    (address::TORQUE_ENABLE, &[0]),
+    (address::TORQUE_ENABLE, &[1]),
+    (address::GOAL_FORCE_MN, &[0, 0, 0, 0]),
+    (address::GOAL_FORCE_MN, &[0, 2, 0, 0]),
+    // A tare, and the end of a fault.
+    (address::GOAL_FORCE_MN, &[0, 2, 0, 0, 1, 1]),
+    (address::SHORT_GOAL_MN, &[0, 2]),
+    (address::MIRROR_GOAL_MN, &[0, 2, 0, 0]),
+    // Goal, torque and recovery through indirect addresses.
+    (address::INDIRECT_DATA_1, &[0, 2, 0]),
+    (address::INDIRECT_DATA_1, &[0, 2, 1]),
+    (address::INDIRECT_DATA_1, &[0, 2, 1, 1]),
+    (RECOVER, &[1]),
+    (address::CLEAR_FAULT, &[1]),
+    (address::BUS_WATCHDOG, &[0]),
+    (address::MEASURE, &[3]),
+];
 
 /// An untared array shows its offsets: as pressures they would be false. The loop itself reports no contact then.
 #[test]
@@ -259,9 +310,9 @@ fn a_tripped_watchdog_reads_minus_one_until_it_is_reset() {
 
     assert_eq!(bench.write(address::BUS_WATCHDOG, &[0]), Ok(()));
     assert_eq!(bench.number(address::BUS_WATCHDOG, 1), 0);
-    assert_eq!(bench.write(address::GOAL_FORCE_MN, &500i32.to_le_bytes()), Ok(()));
     assert_eq!(bench.write(address::BUS_WATCHDOG, &[1]), Ok(()));
     assert_eq!(bench.write(address::TORQUE_ENABLE, &[1]), Ok(()));
+    assert_eq!(bench.write(address::GOAL_FORCE_MN, &500i32.to_le_bytes()), Ok(()));
     bench.set_fault(Some(Fault::BusSilent));
     assert_eq!(bench.number(address::BUS_WATCHDOG, 1), 0xFF, "it trips again");
 }
@@ -366,8 +417,8 @@ fn torque_and_goals_wait_until_the_fault_is_seen_to_be_cleared() {
     assert_eq!(bench.write(address::TORQUE_ENABLE, &[1]), RESULT);
     assert_eq!(bench.write(address::GOAL_FORCE_MN, &goal), RESULT);
     bench.take_up();
-    assert_eq!(bench.write(address::GOAL_FORCE_MN, &goal), Ok(()));
     assert_eq!(bench.write(address::TORQUE_ENABLE, &[1]), Ok(()));
+    assert_eq!(bench.write(address::GOAL_FORCE_MN, &goal), Ok(()));
     assert_eq!(bench.number(address::GOAL_FORCE_MN, 4), 1_000);
 }
 

@@ -9,7 +9,9 @@ use fingertip::shipped::{Record, Settings, address};
 const BROADCAST: u8 = 254;
 
 fn device(id: u8) -> Bench {
-    let mut bench = Bench::with(Record { id, ..Record::DEFAULT });
+    let mut bench = Bench::new();
+    bench.write(address::ID, &[id]).expect("an ID");
+    bench.write(address::TORQUE_ENABLE, &[1]).expect("torque");
     bench.status.sequence = 100 + u32::from(id);
     bench
 }
@@ -258,7 +260,7 @@ fn ping_names_model_and_firmware() {
 
 #[test]
 fn a_write_to_all_is_silent() {
-    let mut bench = Bench::new();
+    let mut bench = Bench::on();
     assert_eq!(bench.ask_as(BROADCAST, 0x03, &GOAL), None);
     assert_eq!(goal_mn(&mut bench), 1000);
     assert_eq!(bench.ask_as(BROADCAST, 0x02, &[7, 0, 1, 0]), None, "a read from all is not answered");
@@ -267,7 +269,7 @@ fn a_write_to_all_is_silent() {
 
 #[test]
 fn reg_write_waits_for_action() {
-    let mut bench = Bench::new();
+    let mut bench = Bench::on();
     assert_eq!(bench.ask(0x05, &[]).number(), 1, "nothing registered");
     assert_eq!(bench.ask(0x04, &GOAL).number(), 0);
     assert_eq!((goal_mn(&mut bench), bench.number(address::REGISTERED_INSTRUCTION, 1)), (0, 1));
@@ -280,14 +282,54 @@ fn reg_write_waits_for_action() {
     assert_eq!(bench.ask(0x05, &[0]).number(), 5);
     assert_eq!(bench.number(address::REGISTERED_INSTRUCTION, 1), 0);
 
+    bench.ask(0x04, &[0, 1, 0, 0, 0, 0]);
+    assert_eq!(bench.ask_as(BROADCAST, 0x05, &[]), None);
+    assert_eq!(goal_mn(&mut bench), 0);
+
+    assert_eq!(bench.write(address::TORQUE_ENABLE, &[0]), Ok(()));
     assert_eq!(bench.ask(0x04, &[9, 0, 10]).number(), 0);
     assert_eq!(bench.write(address::TORQUE_ENABLE, &[1]), Ok(()));
     assert_eq!(bench.ask(0x05, &[]).number(), 7, "checked again");
     assert_eq!(bench.number(address::RETURN_DELAY_TIME, 1), 250);
+}
 
-    bench.ask(0x04, &[0, 1, 0, 0, 0, 0]);
-    assert_eq!(bench.ask_as(BROADCAST, 0x05, &[]), None);
-    assert_eq!(goal_mn(&mut bench), 0);
+/// An Action that another finger waits for moves no finger that was stopped.
+#[test]
+fn a_stop_drops_a_registered_write() {
+    let stops: [(u16, &[u8]); 7] = [
+        (address::TORQUE_ENABLE, &[0]),
+        (address::GOAL_FORCE_MN, &[0; 4]),
+        (address::SHORT_GOAL_MN, &[0; 2]),
+        (address::MIRROR_GOAL_MN, &[0; 4]),
+        (address::MEASURE, &[0]),
+        (address::RECOVER, &[1]),
+        // A read, which only looks on.
+        (address::FAULT, &[]),
+    ];
+    for (stop, data) in stops {
+        for (torque, address, written) in
+            [(1, GOAL[..2].to_vec(), &GOAL[2..]), (0, address::MEASURE.to_le_bytes().to_vec(), &[2])]
+        {
+            let mut bench = Bench::new();
+            bench.write(address::TORQUE_ENABLE, &[torque]).expect("torque");
+            assert_eq!(bench.ask(0x04, &[&address[..], written].concat()).number(), 0);
+            // A write beside it drops nothing.
+            bench.write(address::CAPTURE_OFFSET, &[1, 0, 0, 0]).expect("a write");
+            assert_eq!(bench.number(address::REGISTERED_INSTRUCTION, 1), 1);
+            if [address::RECOVER, address::FAULT].contains(&stop) {
+                bench.set_fault(Some(Fault::BusSilent));
+            }
+            if !data.is_empty() {
+                bench.write(stop, data).expect("a stop");
+            }
+            assert_eq!(bench.number(address::REGISTERED_INSTRUCTION, 1), 0, "{stop}");
+            bench.take_up();
+            bench.set_fault(None);
+            let before = bench.server.command();
+            assert_eq!(bench.ask_as(BROADCAST, 0x05, &[]), None);
+            assert_eq!(bench.server.command(), before, "{stop}");
+        }
+    }
 }
 
 #[test]
@@ -356,7 +398,7 @@ fn a_packet_too_long_to_keep_is_refused() {
 #[test]
 fn the_status_return_level_is_honoured() {
     for (level, ping, read, write) in [(0, true, false, false), (1, true, true, false), (2, true, true, true)] {
-        let mut bench = Bench::new();
+        let mut bench = Bench::on();
         bench.write(address::STATUS_RETURN_LEVEL, &[level]).expect("answered at the level before");
         assert_eq!(bench.ask_as(ID, 0x01, &[]).is_some(), ping);
         assert_eq!(bench.ask_as(ID, 0x02, &[7, 0, 1, 0]).is_some(), read);

@@ -92,7 +92,7 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> Exchange<'a, ROWS, COLUMNS> {
 
     fn staged(&self) -> Staged<'a, ROWS, COLUMNS> {
         let Device { settings, actions, clocks, .. } = *self.state;
-        Staged { settings, actions, snapshot: self.snapshot, clocks }
+        Staged { settings, actions, stops: false, snapshot: self.snapshot, clocks }
     }
 
     /// Replaces the settings, once they are checked.
@@ -107,6 +107,9 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> Exchange<'a, ROWS, COLUMNS> {
         }
         self.state.settings = staged.settings;
         self.state.actions = staged.actions;
+        if staged.stops {
+            self.state.registered = None;
+        }
         Ok(())
     }
 

@@ -47,13 +47,13 @@ control_table! {
     /// 0, the current control of an X-series servo: the goal is an effort, here a force.
     11 OPERATING_MODE: U8 TorqueOff in 0..=0 = 0, |_, _| 0, |_, _| Ok(());
     /// 1 enables the bridge; refused with a result error before direction_confirmed
-    /// is 1 and before a tare was requested. A fault sets 0. 0 clears the goal, so
-    /// the next 1 waits for a new goal, and stops a measuring motion.
+    /// is 1 and before a tare was requested. A fault sets 0. 0 sets the goal to 0,
+    /// and stops a measuring motion.
     64 TORQUE_ENABLE: U8 ReadWrite in 0..=1 = 0, |view, _| view.settings().command.torque.into(), Staged::set_torque;
     /// Answered instructions: 0 only Ping, 1 also reads, 2 all.
     68 STATUS_RETURN_LEVEL: U8 ReadWrite in 0..=2 = 2, |view, _| view.settings().status_return_level.into(),
         |staged, value| { staged.settings.status_return_level = value as u8; Ok(()) };
-    /// 1 while a Reg Write waits for its Action.
+    /// 1 while a Reg Write waits for its Action. A fault, torque_enable 0, a goal of 0, measure 0 and recover drop it.
     69 REGISTERED_INSTRUCTION: U8 ReadOnly in 0..=1, |view, _| view.state.registered.is_some().into();
     /// Reason of a stop of the motor, by bit: 0 supply, 3 encoder, 4
     /// bridge, 5 over-force, 6 array, 7 controller or bus. Number: fault.
@@ -78,8 +78,8 @@ control_table! {
 
     // The force loop: requests, state, and the state of the board.
     /// Force to hold; 0 releases, and stops a measuring motion. Above force_max_mn: limit error. Below
-    /// contact_on_mn: held as contact_on_mn, with limit 3. A fault and torque_enable
-    /// 0 set it to 0. In a fault, other goals are refused with a result error.
+    /// contact_on_mn: held as contact_on_mn, with limit 3. While torque_enable
+    /// is 0, the goal is 0, and others are refused with a result error.
     256 GOAL_FORCE_MN: I32 ReadWrite "mN" in 0..=150_000 = 0, |view, _| milli(view.settings().command.goal.0),
         Staged::set_goal;
     /// 1 measures the zero of every taxel. Nothing may touch the tip: after a touch limit 10

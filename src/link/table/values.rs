@@ -54,6 +54,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Staged<'_, ROWS, COLUMNS> {
 
     /// Requests the end of a motion that measures, unless there is none or that was the last request anyway.
     fn stop_measure(&mut self) {
+        self.stops = true;
         let measures = self.measures();
         let request = &mut self.settings.command.measure_request;
         if measures && Task::of(*request) != Task::Stop {

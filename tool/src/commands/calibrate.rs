@@ -13,8 +13,8 @@ use std::time::Duration;
 
 /// Goals of the holds where none are given, N.
 const GOALS_N: [f64; 3] = [1.0, 2.5, 4.0];
-/// Name of the press after the controller became warmer.
-const WARM: &str = "warm.fts";
+/// End of the name of a press after the controller became warmer, behind the name of the press at the same place.
+const WARM: &str = "-warm.fts";
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
@@ -175,21 +175,33 @@ fn creep(seconds: f64, args: &Calibrate, procedure: &mut Procedure<'_>) -> Resul
     Ok(())
 }
 
+/// Names of two presses at the same place, cold and warm, for a session that has these records. A place whose warm press is
+/// still to be made is that of the last press: finger and plate are there.
+fn pair(names: &[&str]) -> (String, String) {
+    let warm = names.iter().find_map(|name| name.strip_suffix(WARM)).map(|cold| format!("{cold}.fts"));
+    let last = || (1..).map(press_name).take_while(|name| names.contains(&name.as_str())).last();
+    let cold = warm.or_else(last).unwrap_or_else(|| press_name(1));
+    let warm = cold.replace(".fts", WARM);
+    (cold, warm)
+}
+
 fn temperature(args: &Calibrate, procedure: &mut Procedure<'_>) -> Result<(), Error> {
-    let cold = procedure.pressed(&press_name(args.presses))?;
-    if !procedure.session.records.contains_key(WARM) {
+    let names: Vec<&str> = procedure.session.records.keys().map(String::as_str).collect();
+    let (cold, warm) = pair(&names);
+    let cold = procedure.pressed(&cold)?;
+    if !procedure.session.records.contains_key(&warm) {
         let chip_c = cold.steps.iter().find_map(|step| step.chip_c);
         let chip_c = chip_c.ok_or("the controller does not measure its temperature: leave --warm out")?;
         procedure.warm(chip_c + 5.0, Duration::from_secs_f64(args.warm_within_s))?;
     }
     let question = "the controller is warm: leave finger and plate where they were in the last press";
-    procedure.press(WARM, question, &args.how)?;
-    match solve::temperature(&cold, &procedure.pressed(WARM)?) {
+    procedure.press(&warm, question, &args.how)?;
+    match solve::temperature(&cold, &procedure.pressed(&warm)?) {
         Ok(found) => {
             procedure.found.row("array_gain_ppm_per_k", 1e6 * found.per_k.value, Some(1e6 * found.per_k.sigma));
             procedure.found.row("array_gain_at_c", found.chip_c[0], None);
         }
-        Err(why) => return procedure.without(WARM, format!("the temperature coefficient was not measured: {why}")),
+        Err(why) => return procedure.without(&warm, format!("the temperature coefficient was not measured: {why}")),
     }
     Ok(())
 }
@@ -324,4 +336,17 @@ fn solve_strokes(args: &Commission, procedure: &mut Procedure<'_>) -> Result<(),
     found.more.insert("friction_each_unm".into(), json!({ "forward": 1e6 * forward.value, "back": 1e6 * back.value }));
     found.notes.push(format!("time constant {tau} s; force that depends on the place {force} N"));
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_warm_press_is_compared_with_the_cold_one_at_its_place() {
+        let [first, second] = [1, 2].map(press_name);
+        let warm = "press-1-warm.fts";
+        assert_eq!(pair(&[warm, &first, &second]), (first.clone(), warm.into()));
+        assert_eq!(pair(&[&first, &second]), (second, "press-2-warm.fts".into()));
+    }
 }

@@ -1,6 +1,6 @@
 //! `fingertip params`: what outlives a reset. A backup of it is TOML, a line each with its meaning.
 
-use super::{say, say_json};
+use super::{Interrupt, say, say_json};
 use crate::state::RESTARTED;
 use crate::table::{self, name};
 use crate::{Client, Error, whole};
@@ -143,12 +143,12 @@ fn conclude(set: &Set, save_too: bool, client: &mut Client, json: bool) -> Resul
     let what = if lines.is_empty() { "nothing differs: nothing was changed".into() } else { lines.join("\n") };
     told(json, &now, &what);
     if save_too {
-        return save(&set.meant, client, json);
-    }
-    if !json && !lines.is_empty() {
+        set.interrupt.check()?;
+        save(&set.meant, client, json)?;
+    } else if !json && !lines.is_empty() {
         say("set until the next reset; `fingertip params save` keeps it");
     }
-    Ok(())
+    set.interrupt.check()
 }
 
 /// Saves what the controller has. Fails where that is not what was meant: it restarted since.
@@ -299,6 +299,8 @@ impl Stored {
 pub(super) struct Set {
     before: Stored,
     pub meant: Stored,
+    /// A signal since the first packet: it waits until all is set, and prevents a save that has not begun.
+    interrupt: Interrupt,
 }
 
 /// A packet that sets a part of what is stored.
@@ -371,6 +373,7 @@ pub(super) fn set(values: &[Value], gains: Option<Vec<Vec<u16>>>, client: &mut C
     if !packets.is_empty() {
         torque_is_off(client)?;
     }
+    let interrupt = Interrupt::catch()?;
     for (at, packet) in packets.iter().enumerate() {
         if let Err(why) = packet.send(&meant, client) {
             // What a packet sets may be set also where its answer was lost.
@@ -381,7 +384,7 @@ pub(super) fn set(values: &[Value], gains: Option<Vec<Vec<u16>>>, client: &mut C
     if !packets.is_empty() {
         meant.check(client)?;
     }
-    Ok(Set { before, meant })
+    Ok(Set { before, meant, interrupt })
 }
 
 fn torque_is_off(client: &mut Client) -> Result<(), Error> {

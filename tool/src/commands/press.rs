@@ -1,7 +1,7 @@
 //! `fingertip press`.
 
-use super::stop::Moving;
-use super::{Interrupt, aside, no_fault, say, say_json, stopped};
+use super::stop::{Moving, PREVENTED};
+use super::{Interrupt, TOUCHED, aside, no_fault, say, say_json, stopped};
 use crate::state::{Clock, RESTARTED, State};
 use crate::{Client, Error, numbers, table};
 use fingertip::shipped::address;
@@ -65,6 +65,11 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     if Limits(client.number(address::LIMITS)? as u16).has(Limits::NOT_TARED) {
         return Err("the tip is not tared since the controller started: free it, then `fingertip tare`".into());
     }
+    let least_mn = client.number(table::find("contact_on_mn")?.address)?;
+    if (least_mn - args.goal_mn) as f64 > tolerance_mn(args) {
+        let goal_mn = args.goal_mn;
+        return Err(format!("{goal_mn} mN are less than the finger can hold: contact_on_mn is {least_mn}").into());
+    }
     let interrupt = Interrupt::catch()?;
     let moving = Moving::begin(client, &interrupt)?;
     let clear = if !json && io::stderr().is_terminal() { CLEAR } else { "" };
@@ -127,6 +132,9 @@ pub(super) fn begin(goal_mn: i64, client: &mut Client) -> Result<(), Error> {
     };
     // Some faults show only once torque is on: then it is not the goal that is wrong.
     no_fault(client)?;
+    if why.refused_with(PREVENTED) && Limits(client.number(address::LIMITS)? as u16).has(Limits::TARED_TOUCHING) {
+        return Err(TOUCHED.into());
+    }
     if !why.refused_with(BEYOND) {
         return Err(why);
     }

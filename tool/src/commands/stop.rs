@@ -38,7 +38,10 @@ pub struct Moving<'a> {
 impl<'a> Moving<'a> {
     /// Sets the bus watchdog. `_interrupt` proves that a signal no longer ends the program on the spot.
     pub fn begin(client: &'a mut Client, _interrupt: &Interrupt) -> Result<Self, Error> {
-        let watchdog = client.number(address::BUS_WATCHDOG)?.max(0);
+        let watchdog = client.number(address::BUS_WATCHDOG)?;
+        if watchdog < 0 {
+            return Err("the bus watchdog has tripped: `fingertip recover` resets it".into());
+        }
         client.set(address::BUS_WATCHDOG, WATCHDOG)?;
         Ok(Self { client, watchdog: Some(watchdog) })
     }
@@ -139,10 +142,14 @@ pub fn run(args: &Stop, reach: &Reach, json: bool) -> Result<(), Error> {
     interrupt.check()
 }
 
-/// Turns torque off, which aborts measurements, sets the bus watchdog to 0, and reports what was found and changed.
+/// `status_return_level`: every instruction is answered. A host may have left another level, at which torque off seems lost.
+const ANSWERS: (u16, i64) = (address::STATUS_RETURN_LEVEL, 2);
+
+/// Turns torque off, which aborts measurements, sets the bus watchdog to 0, and reports what was found and changed. All
+/// fingers release at once, then each is stopped.
 fn stop_all(args: &Stop, reach: &Reach, json: bool) -> Result<(), Error> {
     if !args.all {
-        return super::each(reach, false, |client| {
+        return super::each(reach, false, &[(address::GOAL_FORCE_MN, 0), ANSWERS], |client| {
             let stopped = stop(client, true, json)?;
             if json {
                 say_json(&stopped);
@@ -156,6 +163,8 @@ fn stop_all(args: &Stop, reach: &Reach, json: bool) -> Result<(), Error> {
     if found.is_empty() {
         return Err("torque off was sent to all IDs, but nothing answers: is the baud rate right?".into());
     }
+    let fingers: Vec<u8> = found.iter().filter(|pong| pong.is_fingertip()).map(|pong| pong.id).collect();
+    client.set_each(&fingers, ANSWERS.0, ANSWERS.1)?;
     let (mut all, mut failed) = (Vec::new(), Vec::new());
     for pong in found {
         client.id = pong.id;
@@ -224,7 +233,7 @@ fn stop(client: &mut Client, releases: bool, json: bool) -> Result<Value, Error>
 /// The controller takes a frame or two.
 const RECOVERED_WITHIN: Duration = Duration::from_secs(2);
 /// Error number of a status packet if something prevents the request.
-const PREVENTED: u8 = 1;
+pub(super) const PREVENTED: u8 = 1;
 
 /// Clears what stopped the motor: one register does it.
 pub fn recover(client: &mut Client, json: bool) -> Result<(), Error> {

@@ -269,7 +269,8 @@ fn an_absent_finger_keeps_the_other_one_neither_from_its_stop_nor_from_its_next_
     commander.set(address::GOAL_FORCE_MN, 1_000).expect("it obeys");
     drop(commander);
     let mut next = shared.client();
-    next.set(address::GOAL_FORCE_MN, 500).expect("it commands now");
+    next.set(address::TORQUE_ENABLE, 1).expect("it commands now");
+    next.set(address::GOAL_FORCE_MN, 500).expect("it obeys");
     let begun = shared.finger.heard();
     while shared.finger.heard() - begun < 2_000 {
         assert_eq!(next.number(address::GOAL_FORCE_MN).expect("it answers"), 500);

@@ -11,6 +11,7 @@ mod shared;
 mod stopped;
 
 use fingertip::params::Params;
+use fingertip::shipped::address;
 use served::Served;
 use std::collections::BTreeMap;
 use std::fs;
@@ -74,6 +75,13 @@ fn several_ids_are_asked_one_after_the_other() {
 fn it_tares_presses_and_lets_go() {
     let finger = Served::begin("wall");
     finger.refuses(&["press", "1"], &["not tared", "`fingertip tare`"]);
+    finger.command("move -1");
+    finger.until("object is at -1.00");
+    let touched = "Free the tip and tare again";
+    finger.refuses(&["tare"], &[touched]);
+    finger.refuses(&["press", "1"], &[touched]);
+    finger.command("move 5");
+    finger.until("object is at 5.00");
     let tared = finger.json(&["tare"]);
     assert_eq!((&tared["tared"], &tared["touched"]), (&true.into(), &false.into()));
     let held = finger.json(&["press", "1.5", "--seconds", "0.3", "--within-s", "3600"]);
@@ -84,6 +92,9 @@ fn it_tares_presses_and_lets_go() {
     assert!(held["tolerance_mn"] == 75.0 && least_mn >= 1_425 && most_mn <= 1_575, "{held}");
     let info = finger.json(&["info"]);
     assert_eq!((&info["torque_enable"], &info["goal_mn"], &info["bus_watchdog_ms"]), (&0.into(), &0.into(), &0.into()));
+    let heard = finger.heard();
+    finger.refuses(&["press", "0.001"], &["1 mN are less than the finger can hold: contact_on_mn is 40"]);
+    assert!(finger.heard() - heard < 10, "nothing moves");
     let why = finger.refused(&["press", "9"]);
     assert!(why.contains("goal_force_mn to 9000") && why.contains("error 6"), "{why}");
     assert!(why.contains("force_max_mn is 7000"), "{why}");
@@ -112,6 +123,12 @@ fn a_fault_is_told_and_cleared() {
     let again = finger.done(&["recover"]);
     assert!(again.starts_with("there was nothing to recover from"), "{again}");
     finger.done(&["press", "0.5", "--seconds", "0.1", "--within-s", "3600"]);
+    // A fault that is cleared by its register leaves the bus watchdog tripped.
+    finger.set(&[(address::TORQUE_ENABLE, 1), (address::BUS_WATCHDOG, 1)]);
+    finger.until_alone("BusSilent");
+    finger.set(&[(address::CLEAR_FAULT, 1)]);
+    finger.until("Off");
+    finger.refuses(&["press", "1"], &["the bus watchdog has tripped: `fingertip recover`"]);
 }
 
 #[test]

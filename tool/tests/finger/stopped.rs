@@ -177,6 +177,9 @@ fn stop_stops_every_mode() {
         (&[][..], "Off:"),
         (press, "Approach:"),
         (press, "Force:"),
+        // A host that reads few answers.
+        (&[press[0], press[1], (address::STATUS_RETURN_LEVEL, 0)], "Force:"),
+        (&[press[0], press[1], (address::STATUS_RETURN_LEVEL, 1)], "Force:"),
         (&[(address::TORQUE_ENABLE, 1), (address::MEASURE, 3)], "Press:"),
         (&[(address::MEASURE, 2)], "Strokes:"),
     ] {
@@ -277,6 +280,46 @@ fn one_packet_stops_all_fingers() {
     finger.command(&format!("deaf after 1 for {}", u64::MAX));
     let why = finger.refused(&["--timeout-ms", "50", "stop", "--all"]);
     assert!(both("Off:"), "{why} {}", finger.command("state"));
+    // So it is for listed ones: an absent ID before them does not keep them pressing.
+    finger.command("deaf no more");
+    let hold = |id| {
+        let mut client = finger.tared(id);
+        client.set(address::TORQUE_ENABLE, 1).and_then(|()| client.set(address::GOAL_FORCE_MN, 500)).expect("it obeys");
+    };
+    [1, 2].into_iter().for_each(hold);
+    while !both("Force:") {}
+    finger.command(&format!("deaf after 1 for {}", u64::MAX));
+    let why = finger.refused(&["--id", "9,1,2", "--timeout-ms", "50", "stop"]);
+    assert!(both("Release:"), "{why} {}", finger.command("state"));
+}
+
+/// TERM while the finger misses each packet in turn; KILL would leave gains of the file with parameters of before.
+#[test]
+fn a_signal_amid_a_restore_mixes_no_gains_with_parameters() {
+    let finger = Served::begin("wall");
+    let (old, new) = (finger.file("old.toml"), finger.file("new.toml"));
+    finger.done(&["params", "backup", &old]);
+    let text = fs::read_to_string(&old).expect("it was written");
+    let text =
+        text.replace("row_3 = [16384, ", "row_3 = [20000, ").replace("modulus_pa = 250000", "modulus_pa = 300000");
+    fs::write(&new, text).expect("a file");
+    let restore = ["--timeout-ms", "1000", "params", "restore", &new];
+    let begun = finger.heard();
+    finger.done(&restore);
+    let mut seen = [0; 2];
+    for packets in 0..finger.heard() - begun {
+        finger.done(&["params", "restore", &old]);
+        finger.command(&format!("deaf after {packets} for {}", u64::MAX));
+        let child = finger.start(&restore);
+        Served::wait_for(|| finger.command("unheard") != "0");
+        Served::signal(&child, Signal::TERM);
+        finger.command("deaf no more");
+        child.wait_with_output().expect("it ends");
+        let same = [&old, &new].map(|file| finger.json(&["params", "diff", file]) == serde_json::json!({}));
+        assert!(same[0] != same[1], "signalled after {packets}: {}", finger.json(&["params", "diff", &new]));
+        seen[usize::from(same[1])] += 1;
+    }
+    assert!(seen.iter().all(|count| *count > 0), "{seen:?}");
 }
 
 #[test]

@@ -214,7 +214,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
     pub fn begin(&mut self, frame: &Frame<ROWS, COLUMNS>, rows: usize, config: &Config) -> (u16, u16) {
         let rows = rows.min(ROWS);
         self.begin_again();
-        self.read_rows(frame, rows, config);
+        self.so_far = self.read_rows(frame, rows, config);
         let mut count = 0;
         let limits = CodeLimits::new(self.so_far.undriven_max, config);
         if limits.suspects(larger_lane(self.so_far.total.largest)) {
@@ -239,8 +239,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
     }
 
     /// Reads the rows of a frame before row `to` that have not been read.
-    #[inline(never)]
-    fn read_rows(&mut self, frame: &Frame<ROWS, COLUMNS>, to: usize, config: &Config) {
+    #[inline(always)]
+    fn read_rows(&mut self, frame: &Frame<ROWS, COLUMNS>, to: usize, config: &Config) -> SoFar {
         let Frame { codes, sequence } = frame;
         let mut so_far = self.so_far;
         if !(1..ROWS).contains(&so_far.rows) || so_far.sequence != *sequence {
@@ -253,21 +253,21 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         let common = Common { dead: both(config.dead_codes), sag: both(config.sag_q32), curve };
         let SoFar { rows, total, .. } = so_far;
         let total = lanes::pass(codes, &mut self.rows, &common, &mut self.picture.taxels, rows..to, total);
-        self.so_far = SoFar { rows: to, total, ..so_far };
+        SoFar { rows: to, total, ..so_far }
     }
 
     /// Reads a frame: every taxel, their sums, the peak and the flags. Any codes are accepted: a code that a sound
     /// array cannot show makes its taxel bad.
     pub fn read(&mut self, frame: &Frame<ROWS, COLUMNS>, config: &Config) -> &TactileImage<ROWS, COLUMNS> {
-        self.read_rows(frame, ROWS, config);
+        let SoFar { total, undriven_max, .. } = self.read_rows(frame, ROWS, config);
+        self.begin_again();
         // Without a bad taxel in the last frame none is bad again.
         let mut before = None;
         if self.picture.bad_count != 0 {
             before = Some(self.picture.bad);
             (self.picture.bad, self.picture.bad_count, self.picture.bad_again) = (self.mask, 0, 0);
         }
-        let total = &self.so_far.total;
-        let limits = CodeLimits::new(self.so_far.undriven_max, config);
+        let limits = CodeLimits::new(undriven_max, config);
         let largest = larger_lane(total.largest);
         self.picture.peak = total.peak;
         self.picture.undriven_max = limits.undriven_max;
@@ -275,7 +275,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         let [sum, moment_x, moment_y] = if self.loads {
             [total.first, total.second, moment_y::<ROWS>(total.first, total.running)]
         } else {
-            let [sum, moment_x, moment_y] = sixteenths::<ROWS, COLUMNS>(total);
+            let [sum, moment_x, moment_y] = sixteenths::<ROWS, COLUMNS>(&total);
             let [tare, tare_x, tare_y] = self.tare_sums;
             [sum.wrapping_sub(tare), moment_x.wrapping_sub(tare_x), moment_y.wrapping_sub(tare_y)]
         };

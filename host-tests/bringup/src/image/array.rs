@@ -135,7 +135,7 @@ pub fn noise(scan: &mut scan::Scan, bench: &mut Bench, pipeline: &mut Pipeline) 
 pub fn means(mut analogue: Analogue) {
     for _ in 0..=FRAMES {
         cortex_m::asm::delay(100 * CYCLES_PER_US);
-        analogue.read_mv();
+        analogue.take();
     }
     report::figure("analogue_mv", f32::from(health::health().analogue_mv));
     if let Some(chip) = analogue.chip() {

@@ -1,4 +1,4 @@
-"""The package as a whole: its types, and its wheel. Nothing is downloaded: `cargo xtask test` installs the tools."""
+"""The package as a whole: its types, and its wheel. Nothing is downloaded: `cargo xtask package` installs the tools."""
 
 import os
 import subprocess

@@ -141,8 +141,9 @@ pub fn package(console: &mut Console) -> Result<()> {
     console.prepare(console::cargo("fetch").args(["--locked", "--quiet"]))?;
     let serve = host::SERVE.build(console)?;
     let mut test = std::process::Command::new(python);
-    test.args(["-B", "-m", "unittest", "test_package"]).current_dir(host::root().join("python").join("tests"));
-    console.run(test.env("PYTHONPATH", "..").env("FINGERTIP_SERVE", serve.get_program()))
+    test.args(["-B", "-m", "unittest", "discover", "--pattern", "test_package.py"]);
+    test.arg(host::root().join("python").join("tests")).env("PYTHONPATH", host::root().join("python"));
+    console.run(test.env("FINGERTIP_SERVE", host::root().join(serve.get_program())))
 }
 
 // The checker of licences and sources, installed in the build folder.

@@ -111,7 +111,7 @@ enum Command {
     Lint,
     /// Renew the generated files, or check that they are fresh
     Docs(docs::Args),
-    /// Make the packages that others take, and test them from a project outside of this workspace
+    /// Make the packages that others take, test them from a project outside of this workspace, and check the Python package
     #[command(after_help = "Examples:\n  cargo xtask package")]
     Package,
     /// Try the examples for clusters here: Slurm's tasks, GNU parallel, the Kubernetes job's shell, DuckDB

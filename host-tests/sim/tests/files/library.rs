@@ -51,7 +51,7 @@ const BREAKERS: &[Breakers] = &[
     ("compression", &[LOW, MORE, "controller.force_max_mn=1000", HUNTS]),
     ("demo", &[LOW, MORE, "controller.inertia_ug_m2=300", "object.distance_mm=1.0", "object.distance_mm=7.0", STICKS]),
     ("everything", &[LOW, MORE, LESS, "effects.breakable_object.force_n=0.1", "effects.tangential.still=0.05", "object.distance_mm=1.0", HEAVY]),
-    ("grasp", &[LOW, "host.grip_friction=0.2", "object.distance_mm=0.5", "object.shake_g=0", "hand.lift_mm=12", "host.grip_most_n=0.9", "effects.tangential.still=0.1", HUNTS]),
+    ("grasp", &[LOW, "host.grip_friction=0.2", "object.distance_mm=0.5", "object.distance_mm=4", "object.shake_g=0", "hand.lift_mm=12", "host.grip_most_n=0.9", "effects.tangential.still=0.1", HUNTS]),
     ("hot_hour", &[LOW, LESS, "controller.codes_per_kpa_milli=24600", "effects.thermal_derating.ambient_c=25", "effects.thermal_derating.ambient_c=60", STICKS]),
     ("impact", &[LOW, MORE, LESS, "controller.approach_um_per_s=200000", "object.distance_mm=1.0", HEAVY]),
     ("noisy_supply", &[LOW, MORE, LESS, "effects.noise.rms_codes=0", HUNTS]),

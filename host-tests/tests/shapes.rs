@@ -366,7 +366,7 @@ fn fingers<const ROWS: usize, const COLUMNS: usize>(pitch_um: i32, frames_per_s:
     (inside, worst)
 }
 
-// More with `FINGERS=100 cargo test -p host-tests --test all the_envelope -- --include-ignored --nocapture`.
+// More fingers: `FINGERS=100 cargo test -p host-tests --test all the_envelope -- --include-ignored --nocapture`.
 sim::sizes!(the_envelope_holds_for_other_arrays_and_rates, envelope(&[1_000]), envelope(&[2_000, 5_000]));
 
 fn envelope(rates: &[u32]) {

@@ -2,7 +2,7 @@
 
 use crate::{Error, table};
 use fingertip::link::Reply;
-use fingertip::link::packet::{BROADCAST, Event, Packet, Receiver, Sender, instruction};
+use fingertip::link::packet::{BROADCAST, Event, Packet, REPLY_MAX, Receiver, Sender, instruction};
 use rustix::fs::{FlockOperation, flock};
 use serial2::SerialPort;
 use std::io::{self, ErrorKind, Read as _, Write as _};
@@ -20,8 +20,8 @@ const PING_BITS: u32 = 14 * 10;
 /// No bus is slower: all IDs would take minutes to answer.
 pub const BAUD_MIN: i64 = 1_200;
 pub const ID_MAX: u8 = 252;
-/// Most devices of a Sync Write of 4 bytes each: a finger's longest packet has 384 bytes behind its header.
-const LISTED: usize = 74;
+/// Number of devices to which one Sync Write carries four bytes each, beside 14 bytes: a finger takes no longer packet.
+pub const LISTED: usize = (REPLY_MAX - 14) / 5;
 /// Time between two keep-alive packets.
 const FEED: Duration = Duration::from_millis(100);
 

@@ -208,7 +208,7 @@ proptest! {
     }
 }
 
-/// Writes that torque and goal depend on.
+/// Writes that change torque or goal, or whose refusal depends on them.
 const WRITES: [(u16, &[u8]); 14] = [
     (address::TORQUE_ENABLE, &[0]),
     (address::TORQUE_ENABLE, &[1]),

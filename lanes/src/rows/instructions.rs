@@ -36,7 +36,8 @@ pub fn pass<const ROWS: usize, const COLUMNS: usize>(
     }
     let mut second = total.second;
     if common.curve.growth != 0 {
-        // The sum of sums from which the last instructions compute `second` again. What is halved is even.
+        // With a curve the loop adds up sums, from which its end computes `second`: this start value gives back
+        // `total.second`. The halved number is even.
         let both = total.first.wrapping_mul(9).wrapping_add(second);
         second = total.running.wrapping_mul(5).wrapping_sub(both >> 1);
     }

@@ -8,7 +8,7 @@
 use super::{Interrupt, aside, say, stop};
 use crate::client::{self, ID_MAX, Reach};
 use crate::{Client, Error, table};
-use fingertip::link::packet::{BROADCAST, Event, HEADER, Packet, REPLY_MAX, Receiver, StatusError, instruction};
+use fingertip::link::packet::{BROADCAST, Event, HEADER, Packet, Receiver, StatusError, instruction};
 use fingertip::shipped::address;
 use rustix::io::Errno;
 use rustix::net::{RecvFlags, recv};
@@ -34,10 +34,6 @@ const READS: [u8; 6] = [
 /// Registers to which every client may write 0, to stop a finger.
 const STOPS: [u16; 5] =
     [address::TORQUE_ENABLE, address::MEASURE, address::GOAL_FORCE_MN, address::SHORT_GOAL_MN, address::MIRROR_GOAL_MN];
-/// Number of goals that fit in one Sync Write: an ID and four bytes each, beside 14 bytes.
-const GOALS: usize = (REPLY_MAX - 14) / 5;
-/// Status return level at which all instructions are answered.
-const ALL_ANSWERED: u8 = 2;
 /// Reason for a stop during which the bus watchdogs are not fed.
 const SILENT: &str = "its client is silent";
 const LEFT: &str = "its client left";
@@ -296,7 +292,9 @@ impl Bus {
             let later = packet.instruction == instruction::REG_WRITE;
             let fixed = |part: &Part<'_>| {
                 part.byte(address::BAUD_RATE).is_some()
-                    || part.byte(address::STATUS_RETURN_LEVEL).is_some_and(|level| level != ALL_ANSWERED)
+                    || part
+                        .byte(address::STATUS_RETURN_LEVEL)
+                        .is_some_and(|level| i64::from(level) != stop::ALL_ANSWERED)
                     || later && part.byte(address::BUS_WATCHDOG).is_some()
             };
             // A write to no device feeds the watchdogs. A stopped client keeps its other fingers alive by it.
@@ -313,7 +311,7 @@ impl Bus {
             own.ids.extend(ids);
             let reset = (packet.instruction == instruction::REBOOT).then_some(0);
             for part in &parts {
-                // Fingers refuse more steps.
+                // A finger refuses a larger number of steps.
                 if let Some(steps @ ..=127) = reset.or(part.byte(address::BUS_WATCHDOG)) {
                     self.watch(part.ids.clone(), steps.into());
                 }
@@ -367,14 +365,10 @@ impl Bus {
         let ids = self.connections.get_mut(&from).map(|one| std::mem::take(&mut one.ids)).unwrap_or_default();
         let next = self.commander().map(|next| &self.connections[&next].ids);
         let mut ids: Vec<u8> = ids.into_iter().filter(|id| next.is_none_or(|next| !next.contains(id))).collect();
-        let [low, high] = address::GOAL_FORCE_MN.to_le_bytes();
-        for some in ids.chunks(GOALS) {
-            let goals = some.iter().flat_map(|id| [*id, 0, 0, 0, 0]);
-            let params: Vec<u8> = [low, high, 4, 0].into_iter().chain(goals).collect();
-            let _ = self.client.pass(&client::packet(BROADCAST, instruction::SYNC_WRITE, &params), None, 0);
-        }
+        // A port that is lost ends `share` at the next try.
+        let _ = self.client.set_each(&ids, address::GOAL_FORCE_MN, 0);
         // A client that wrote by broadcast: absent IDs would take a time-out each.
-        if ids.len() > GOALS {
+        if ids.len() > client::LISTED {
             self.answered.extend(self.client.ping_all().unwrap_or_default().iter().map(|pong| pong.id));
             ids.retain(|id| self.answered.contains(id));
         }
@@ -420,7 +414,7 @@ impl Bus {
 fn stop(client: &mut Client, is_fingertip: bool) -> Result<bool, Error> {
     if is_fingertip {
         // The level before decides whether this write is answered.
-        let _ = client.set(address::STATUS_RETURN_LEVEL, ALL_ANSWERED.into());
+        let _ = client.set(address::STATUS_RETURN_LEVEL, stop::ALL_ANSWERED);
     }
     let drives = client.again(|client| client.number(address::TORQUE_ENABLE))? != 0;
     if !is_fingertip {

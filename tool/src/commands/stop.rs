@@ -142,14 +142,16 @@ pub fn run(args: &Stop, reach: &Reach, json: bool) -> Result<(), Error> {
     interrupt.check()
 }
 
-/// `status_return_level`: every instruction is answered. A host may have left another level, at which torque off seems lost.
-const ANSWERS: (u16, i64) = (address::STATUS_RETURN_LEVEL, 2);
+/// Status return level at which all instructions are answered. A host may have left another one, at which torque off seems
+/// lost.
+pub const ALL_ANSWERED: i64 = 2;
 
 /// Turns torque off, which aborts measurements, sets the bus watchdog to 0, and reports what was found and changed. All
 /// fingers release at once, then each is stopped.
 fn stop_all(args: &Stop, reach: &Reach, json: bool) -> Result<(), Error> {
     if !args.all {
-        return super::each(reach, false, &[(address::GOAL_FORCE_MN, 0), ANSWERS], |client| {
+        let first = [(address::GOAL_FORCE_MN, 0), (address::STATUS_RETURN_LEVEL, ALL_ANSWERED)];
+        return super::each(reach, false, &first, |client| {
             let stopped = stop(client, true, json)?;
             if json {
                 say_json(&stopped);
@@ -164,7 +166,7 @@ fn stop_all(args: &Stop, reach: &Reach, json: bool) -> Result<(), Error> {
         return Err("torque off was sent to all IDs, but nothing answers: is the baud rate right?".into());
     }
     let fingers: Vec<u8> = found.iter().filter(|pong| pong.is_fingertip()).map(|pong| pong.id).collect();
-    client.set_each(&fingers, ANSWERS.0, ANSWERS.1)?;
+    client.set_each(&fingers, address::STATUS_RETURN_LEVEL, ALL_ANSWERED)?;
     let (mut all, mut failed) = (Vec::new(), Vec::new());
     for pong in found {
         client.id = pong.id;

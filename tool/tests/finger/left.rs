@@ -127,7 +127,7 @@ fn once_a_commander_has_left_the_next_client_writes() {
     }
 }
 
-/// An unplugged hand: each of its fingers takes three time-outs of 2 s.
+/// Fingers of an unplugged hand: each try to stop one costs a time-out of 2 s.
 #[test]
 fn absent_fingers_of_who_left_keep_nobody_from_the_bus() {
     let shared = Shared::begin("wall");
@@ -179,7 +179,7 @@ fn a_finger_is_stopped_once_the_line_is_back_unless_another_client_commands_it()
     shared.finger.command("deaf after 0 for 2");
     drop(next);
     Served::wait_for(|| shared.finger.command("unheard") == "2");
-    // One that writes to a group takes it before the next try.
+    // A client that writes to it in a group packet commands it before the next try to stop it.
     let mut next = shared.client();
     sync_write(&mut next, address::TORQUE_ENABLE, 1, &[1, 1]);
     for _ in 0..1_000 {

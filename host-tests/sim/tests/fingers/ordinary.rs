@@ -211,8 +211,8 @@ fn duty_rests(numbers: Range<usize>) {
     assert!((count.div_ceil(2)..count).contains(&quiet), "{quiet} are quite quiet: with noise and counts not all are");
 }
 
-// A coarse encoder makes a slower loop, never a swinging one. 256 counts swung by 33 mN, 128 by 158, 48 by 817; 16
-// held 3 N at goal 1.
+// A coarse encoder may slow the loop down, but the force must not swing. An earlier loop swung by 33 mN with 256 counts,
+// by 158 with 128 and by 817 with 48; with 16 it held 3 N for a goal of 1 N.
 sim::sizes!(coarse_encoders_do_not_swing, do_not_swing(&[1.0]), do_not_swing(&[0.3, 3.0]));
 
 fn do_not_swing(goals_n: &[f64]) {

@@ -89,6 +89,7 @@ FIT_LEVEL = Register("fit_level", 367, 1, 1, False, 1, True, 0, 5)
 FIT_LEVEL_IN_USE = Register("fit_level_in_use", 368, 1, 1, False, 1, False, 0, 5)
 TARE_STATE = Register("tare_state", 369, 1, 1, False, 1, False, 0, 3)
 PRESENT_CREEP_MN = Register("present_creep_mn", 372, 4, 1, True, 1, False, 0, 32768000)
+CHIP_ID = Register("chip_id", 376, 4, 1, False, 1, False, 0, 4294967295)
 RESET_CAUSE = Register("reset_cause", 384, 1, 1, False, 1, False, 0, 6)
 CRASH_CAUSE = Register("crash_cause", 385, 1, 1, False, 1, False, 0, 4)
 CRASH_COUNT = Register("crash_count", 386, 4, 1, False, 1, False, 0, 4294967295)
@@ -263,6 +264,7 @@ ALL = (
     FIT_LEVEL_IN_USE,
     TARE_STATE,
     PRESENT_CREEP_MN,
+    CHIP_ID,
     RESET_CAUSE,
     CRASH_CAUSE,
     CRASH_COUNT,

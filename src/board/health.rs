@@ -2,7 +2,7 @@
 
 use core::sync::atomic::{AtomicU16, AtomicU32, Ordering};
 
-use embassy_stm32::usart;
+use embassy_stm32::{uid, usart};
 use fingertip::link::snapshot::Health;
 
 use super::flash;
@@ -84,10 +84,16 @@ pub fn set_stack_bytes(bytes: u16) {
     STACK_BYTES.store(bytes, Ordering::Relaxed);
 }
 
+/// The FNV-1a hash of the unique ID: lot, wafer and place on the wafer differ from chip to chip.
+fn chip_id() -> u32 {
+    uid::uid().iter().fold(0x811c_9dc5, |hash, &byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193))
+}
+
 /// All of it, for the bus.
 pub fn health() -> Health {
     let late_ns = u64::from(LATE.load(Ordering::Relaxed)) * 1_000 / u64::from(guard::TICKS_PER_US);
     Health {
+        chip_id: chip_id(),
         option_bytes: flash::option_bytes(),
         analogue_mv: ANALOGUE_MV.load(Ordering::Relaxed),
         stack_bytes: STACK_BYTES.load(Ordering::Relaxed),

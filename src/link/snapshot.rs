@@ -52,6 +52,8 @@ pub struct Captured<'a> {
 /// Health of the board since the last reset. Counts saturate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Health {
+    /// Number of the microcontroller, from its unique ID.
+    pub chip_id: u32,
     /// The option bytes as the last reset loaded them, in the microcontroller's own order.
     pub option_bytes: u32,
     /// Analogue supply, mV; 0 if it is not known.

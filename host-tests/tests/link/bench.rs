@@ -105,6 +105,7 @@ impl Bench {
             reset_cause: ResetCause::Watchdog,
             crash: Crash { cause: CrashCause::Panic, line: 321, count: 7, pc: 0x0800_1234 },
             health: Health {
+                chip_id: 0xF1D0_2A17,
                 option_bytes: 0x0fff_aae1,
                 analogue_mv: 3_301,
                 stack_bytes: 15_080,

@@ -60,7 +60,8 @@ fn images(image: &Firmware, options: &Options) -> Result<Vec<Image>, Error> {
     };
     let mut images = vec![read(&image.path, image.elf.clone(), None)?];
     let Factory { reference, sensor: [cold, hot] } = options.factory;
-    let factory = [reference, cold, hot].map(u16::to_le_bytes).concat();
+    let codes = [reference, cold, hot].map(u16::to_le_bytes);
+    let factory = [&converter::UNIQUE_ID[..], codes.as_flattened()].concat();
     images.push(read(Path::new("factory"), factory, Some(converter::FACTORY_AT))?);
     for (address, bytes) in &options.presets {
         images.push(read(Path::new("preset"), bytes.clone(), Some(*address))?);

@@ -71,6 +71,7 @@ fn the_bus_tells_how_the_board_is(rig: &mut Rig) {
     // These are measured once a second.
     rig.run_until_ns(1_120_000_000).expect("it runs");
     assert_eq!(read_u32(rig, address::OPTION_BYTES) & 0xffff_fffe, 0x0fff_aae0);
+    assert_eq!(read_u32(rig, address::CHIP_ID), 0xdcfe_d52e, "FNV-1a of the virtual chip's unique ID");
     assert!((3_295..=3_305).contains(&read_u16(rig, address::ANALOGUE_SUPPLY_MV)));
     let deepest = rig.stack_use().expect("it runs").expect("the image names its stack").used;
     let told = u64::from(read_u16(rig, address::STACK_BYTES));

@@ -22,7 +22,7 @@ type Record = store::Record<3, 3>;
 /// Model number: the letters FT.
 const MODEL: u16 = u16::from_le_bytes(*b"FT");
 /// Counts changes of the control table that a host must know of.
-const TABLE_VERSION: u32 = 2;
+const TABLE_VERSION: u32 = 3;
 /// Ten times the major and once the minor number of the version.
 const FIRMWARE_VERSION: u8 = number(env!("CARGO_PKG_VERSION_MAJOR")) * 10 + number(env!("CARGO_PKG_VERSION_MINOR"));
 
@@ -177,6 +177,8 @@ control_table! {
     /// Part of present_force_mn that counts as the array's creep:
     /// the held force is lower by it. 0 if creep_permille is 0.
     372 PRESENT_CREEP_MN: I32 ReadOnly "mN" in 0..=32_768_000, |view, _| milli(view.status().creep.0);
+    /// Number of this microcontroller, computed from its unique ID of 96 bits: tells fingers with the same ID apart.
+    376 CHIP_ID: U32 ReadOnly, |view, _| view.snapshot.health.chip_id;
     /// Reason of the last start: 0 unknown, 1 power-on, 2
     /// brown-out, 3 reset pin, 4 software, 5 watchdog, 6 other.
     384 RESET_CAUSE: U8 ReadOnly in 0..=6, |view, _| view.snapshot.reset_cause as u32;

@@ -78,6 +78,7 @@ pub fn info(client: &mut Client, json: bool) -> Result<(), Error> {
     let version = information >> 16;
     let mut numbers = Map::new();
     let wanted = [
+        address::CHIP_ID,
         address::RETURN_DELAY_TIME,
         address::TORQUE_ENABLE,
         address::BUS_WATCHDOG,

@@ -7,6 +7,7 @@ use super::{Interrupt, aside, params, report, say};
 use crate::{Client, Error, numbers, table, whole};
 use fingertip::params::Params;
 use fingertip::pressure::GAIN_ONE;
+use fingertip::shipped::address;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::{Errno, read};
 use rustix::termios::{QueueSelector, tcflush};
@@ -176,7 +177,7 @@ pub fn yes_or_no(text: &str) -> Result<bool, String> {
 // A file is written beside its place and renamed once it is whole. A record is listed in `session.json` after it was
 // written: a kill between the two repeats the motion.
 
-const VERSION: u64 = 3;
+const VERSION: u64 = 4;
 
 /// Parameters and gains of the controller at one time.
 #[derive(Clone, Debug, PartialEq)]
@@ -223,6 +224,7 @@ pub(super) struct Session {
     folder: Option<PathBuf>,
     command: &'static str,
     id: u8,
+    chip_id: i64,
     /// Settings with which all records were made.
     pub before: Settings,
     pub steps: Map<String, Value>,
@@ -236,6 +238,7 @@ impl Session {
             folder: folder.map(Path::to_owned),
             command,
             id: client.id,
+            chip_id: client.number(address::CHIP_ID)?,
             before: Settings::read(client)?,
             steps: Map::new(),
             records: BTreeMap::new(),
@@ -259,6 +262,10 @@ impl Session {
         if value["command"] != command || value["id"] != client.id {
             let (command, id) = (&value["command"], &value["id"]);
             return Err(not_one(&format!("a session of the command {command} with ID {id}")));
+        }
+        let (before, now) = (&value["chip_id"], session.chip_id);
+        if *before != now {
+            return Err(not_one(&format!("a session of the finger with chip_id {before}; this one has {now}")));
         }
         session.before = Settings::of(&value["before"]).ok_or_else(|| not_one("the settings before are damaged"))?;
         session.steps = value["steps"].as_object().cloned().ok_or_else(|| not_one("the steps are damaged"))?;
@@ -299,7 +306,8 @@ impl Session {
     fn keep(&self) -> Result<(), Error> {
         let Some(folder) = &self.folder else { return Ok(()) };
         let value = json!({
-            "version": VERSION, "command": self.command, "id": self.id, "before": self.before.json(), "steps": self.steps,
+            "version": VERSION, "command": self.command, "id": self.id, "chip_id": self.chip_id,
+            "before": self.before.json(), "steps": self.steps,
         });
         whole::write(&folder.join("session.json"), true, &serde_json::to_vec_pretty(&value).unwrap_or_default())
     }

@@ -124,7 +124,23 @@ fn a_killed_session_resumes_where_it_was() {
     finger.refuses(&calibrate, &["press-1.fts: the series has"]);
 }
 
-// KILL after packets of a session that has all records: what is left are the write and the tare. Usually after each odd number of
+#[test]
+fn a_session_of_a_finger_is_refused_for_another_one_at_its_id() {
+    let fingers = Served::begin("grasp");
+    let session = fingers.file("first");
+    let calibrate = [&QUICK[..], &["--presses", "1", "--no-scale", "--session", &session]].concat();
+    let begun = fingers.file("first/session.json");
+    let mut child = fingers.start(&calibrate);
+    Served::wait_for(|| fs::exists(&begun).unwrap_or(false));
+    fingers.kill(&mut child);
+    fingers.done(&["stop"]);
+    for (id, other) in [("1", "3"), ("2", "1")] {
+        fingers.done(&["--id", id, "params", "set", &format!("id={other}")]);
+    }
+    fingers.refuses(&calibrate, &["a session of the finger with chip_id", "name another folder"]);
+}
+
+// KILL after packets of a session that has all records: what is left are the write and the tare. Usually after each even number of
 // packets, one of which lies between the gains and the parameters.
 sim::sizes!(a_write_that_is_killed_leaves_old_or_new_parameters_and_is_completed, write_killed(2), write_killed(1));
 
@@ -136,7 +152,7 @@ fn write_killed(every: usize) {
     let wanted = finger.json(&calibrate)["after"].clone();
     let applied = [&calibrate[..], &["--apply"]].concat();
     let (mut seen, mut completed) = ([0; 2], 0);
-    for packets in (every as u64 - 1..).step_by(every) {
+    for packets in (0..).step_by(every) {
         if !finger.killed_after(packets, &applied) {
             break;
         }

@@ -5,6 +5,7 @@
 //! parameters make a new configuration, and saved ones survive a reboot. Not simulated are the time of bytes on the
 //! line, and the time in which the microcontroller starts, saves and answers (loop times read 0).
 
+use crate::effects::stream;
 use crate::mechanics::Bridge;
 use crate::native::{Board, SimError};
 use crate::scene::Scene;
@@ -44,6 +45,7 @@ pub struct Bus {
 struct Device {
     server: Server,
     flash: Record,
+    chip_id: u32,
     started_s: f64,
     reset: ResetCause,
     encoder_start: i32,
@@ -64,7 +66,7 @@ impl Bus {
         let board = Board::new(&scene.without_events())?;
         let device = |finger: usize| {
             let flash = Record { id: 1 + finger as u8, params: board.params, ..Record::DEFAULT };
-            Device::new(flash, ResetCause::PowerOn, 0.0)
+            Device::new(flash, stream(scene.seed, "chip", finger) as u32, ResetCause::PowerOn, 0.0)
         };
         let devices = (0..board.units.len()).map(device).collect();
         let object = Object::new(&board.world);
@@ -101,7 +103,7 @@ impl Bus {
             let board = &mut self.board;
             if device.reboot_s.is_some_and(|at_s| at_s <= now_s) {
                 let encoder = board.sense(finger, 0).encoder;
-                let rebooted = Device::new(device.flash, ResetCause::Software, now_s);
+                let rebooted = Device::new(device.flash, device.chip_id, ResetCause::Software, now_s);
                 *device = Device { encoder_start: encoder, broken: device.broken.take(), ..rebooted };
                 board.units[finger].pipeline = device.pipeline();
                 board.units[finger].frame.sequence = 0;
@@ -179,7 +181,7 @@ impl Bus {
                 loop_time_max_us: 0,
                 reset_cause: device.reset,
                 crash: Crash::default(),
-                health: Health::default(),
+                health: Health { chip_id: device.chip_id, ..Health::default() },
                 frame: &device.frame,
                 taxels: &pipeline.array().picture().taxels,
                 pascals_per_sum_q32: pipeline.config().pascals_per_sum_q32,
@@ -202,10 +204,11 @@ impl Bus {
 }
 
 impl Device {
-    fn new(flash: Record, reset: ResetCause, started_s: f64) -> Self {
+    fn new(flash: Record, chip_id: u32, reset: ResetCause, started_s: f64) -> Self {
         Self {
             server: Server::new(flash, &CLOCKS),
             flash,
+            chip_id,
             started_s,
             reset,
             encoder_start: 0,

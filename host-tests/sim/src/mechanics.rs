@@ -83,7 +83,7 @@ pub struct Finger {
     pub fallen_v: Option<f64>,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Motion {
     /// Shaft before and after the last step.
     before: Shaft,
@@ -115,26 +115,15 @@ impl Finger {
             rounds: ROUNDS,
             tolerance: TOLERANCE,
         };
-        let contact = Contact::new(setup, contact);
-        let now = Motion {
-            before: Shaft::default(),
-            shaft: Shaft::default(),
-            rad_per_s2: 0.0,
-            winding_a: 0.0,
-            tip_mm: 0.0,
-            bridge: Bridge::Coast,
-            circuit: Circuit::of(setup, 0.0),
-            dt_s: 0.0,
-        };
         Self {
-            contact,
+            contact: Contact::new(setup, contact),
             drive,
             faults: Faults::default(),
             counts: 0,
             setup: setup.clone(),
             rotor,
             mm_per_rad,
-            now,
+            now: Motion { circuit: Circuit::of(setup, 0.0), ..Motion::default() },
             friction: Friction::default(),
             slipped_counts: 0,
             fallen_v: None,
@@ -225,9 +214,8 @@ impl Finger {
 
     /// Puts the finger at rest at a travel.
     pub fn place(&mut self, travel_mm: f64) {
-        self.now.shaft = Shaft { angle_rad: travel_mm / self.mm_per_rad, speed_rad_per_s: 0.0 };
-        (self.now.before, self.now.rad_per_s2, self.now.winding_a, self.now.tip_mm) =
-            (self.now.shaft, 0.0, 0.0, travel_mm);
+        let shaft = Shaft { angle_rad: travel_mm / self.mm_per_rad, speed_rad_per_s: 0.0 };
+        self.now = Motion { before: shaft, shaft, rad_per_s2: 0.0, winding_a: 0.0, tip_mm: travel_mm, ..self.now };
     }
 
     /// Force at the tip that dry friction and the gear hold without the motor, N.

@@ -13,7 +13,7 @@ use crate::setup::Setup;
 use crate::watch::{Cost, Truth};
 
 /// Circuit of the winding during a step.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Circuit {
     pub source_v: f64,
     /// Resistance of the source. The motor sees duty^2 of it.
@@ -34,12 +34,11 @@ impl Circuit {
     pub fn of(setup: &Setup, duty: f64) -> Self {
         Self {
             source_v: setup.supply.source_v,
-            source_ohm: 0.0,
             duty,
             winding_ohm: setup.motor.resistance_ohm,
             bridge_ohm: setup.supply.bridge_ohm,
-            henry: 0.0,
             torque_nm_per_a: setup.motor.torque_nm_per_a,
+            ..Self::default()
         }
     }
 }

@@ -12,18 +12,15 @@ use fingertip::shipped::{COLUMNS, ROWS};
 pub struct Contact {
     pub effects: Named,
     pub along: Along,
-    elastic: Elastic,
+    /// Law of the force for the next step.
+    law: Law,
     /// Indentations, each with the centre of pressure; empty on a plane.
     centres: Vec<[f64; 3]>,
     pressures: Pressures,
     /// Contact at the last sample of each row, and its pressures.
     rows: [(Place, [f64; COLUMNS]); ROWS],
-    mm_per_n: f64,
     /// Stiffness along the surface; 0 without friction.
     pub n_per_mm_along: f64,
-    forgotten_n: f64,
-    free_mm: f64,
-    left: f64,
 }
 
 /// Contact at an instant: what its rows have in common.
@@ -59,45 +56,32 @@ impl Contact {
         };
         let centre_mm = [setup.wall.centre_x_mm, setup.wall.centre_y_mm];
         let pressures = Pressures::new(setup.tip, setup.array.pitch_mm, centre_mm);
-        let mm_per_n = effects.mm_per_n();
+        let law = Law { elastic, forgotten_n: 0.0, free_mm: 0.0, mm_per_n: effects.mm_per_n(), left: 1.0 };
         let n_per_mm_along = effects.grip().map_or(0.0, |grip| grip.n_per_mm);
-        Self {
-            n_per_mm_along,
-            effects,
-            along: Along::default(),
-            elastic,
-            centres,
-            pressures,
-            rows: [(Place::NOWHERE, [0.0; COLUMNS]); ROWS],
-            mm_per_n,
-            forgotten_n: 0.0,
-            free_mm: 0.0,
-            left: 1.0,
-        }
+        let rows = [(Place::NOWHERE, [0.0; COLUMNS]); ROWS];
+        Self { n_per_mm_along, effects, along: Along::default(), law, centres, pressures, rows }
     }
 
     /// Returns the law of the force for the next step.
-    pub fn law(&self) -> Law<'_> {
-        let Self { elastic, forgotten_n, free_mm, mm_per_n, left, .. } = self;
-        Law { elastic, forgotten_n: *forgotten_n, free_mm: *free_mm, mm_per_n: *mm_per_n, left: *left }
+    pub fn law(&self) -> &Law {
+        &self.law
     }
 
     /// Lets the tip relax for a time at an overlap.
     pub fn relax(&mut self, dt_s: f64, x_mm: f64) {
-        if !self.effects.forgets() {
-            return;
+        let law = &mut self.law;
+        if self.effects.forgets() {
+            let elastic_n = law.elastic.force_n(law.depth_mm(x_mm));
+            self.effects.relax(dt_s, (elastic_n >= law.forgotten_n).then_some(elastic_n));
+            law.forgotten_n = self.effects.forgotten_n();
+            law.free_mm = law.elastic.depth_mm(law.forgotten_n);
         }
-        let elastic_n = self.elastic.force_n(self.law().depth_mm(x_mm));
-        self.effects.relax(dt_s, (elastic_n >= self.forgotten_n).then_some(elastic_n));
-        self.forgotten_n = self.effects.forgotten_n();
-        self.free_mm = self.elastic.depth_mm(self.forgotten_n);
     }
 
     /// Loads the object with the force of an overlap.
     pub fn bear(&mut self, x_mm: f64) {
         if self.effects.breaks() {
-            let force_n = self.law().force_n(x_mm);
-            self.left = self.effects.left(force_n / self.left);
+            self.law.left = self.effects.left(self.law.force_n(x_mm) / self.law.left);
         }
     }
 
@@ -106,14 +90,14 @@ impl Contact {
         if x_mm <= 0.0 {
             return Place::NOWHERE;
         }
-        let law = self.law();
+        let law = &self.law;
         let d_mm = law.depth_mm(x_mm);
         let between = self.pressures.between(d_mm, self.along.stretch_mm);
         if law.forgotten_n == 0.0 && law.left == 1.0 {
             return Place { between, share: 1.0 };
         }
         // At the first touch of a shaped surface both forces may round to 0.
-        let elastic_n = self.elastic.force_n(d_mm);
+        let elastic_n = law.elastic.force_n(d_mm);
         Place { between, share: if elastic_n > 0.0 { law.left * law.net_n(d_mm) / elastic_n } else { law.left } }
     }
 
@@ -142,8 +126,8 @@ impl Contact {
 
     /// Returns the largest slope of force against overlap, at the deepest indentation.
     pub fn steepest_n_per_mm(&self, deepest_mm: f64) -> f64 {
-        let tip = self.elastic.n_per_mm(deepest_mm);
-        tip / (1.0 + self.mm_per_n * tip)
+        let tip = self.law.elastic.n_per_mm(deepest_mm);
+        tip / (1.0 + self.law.mm_per_n * tip)
     }
 }
 
@@ -184,9 +168,9 @@ impl Along {
 /// elastic force is a closed form on a plane and a table on other surfaces.
 ///
 /// The fields are F_e, S, c and k.
-#[derive(Clone, Copy, Debug)]
-pub struct Law<'a> {
-    pub elastic: &'a Elastic,
+#[derive(Clone, Debug)]
+pub struct Law {
+    pub elastic: Elastic,
     pub forgotten_n: f64,
     /// Indentation at which the elastic force is `forgotten_n`.
     pub free_mm: f64,
@@ -194,7 +178,7 @@ pub struct Law<'a> {
     pub left: f64,
 }
 
-impl Law<'_> {
+impl Law {
     /// Indentation of the tip at an overlap; negative without contact.
     #[inline]
     pub fn depth_mm(&self, x_mm: f64) -> f64 {
@@ -205,7 +189,7 @@ impl Law<'_> {
         if x_mm <= self.free_mm {
             return x_mm;
         }
-        match self.elastic {
+        match &self.elastic {
             Elastic::Plane { n_per_mm2 } => {
                 let steep = self.mm_per_n * n_per_mm2;
                 let ahead = x_mm + self.mm_per_n * self.forgotten_n;

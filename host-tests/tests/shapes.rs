@@ -9,18 +9,16 @@ use fingertip::frame::{Frame, Shape};
 use fingertip::pipeline::Pipeline;
 use sim::mechanics::Bridge;
 use sim::mechanics::pressures::Cell;
-use sim::mechanics::rotor::{Dynamics, Shaft, Source};
 use sim::native::DUTY_DELAY_SLOTS;
 
 // A finger with an array of any shape: a hemisphere on a plane by the paper's model, the reference front end and motor.
 
 /// The finger with its controller.
 struct Finger<const ROWS: usize, const COLUMNS: usize> {
-    setup: Setup,
+    plant: Plant,
     pipeline: Pipeline<ROWS, COLUMNS>,
     command: Command,
     frame: Frame<ROWS, COLUMNS>,
-    shaft: Shaft,
     slot_s: f64,
     idle_s: f64,
     bridge: Bridge,
@@ -39,11 +37,10 @@ impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
         setup.array.pitch_mm = f64::from(pitch_um) * 1e-3;
         [setup.wall.centre_x_mm, setup.wall.centre_y_mm] = centre_mm;
         Self {
-            setup,
+            plant: Plant::new(&setup),
             pipeline: Pipeline::new(&config),
             command: Command { fit_level, ..Command::default() },
             frame: Frame::EMPTY,
-            shaft: Shaft::default(),
             slot_s: f64::from(config.timing.slot.0) / f64::from(clocks.timer_hz),
             idle_s: f64::from(config.timing.idle.0) / f64::from(clocks.timer_hz),
             bridge: Bridge::Coast,
@@ -53,42 +50,24 @@ impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
         }
     }
 
-    fn indentation_mm(&self) -> f64 {
-        let travel_mm = Dynamics::new(&self.setup).travel_mm(self.shaft.angle_rad);
-        (travel_mm - self.setup.wall.distance_mm).max(0.0)
-    }
-
     fn force_n(&self) -> f64 {
-        self.setup.tip.force_n(self.indentation_mm())
+        self.plant.force_n()
     }
 
     fn frame_s(&self) -> f64 {
         self.slot_s * Shape::<ROWS, COLUMNS>::SLOTS as f64 + self.idle_s
     }
 
-    fn advance(&mut self, seconds: f64) {
-        let supply = &self.setup.supply;
-        let source = match self.bridge {
-            Bridge::Coast => Source::OPEN,
-            Bridge::Driven { duty } => {
-                let ohms = supply.circuit_ohm(&self.setup.motor, duty);
-                Source { volts: duty * supply.source_v, ohms, ..Source::OPEN }
-            }
-        };
-        self.shaft = Dynamics::new(&self.setup).advance(self.shaft, seconds, &source);
-    }
-
     /// The codes of a row under the present load, or of the slot with none driven.
     fn scan(&mut self, slot: usize) {
-        let array = self.setup.array;
-        let tip = self.setup.tip.flattened(self.indentation_mm());
-        let [centre_x, centre_y] = [self.setup.wall.centre_x_mm, self.setup.wall.centre_y_mm];
+        let Setup { array, tip, wall, .. } = &self.plant.finger().setup;
+        let tip = tip.flattened(self.plant.indentation_mm());
         let side = |place: usize, of: usize, centre: f64| {
             let low = (place as f64 - 0.5 * of as f64) * array.pitch_mm - centre;
             [low, low + array.pitch_mm]
         };
         let siemens: [f64; COLUMNS] = core::array::from_fn(|column| {
-            let cell = Cell { x_mm: side(column, COLUMNS, centre_x), y_mm: side(slot, ROWS, centre_y) };
+            let cell = Cell { x_mm: side(column, COLUMNS, wall.centre_x_mm), y_mm: side(slot, ROWS, wall.centre_y_mm) };
             let gain = self.gains.get(slot).map_or(1.0, |row| row[column]);
             array.preload_siemens + gain * array.siemens_per_kpa * cell.mean_kpa(&tip)
         });
@@ -108,13 +87,13 @@ impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
             // The duty acts at once, and the scan follows the idle time.
             self.bridge = Bridge::of(self.pipeline.status());
             let steps = (self.idle_s / self.slot_s).ceil() as u32;
-            (0..steps).for_each(|_| self.advance(self.idle_s / f64::from(steps)));
+            (0..steps).for_each(|_| self.plant.advance(self.idle_s / f64::from(steps), self.bridge));
         }
         for slot in 0..slots {
             if slot == DUTY_DELAY_SLOTS.min(slots - 1) {
                 self.bridge = Bridge::of(self.pipeline.status());
             }
-            self.advance(self.slot_s);
+            self.plant.advance(self.slot_s, self.bridge);
             self.scan(slot);
         }
         self.frame.sequence = self.frame.sequence.wrapping_add(1);
@@ -125,10 +104,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
 
     /// A control step with the frame of the last one.
     fn repeat(&mut self) -> Status {
-        let turns = self.shaft.angle_rad / core::f64::consts::TAU;
-        let encoder = (turns * self.setup.motor.encoder_counts_per_turn).floor() as i32;
-        let supply_mv = (self.setup.supply.source_v * 1e3) as u16;
-        let sense = Sense { encoder, supply_mv, ..Sense::default() };
+        let sense = self.plant.sense(0);
         *self.pipeline.step(&self.frame, &sense, &self.command).1
     }
 
@@ -182,7 +158,8 @@ fn presses<const ROWS: usize, const COLUMNS: usize>(
         finger.command.fit_level, status.contact.confidence
     );
     assert!(goal * (1.0 - share) < least && most < goal * (1.0 + share), "{least} .. {most} N");
-    let is = [finger.setup.wall.centre_x_mm, finger.setup.wall.centre_y_mm];
+    let wall = finger.plant.finger().setup.wall;
+    let is = [wall.centre_x_mm, wall.centre_y_mm];
     assert!(centre.iter().zip(is).all(|(found, place)| (found - place).abs() < off_mm), "{centre:?}");
     (hidden, status)
 }

@@ -60,11 +60,8 @@ impl Run {
     }
 }
 
-/// Reason why the demonstration has no result.
-pub type DemoError = RunError;
-
 /// Returns the scene. The quick one holds the same goals for a shorter time.
-pub fn scene(quick: bool) -> Result<Scene, DemoError> {
+pub fn scene(quick: bool) -> Result<Scene, RunError> {
     let (path, text) = scene::library_text(SCENE)?;
     let mut scene = read(&path.to_string_lossy(), &text)?;
     if quick {
@@ -101,7 +98,7 @@ impl Trace {
         Self { array: Taxels::of(scene), run: Run::default(), controllers: Vec::new(), last: None, fault: None }
     }
 
-    pub fn finish(mut self) -> Result<Run, DemoError> {
+    pub fn finish(mut self) -> Result<Run, RunError> {
         self.keep();
         match self.fault {
             Some(fault) => Err(format!("the controller stopped with fault {}", fault as u8).into()),
@@ -273,7 +270,7 @@ pub fn missed(checks: &[Check]) -> usize {
 }
 
 impl Forces {
-    pub fn of(run: &Run) -> Result<Self, DemoError> {
+    pub fn of(run: &Run) -> Result<Self, RunError> {
         let (mut touch, mut steps, mut release) = (None, Vec::new(), None);
         for (place, asked) in run.goals.iter().enumerate() {
             let to_s = run.goals.get(place + 1).map_or(f64::INFINITY, |next| next.at_s);
@@ -336,13 +333,14 @@ impl Touch {
 }
 
 impl StepFigures {
-    fn of(asked: &Asked) -> Result<Self, DemoError> {
+    fn of(asked: &Asked) -> Result<Self, RunError> {
         let setup = Setup::default();
         let [volts, amperes] =
             [Params::DEFAULT.voltage_max_mv, Params::DEFAULT.current_max_ma].map(|milli| f64::from(milli) * 1e-3);
         let [d_from_mm, d_to_mm] = [asked.from_n, asked.goal_n].map(|force_n| setup.tip.indentation_mm(force_n));
         let optimal = profile(&setup, d_from_mm, d_to_mm, volts, amperes);
-        let time_optimal_ms = 1e3 * optimal.map_err(|why| format!("no bound for a step: {why}"))?.total_s;
+        let no_bound = |why| format!("no bound for a step from {d_from_mm} mm to {d_to_mm} mm of indentation: {why}");
+        let time_optimal_ms = 1e3 * optimal.map_err(no_bound)?.total_s;
         let measured = asked.meter.measured();
         let settling_ms = measured.get("settling_ms");
         Ok(Self {
@@ -400,7 +398,7 @@ const BEFORE_MS: f64 = 5.0;
 const AFTER_MS: f64 = 60.0;
 
 /// Draws the pictures into a folder and returns their paths.
-pub fn draw(run: &Run, forces: &Forces, folder: &Path) -> Result<Vec<PathBuf>, DemoError> {
+pub fn draw(run: &Run, forces: &Forces, folder: &Path) -> Result<Vec<PathBuf>, RunError> {
     let touched_s = run.goals.first().map_or(0.0, |asked| asked.at_s) + forces.touch.touched_after_ms * 1e-3;
     let window = |zero_s: f64| run.between(zero_s - 1e-3 * BEFORE_MS, zero_s + 1e-3 * AFTER_MS);
     let panel = |title, zero_s, time_optimal_ms| Panel {

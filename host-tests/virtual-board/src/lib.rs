@@ -57,7 +57,7 @@ pub enum Error {
     #[error("the world around the board is another one")]
     OtherWorld,
     #[error(transparent)]
-    Demo(#[from] sim::demo::DemoError),
+    Demo(#[from] sim::run::RunError),
     #[error("{0} of the bounds missed; see the table")]
     Missed(usize),
     #[error(transparent)]

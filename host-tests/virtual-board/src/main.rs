@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 use output::{kept, say};
 use serve::{Place, Port};
-use sim::demo::{DemoError, draw, missed, table};
+use sim::demo::{draw, missed, table};
 use sim::plant::{Plant, Setup};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -159,7 +159,7 @@ pub fn demo(image: &Path, json: Option<&Path>, out: &Path, quick: bool) -> Resul
     if let Some(path) = json {
         let written = serde_json::to_string_pretty(&figures).map_err(std::io::Error::from);
         let written = written.and_then(|text| kept::write(path, text + "\n"));
-        written.map_err(|error| DemoError::from(format!("cannot write {}: {error}", path.display())))?;
+        written.map_err(|error| sim::run::RunError::from(format!("cannot write {}: {error}", path.display())))?;
     }
     say::line(format_args!("sha-256  {} ({} bytes, as flashed)\n", figures.image_sha256, figures.image_bytes));
     say::text(table(&figures.checks, &figures.forces));

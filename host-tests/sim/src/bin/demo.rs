@@ -4,7 +4,8 @@
 
 use clap::Parser;
 use output::say;
-use sim::demo::{self, DemoError, Forces, Trace, draw, missed, table};
+use sim::demo::{self, Forces, Trace, draw, missed, table};
+use sim::run::RunError;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -32,7 +33,7 @@ fn main() -> ExitCode {
 }
 
 /// Runs the scene, prints the table, draws the pictures; how many bounds are missed.
-fn run(quick: bool, out: &Path) -> Result<usize, DemoError> {
+fn run(quick: bool, out: &Path) -> Result<usize, RunError> {
     let scene = demo::scene(quick)?;
     let mut trace = Trace::new(&scene);
     sim::simulate(&scene, &mut trace)?;

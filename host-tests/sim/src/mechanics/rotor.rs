@@ -179,76 +179,6 @@ pub(crate) fn mean_square(factor: f64, x0: f64, x1: f64) -> f64 {
     factor * (d0 * d0 + d0 * d1 + d1 * d1) / 3.0 * share
 }
 
-/// Motion against a rigid wall, in SI units at the shaft of the motor and mm at the tip.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Dynamics {
-    rotor: Rotor,
-    friction_nm: f64,
-    friction_share: f64,
-    mm_per_rad: f64,
-    nm_per_n: f64,
-    wall_mm: f64,
-    force_per_mm2: f64,
-}
-
-/// Iterations of a step. At 10 us each gains a factor of 1e-7.
-const ROUNDS: usize = 3;
-
-impl Dynamics {
-    pub fn new(setup: &Setup) -> Self {
-        let gear = &setup.transmission;
-        let mm_per_rad = gear.drum_radius_mm / gear.ratio;
-        Self {
-            rotor: Rotor {
-                inertia_kg_m2: setup.motor.inertia_kg_m2,
-                torque_nm_per_a: setup.motor.torque_nm_per_a,
-                rounds: ROUNDS,
-                tolerance: 0.0,
-            },
-            friction_nm: setup.motor.friction_nm,
-            friction_share: 1.0 / gear.efficiency - 1.0,
-            mm_per_rad,
-            nm_per_n: mm_per_rad * 1e-3,
-            wall_mm: setup.wall.distance_mm,
-            force_per_mm2: setup.tip.force_per_mm2(),
-        }
-    }
-
-    /// Travel of the tip at an angle of the shaft.
-    pub fn travel_mm(&self, angle_rad: f64) -> f64 {
-        angle_rad * self.mm_per_rad
-    }
-
-    /// Angle of the shaft at a travel of the tip.
-    pub fn angle_rad(&self, travel_mm: f64) -> f64 {
-        travel_mm / self.mm_per_rad
-    }
-
-    /// Advances by one step with a constant source.
-    pub fn advance(&self, shaft: Shaft, dt_s: f64, source: &Source) -> Shaft {
-        self.rotor.advance(shaft, dt_s, &mut (self, source))
-    }
-
-    /// Advances as [`Dynamics::advance`] while the shaft moves. The time taken is less than `dt_s` if it comes to rest.
-    pub fn advance_to_rest(&self, shaft: Shaft, dt_s: f64, source: &Source) -> (Shaft, f64) {
-        self.rotor.advance_to_rest(shaft, dt_s, &mut (self, source))
-    }
-}
-
-impl Acting for (&Dynamics, &Source) {
-    fn resistance(&mut self, from_rad: f64, to_rad: f64) -> Resistance {
-        let Dynamics { friction_nm, friction_share, wall_mm, force_per_mm2, nm_per_n, .. } = *self.0;
-        let [from_mm, to_mm] = [from_rad, to_rad].map(|angle_rad| self.0.travel_mm(angle_rad) - wall_mm);
-        let load_nm = mean_square(nm_per_n * force_per_mm2, from_mm, to_mm);
-        let friction = friction_nm + friction_share * load_nm;
-        Resistance { load_nm, sliding_nm: friction, holding_nm: friction }
-    }
-
-    fn source(&self, _dt_s: f64) -> Source {
-        *self.1
-    }
-}
-
 /// Returns the source without the effect of an inductance.
 pub(crate) fn resistive(circuit: &Circuit, open: bool) -> Source {
     if open {
@@ -339,6 +269,8 @@ impl<L: Fn(f64, f64) -> f64> Acting for Acts<'_, L> {
 const STEP_S: f64 = 20e-6;
 /// Duration from which on a motion counts as impossible.
 const LONGEST_S: f64 = 10.0;
+/// Iterations of a step. At 10 us each gains a factor of 1e-7.
+const ROUNDS: usize = 3;
 /// Halvings of the interval of switch times: its end is 10^12 times narrower, far below a step.
 const HALVINGS: usize = 40;
 /// Largest distance of the end from the target. Beyond it no switch time makes the motion stop there.
@@ -354,18 +286,9 @@ pub struct Profile {
     pub end_mm: f64,
 }
 
-/// Motion that the motor cannot make within its limits.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("no way from {from_mm} mm to {to_mm} mm of indentation: {reason}")]
-pub struct Unreachable {
-    pub from_mm: f64,
-    pub to_mm: f64,
-    pub reason: Reason,
-}
-
-/// Reason why the motor cannot reach a place.
+/// Reason why the motor cannot reach a place within its limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Reason {
+pub enum Unreachable {
     /// Full drive stops, or creeps for more than 10 s, before the target: allow more voltage or current.
     #[error("full drive stops short of it: allow more voltage or current")]
     TooWeak,
@@ -379,7 +302,7 @@ pub enum Reason {
 ///
 /// The drive uses the limits of voltage and current, then brakes with them, and switches once: the time-optimal profile
 /// for a shaft with friction against a load that depends on the place. Bisection (shooting) on the equations of motion
-/// of the plant, [`Dynamics`], finds the switch time.
+/// of the plant finds the switch time.
 pub fn profile(
     setup: &Setup,
     d_from_mm: f64,
@@ -387,37 +310,42 @@ pub fn profile(
     voltage_limit: f64,
     current_limit: f64,
 ) -> Result<Profile, Unreachable> {
-    let fail = |reason| Unreachable { from_mm: d_from_mm, to_mm: d_to_mm, reason };
     if d_from_mm == d_to_mm {
         return Ok(Profile { switch_s: 0.0, total_s: 0.0, end_mm: d_to_mm });
     }
     let shooting = Shooting::new(setup, d_from_mm, d_to_mm, voltage_limit, current_limit);
     let (mut short_s, mut long_s) = (0.0, STEP_S);
-    while !shooting.shoot(long_s).map_err(fail)?.far_enough {
+    while !shooting.shoot(long_s)?.far_enough {
         short_s = long_s;
         long_s *= 2.0;
         if long_s > LONGEST_S {
-            return Err(fail(Reason::TooWeak));
+            return Err(Unreachable::TooWeak);
         }
     }
     for _ in 0..HALVINGS {
         let middle_s = 0.5 * (short_s + long_s);
-        if shooting.shoot(middle_s).map_err(fail)?.far_enough {
+        if shooting.shoot(middle_s)?.far_enough {
             long_s = middle_s;
         } else {
             short_s = middle_s;
         }
     }
-    let hit = shooting.shoot(short_s).map_err(fail)?;
-    let end_mm = shooting.dynamics.travel_mm(hit.end_rad) - setup.wall.distance_mm;
+    let hit = shooting.shoot(short_s)?;
+    let end_mm = shooting.indentation_mm(hit.end_rad);
     if (end_mm - d_to_mm).abs() > END_MM {
-        return Err(fail(Reason::RunsAway));
+        return Err(Unreachable::RunsAway);
     }
     Ok(Profile { switch_s: short_s, total_s: hit.total_s, end_mm })
 }
 
+/// Motions against a rigid wall, in SI units at the shaft of the motor and mm at the tip.
 struct Shooting {
-    dynamics: Dynamics,
+    rotor: Rotor,
+    friction_nm: f64,
+    friction_share: f64,
+    mm_per_rad: f64,
+    wall_mm: f64,
+    force_per_mm2: f64,
     drive: Source,
     from_rad: f64,
     to_rad: f64,
@@ -431,8 +359,8 @@ struct Hit {
 
 impl Shooting {
     fn new(setup: &Setup, d_from_mm: f64, d_to_mm: f64, voltage_limit: f64, current_limit: f64) -> Self {
-        let dynamics = Dynamics::new(setup);
-        let supply = &setup.supply;
+        let (gear, supply) = (&setup.transmission, &setup.supply);
+        let (mm_per_rad, wall_mm) = (gear.drum_radius_mm / gear.ratio, setup.wall.distance_mm);
         let duty = (voltage_limit / supply.source_v).min(1.0);
         let drive = Source {
             volts: duty * supply.source_v * (d_to_mm - d_from_mm).signum(),
@@ -440,30 +368,48 @@ impl Shooting {
             limit_a: current_limit,
             kept_a: 0.0,
         };
-        let angle_rad = |d_mm: f64| dynamics.angle_rad(setup.wall.distance_mm + d_mm);
-        Self { dynamics, drive, from_rad: angle_rad(d_from_mm), to_rad: angle_rad(d_to_mm) }
+        Self {
+            rotor: Rotor {
+                inertia_kg_m2: setup.motor.inertia_kg_m2,
+                torque_nm_per_a: setup.motor.torque_nm_per_a,
+                rounds: ROUNDS,
+                tolerance: 0.0,
+            },
+            friction_nm: setup.motor.friction_nm,
+            friction_share: 1.0 / gear.efficiency - 1.0,
+            mm_per_rad,
+            wall_mm,
+            force_per_mm2: setup.tip.force_per_mm2(),
+            drive,
+            from_rad: (wall_mm + d_from_mm) / mm_per_rad,
+            to_rad: (wall_mm + d_to_mm) / mm_per_rad,
+        }
+    }
+
+    fn indentation_mm(&self, angle_rad: f64) -> f64 {
+        angle_rad * self.mm_per_rad - self.wall_mm
     }
 
     /// Drives until `switch_s`, brakes to rest.
-    fn shoot(&self, switch_s: f64) -> Result<Hit, Reason> {
+    fn shoot(&self, switch_s: f64) -> Result<Hit, Unreachable> {
         let mut shaft = Shaft { angle_rad: self.from_rad, speed_rad_per_s: 0.0 };
         let mut time_s = 0.0;
         while time_s < switch_s && !self.passed(&shaft) {
             let step_s = STEP_S.min(switch_s - time_s);
-            let (next, taken_s) = self.dynamics.advance_to_rest(shaft, step_s, &self.drive);
+            let (next, taken_s) = self.rotor.advance_to_rest(shaft, step_s, &mut (self, &self.drive));
             if taken_s < step_s {
-                return Err(Reason::TooWeak);
+                return Err(Unreachable::TooWeak);
             }
             shaft = next;
             time_s += step_s;
         }
         let brake = Source { volts: -self.drive.volts, ..self.drive };
         while shaft.speed_rad_per_s != 0.0 && !self.passed(&shaft) {
-            let (next, taken_s) = self.dynamics.advance_to_rest(shaft, STEP_S, &brake);
+            let (next, taken_s) = self.rotor.advance_to_rest(shaft, STEP_S, &mut (self, &brake));
             shaft = next;
             time_s += taken_s;
             if time_s > 2.0 * LONGEST_S {
-                return Err(Reason::RunsAway);
+                return Err(Unreachable::RunsAway);
             }
         }
         Ok(Hit { end_rad: shaft.angle_rad, total_s: time_s, far_enough: self.passed(&shaft) })
@@ -471,5 +417,19 @@ impl Shooting {
 
     fn passed(&self, shaft: &Shaft) -> bool {
         (shaft.angle_rad - self.to_rad) * self.drive.volts >= 0.0
+    }
+}
+
+impl Acting for (&Shooting, &Source) {
+    fn resistance(&mut self, from_rad: f64, to_rad: f64) -> Resistance {
+        let Shooting { friction_nm, friction_share, force_per_mm2, mm_per_rad, .. } = *self.0;
+        let [from_mm, to_mm] = [from_rad, to_rad].map(|angle_rad| self.0.indentation_mm(angle_rad));
+        let load_nm = mean_square(mm_per_rad * 1e-3 * force_per_mm2, from_mm, to_mm);
+        let friction = friction_nm + friction_share * load_nm;
+        Resistance { load_nm, sliding_nm: friction, holding_nm: friction }
+    }
+
+    fn source(&self, _dt_s: f64) -> Source {
+        *self.1
     }
 }

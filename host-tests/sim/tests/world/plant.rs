@@ -7,7 +7,7 @@ use fingertip::state::Mode;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
 use sim::mechanics::pressures::Cell;
-use sim::mechanics::rotor::{Reason, profile};
+use sim::mechanics::rotor::{Unreachable, profile};
 use sim::mechanics::{Bridge, decay};
 use sim::native::bench::Bench;
 use sim::plant::{Plant, Row, Setup, Taxel};
@@ -411,11 +411,11 @@ fn no_other_single_switch_is_faster() {
 fn what_the_motor_cannot_do_is_said() {
     let setup = Setup::default();
     let weak = profile(&setup, 0.5, 3.0, 6.0, 0.1).unwrap_err();
-    assert_eq!((weak.reason, weak.to_mm), (Reason::TooWeak, 3.0));
+    assert_eq!(weak, Unreachable::TooWeak);
     assert!(weak.to_string().contains("allow more voltage or current"), "{weak}");
     let mut slick = Setup::default();
     slick.transmission.efficiency = 1.0;
     slick.motor.friction_nm = 0.0;
-    assert_eq!(profile(&slick, 3.0, 2.0, 6.0, 0.05).unwrap_err().reason, Reason::RunsAway);
+    assert_eq!(profile(&slick, 3.0, 2.0, 6.0, 0.05).unwrap_err(), Unreachable::RunsAway);
     assert_eq!(profile(&setup, 2.0, 2.0, 6.0, 1.0).unwrap().total_s, 0.0);
 }

@@ -1,6 +1,6 @@
 //! Command line of `sim`, the same for both boards, with the run and its files, and the replay.
 
-use crate::part::{cannot_write, make_folder};
+use crate::part::{make_folder, write};
 use crate::recording::{Recorder, replay};
 use crate::report::{Over, Report, Trace, page};
 use crate::run::{Run, RunError, ablate, ablation_text, run};
@@ -8,7 +8,7 @@ use crate::scene::{self, Scene, read};
 use crate::watch::{Agreement, Path, Watch};
 use crate::{explain, native};
 use clap::{Parser, ValueEnum};
-use output::{kept, say};
+use output::say;
 use std::path::{self, PathBuf};
 use std::process::ExitCode;
 
@@ -148,18 +148,16 @@ pub fn run_scene(args: &Args, scene: &Scene, board: Run) -> Result<bool, RunErro
         trace.other = Some(path.clone());
         agreement = Some(Agreement::new(scene, path));
     }
-    let mut recorder = match &args.out {
-        Some(out) => {
-            make_folder(out)?;
-            let path = out.join("run.mcap");
-            Some(match args.board {
-                Board::Native => Recorder::new(&path, scene, args.every)?,
-                // The emulated board shows a step each millisecond.
-                Board::Virtual | Board::Both => Recorder::new(&path, scene, 1)?.seen_from_outside(),
-            })
+    let recorder = |out: &PathBuf| {
+        make_folder(out)?;
+        let path = out.join("run.mcap");
+        match args.board {
+            Board::Native => Recorder::new(&path, scene, args.every),
+            // The emulated board shows a step each millisecond.
+            Board::Virtual | Board::Both => Ok(Recorder::new(&path, scene, 1)?.seen_from_outside()),
         }
-        None => None,
     };
+    let mut recorder = args.out.as_ref().map(recorder).transpose()?;
     let mut watchers: Vec<&mut dyn Watch> = Vec::new();
     if let Some(recorder) = &mut recorder {
         watchers.extend([recorder as &mut dyn Watch, &mut trace]);
@@ -181,10 +179,10 @@ pub fn run_scene(args: &Args, scene: &Scene, board: Run) -> Result<bool, RunErro
         say::line(format_args!("\nWhat each effect adds:\n{text}"));
     }
     let json = || format!("{:#}\n", outcome.json(scene, name, &ablated));
-    let json = args.json.as_ref().map_or(Ok(()), |path| write(path, &json()));
+    let json = args.json.as_ref().map_or(Ok(()), |path| write(path, json()));
     let report =
         Report { scene, board: name, outcome: &outcome, trace: &trace, ablated: &ablated, over: over.as_ref() };
-    let reported = args.out.as_ref().map_or(Ok(()), |out| write(&out.join("report.html"), &page(&report)?));
+    let reported = args.out.as_ref().map_or(Ok(()), |out| write(&out.join("report.html"), page(&report)?));
     // A file that cannot be written does not affect the others.
     let failed: Vec<String> =
         [recorded, json, reported].into_iter().filter_map(Result::err).map(|error| error.to_string()).collect();
@@ -196,10 +194,6 @@ pub fn run_scene(args: &Args, scene: &Scene, board: Run) -> Result<bool, RunErro
         say::line(format_args!("wrote {} and {}", report.display(), recording.display()));
     }
     Ok(outcome.passed() && agreement.is_none_or(|agreement| agreement.held()))
-}
-
-fn write(path: &path::Path, text: &str) -> Result<(), RunError> {
-    Ok(kept::write(path, text).map_err(|error| cannot_write(path, &error))?)
 }
 
 /// Replays a recording and reports the result. Returns true if every bit is the same.

@@ -90,6 +90,11 @@ impl Part {
     }
 }
 
+/// Replaces a file. After a failure an earlier file remains.
+pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), RunError> {
+    Ok(kept::write(path, bytes).map_err(|error| cannot_write(path, &error))?)
+}
+
 pub fn make_folder(folder: &Path) -> Result<(), String> {
     fs::create_dir_all(folder).map_err(|error| format!("cannot make {}: {error}", folder.display()))
 }

@@ -16,7 +16,7 @@ pub use report::Report;
 use crate::cli::verdict;
 use crate::cores;
 use crate::effects::stream;
-use crate::part::{Part, cannot_write, make_folder};
+use crate::part::{Part, make_folder, write};
 use crate::population::report::{Ran, judged};
 use crate::run::{Run, RunError, run};
 use crate::scene::{self, Scene, SceneErrors, set};
@@ -24,7 +24,7 @@ use crate::sweep::{Shard, progress};
 use clap::{Parser, Subcommand, ValueEnum};
 use draw::Draw;
 use fastrand::Rng;
-use output::{kept, say};
+use output::say;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::fs;
@@ -213,7 +213,7 @@ pub fn write_worst(
             text = text.replace("\n\n\n", "\n\n");
         }
         let path = out.join(format!("{}-{}-{}.toml", population.name, report.seed, ran.finger));
-        kept::write(&path, head + text.trim_start()).map_err(|error| cannot_write(&path, &error))?;
+        write(&path, head + text.trim_start())?;
         paths.push(path);
     }
     Ok(paths)
@@ -240,7 +240,7 @@ pub struct Args {
     /// The population: a file, or one of those that come with the project: careful, handled, ordinary, rough,
     /// unlike
     #[arg(required = true)]
-    population: Option<String>,
+    pub population: Option<String>,
     /// Number of fingers in the whole population
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..))]
     pub fingers: u32,
@@ -262,13 +262,6 @@ pub struct Args {
     /// Folder for the scenes of the worst fingers
     #[arg(long, value_name = "DIR", requires = "worst")]
     out: Option<PathBuf>,
-}
-
-impl Args {
-    /// Returns the name of the population as it was given.
-    pub fn name(&self) -> Option<&str> {
-        self.population.as_deref()
-    }
 }
 
 /// Board that runs the controller.
@@ -300,7 +293,7 @@ enum Merge {
 pub fn answer(args: &Args, board: Run) -> ExitCode {
     verdict(match &args.merge {
         Some(Merge::Merge { files, json }) => Report::merge(files).and_then(|report| {
-            report.write(json)?;
+            write(json, report.json()?)?;
             say::text(report::text(&report));
             Ok(report.inside() == report.fingers.len())
         }),
@@ -337,7 +330,7 @@ fn population(args: &Args, board: Run) -> Result<bool, RunError> {
             part.write(report.json()?)?;
             part.done()?;
         }
-        (None, Some(path)) => report.write(path)?,
+        (None, Some(path)) => write(path, report.json()?)?,
         (None, None) => {}
     }
     say::text(report::text(&report));

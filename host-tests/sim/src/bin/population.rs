@@ -11,7 +11,7 @@ fn main() -> ExitCode {
     let args = Args::parse();
     match args.board {
         // Shows the error of the force before and after calibration.
-        Board::Native if args.name() == Some("unlike") => {
+        Board::Native if args.population.as_deref() == Some("unlike") => {
             verdict(calibrated::fingers(args.seed, args.fingers as usize).map(|fingers| {
                 say::text(calibrated::errors_text(&fingers));
                 true

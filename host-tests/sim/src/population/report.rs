@@ -3,16 +3,15 @@
 use super::draw::Spread;
 use super::{Counted, Finger, Population};
 use crate::metrics::{Hold, Verdict, shown};
-use crate::part::{cannot_write, check};
+use crate::part::check;
 use crate::run::{Outcome, RunError, asked};
 use crate::sweep::complete;
-use output::kept;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// All fingers of a population or of a shard, in order.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -189,13 +188,9 @@ impl Report {
         fingers
     }
 
+    /// Report for scripts.
     pub fn json(&self) -> Result<String, RunError> {
         Ok(serde_json::to_string_pretty(self)? + "\n")
-    }
-
-    /// Writes the report for scripts. After a failure an earlier file remains.
-    pub fn write(&self, path: &Path) -> Result<(), RunError> {
-        Ok(kept::write(path, self.json()?).map_err(|error| cannot_write(path, &error))?)
     }
 }
 

@@ -237,20 +237,13 @@ pub struct Family {
     pub effects: &'static [Description],
 }
 
-/// Effects between tip and object.
-pub const CONTACT: Family =
-    Family { name: "contact", title: "Contact: between tip and object", effects: contact::EFFECTS };
-/// Effects from the duty to the travel of the tip.
-pub const DRIVE: Family =
-    Family { name: "drive", title: "Drive: from the duty to the tip's way", effects: drive::EFFECTS };
-/// Effects from the pressure on the taxels to the codes of the frame.
-pub const SENSOR: Family = Family { name: "sensor", title: "Sensor: from pressure to codes", effects: sensor::EFFECTS };
-/// Effects on clocks, electronics, bus and host.
-pub const LINK: Family =
-    Family { name: "link", title: "Link: clocks, electronics, bus and host", effects: link::EFFECTS };
-
 /// All families, in the order in which their effects act within a stage: interference comes before the converter.
-const FAMILIES: [Family; 4] = [LINK, SENSOR, CONTACT, DRIVE];
+pub const FAMILIES: [Family; 4] = [
+    Family { name: "link", title: "Link: clocks, electronics, bus and host", effects: link::EFFECTS },
+    Family { name: "sensor", title: "Sensor: from pressure to codes", effects: sensor::EFFECTS },
+    Family { name: "contact", title: "Contact: between tip and object", effects: contact::EFFECTS },
+    Family { name: "drive", title: "Drive: from the duty to the tip's way", effects: drive::EFFECTS },
+];
 
 #[derive(Clone, Debug)]
 pub struct NamedEffect {

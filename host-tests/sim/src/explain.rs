@@ -1,6 +1,6 @@
 //! Descriptions of a scene, and the reference page.
 
-use crate::effects::{self, CONTACT, DRIVE, Description, LINK, SENSOR};
+use crate::effects::{self, Description, FAMILIES};
 use crate::events::{EVENT, KINDS, own_keys};
 use crate::metrics;
 use crate::scene::tables::{EXPECT, Key, ROOT, SCRIPT, TABLES};
@@ -53,7 +53,11 @@ pub fn page() -> String {
         "# Scenes\n\nGenerated from `host-tests/sim/src` by `cargo xtask docs`: do not edit.\n\n{}\n",
         include_str!("explain/scenes.md").trim().replace("{wall}", include_str!("../scenes/wall.toml"))
     );
-    library_of(&mut page);
+    page.push_str("\n## The library\n\nComments in each file of `host-tests/sim/scenes` explain it.\n\n");
+    // None without the sources.
+    for (name, about) in list().unwrap_or_default().lines().filter_map(|line| line.split_once(' ')) {
+        let _ = writeln!(page, "- `{name}`: {}", about.trim());
+    }
     page.push_str(
         "\n## Tables\n\nAfter each key: its range, and its default if it has one. A unit is the end of the key's name.\n",
     );
@@ -85,7 +89,8 @@ pub fn page() -> String {
          rounded down. `cargo xtask sim --explain everything` prints the equations, the state and the sources of all effects; for \
          another scene, those of its effects.\n",
     );
-    for family in [CONTACT, DRIVE, SENSOR, LINK] {
+    let [link, sensor, contact, drive] = FAMILIES;
+    for family in [contact, drive, sensor, link] {
         let _ = write!(page, "\n### {}\n", family.title);
         for effect in family.effects {
             let _ = write!(page, "\n#### `[effects.{}]`\n\n{}\n\n", effect.name, effect.about);
@@ -100,16 +105,6 @@ pub fn page() -> String {
         metrics::page()
     );
     page
-}
-
-/// Adds the scenes of the library; none without the sources.
-fn library_of(page: &mut String) {
-    page.push_str("\n## The library\n\nComments in each file of `host-tests/sim/scenes` explain it.\n\n");
-    for line in list().unwrap_or_default().lines() {
-        if let Some((name, about)) = line.split_once(' ') {
-            let _ = writeln!(page, "- `{name}`: {}", about.trim());
-        }
-    }
 }
 
 /// Adds a list of keys to the page.

@@ -290,7 +290,6 @@ pub struct Recorder {
     every: u64,
     whole: bool,
     fingers: Vec<Finger>,
-    begun: bool,
     start_s: Option<f64>,
     /// First failure. Nothing is written after it.
     failed: McapResult<()>,
@@ -318,7 +317,6 @@ impl Recorder {
             every: every.max(1),
             whole: true,
             fingers: Vec::new(),
-            begun: false,
             start_s: None,
             failed: Ok(()),
         })
@@ -333,7 +331,7 @@ impl Recorder {
     /// Closes the file after the run and moves it to its place. After a failure an earlier file remains.
     pub fn finish(mut self, digest: &str) -> Result<(), RunError> {
         let path = std::mem::take(&mut self.path);
-        if !self.begun {
+        if self.fingers.is_empty() && self.failed.is_ok() {
             return Err("the board did not say how its controllers are set: nothing to replay".into());
         }
         Ok(self.close(digest).map_err(|error| match error {
@@ -416,7 +414,6 @@ impl Recorder {
 
 impl Watch for Recorder {
     fn begin(&mut self, controllers: &[Controller]) {
-        self.begun = true;
         self.failed = self.write_head(controllers);
     }
 

@@ -26,7 +26,9 @@ pub struct Outcome {
 /// Runs a scene, measures it, and passes it to these watchers too.
 pub fn run(scene: &Scene, board: Run, watchers: &mut [&mut dyn Watch]) -> Result<Outcome, RunError> {
     let mut meter = Meter::default();
-    let summary = board(scene, &mut All { meter: &mut meter, others: watchers })?;
+    let mut all: Vec<&mut dyn Watch> = vec![&mut meter];
+    all.extend(watchers.iter_mut().map(|watch| &mut **watch as &mut dyn Watch));
+    let summary = board(scene, &mut all)?;
     let measured = meter.measured();
     Ok(Outcome { verdicts: meter.verdicts(&measured, &scene.bounds), holds: meter.holds(), measured, summary })
 }
@@ -106,29 +108,22 @@ pub fn asked(min: Option<f64>, max: Option<f64>) -> String {
     }
 }
 
-struct All<'a, 'b> {
-    meter: &'a mut Meter,
-    others: &'a mut [&'b mut dyn Watch],
-}
-
-impl Watch for All<'_, '_> {
+impl Watch for Vec<&mut dyn Watch> {
     fn begin(&mut self, controllers: &[Controller]) {
-        self.meter.begin(controllers);
-        self.others.iter_mut().for_each(|watch| watch.begin(controllers));
+        self.iter_mut().for_each(|watch| watch.begin(controllers));
     }
 
     fn wants_pressures(&mut self, finger: usize, time_s: f64) -> bool {
         // All watchers are called, as they may count their requests.
-        self.others.iter_mut().fold(false, |wanted, watch| watch.wants_pressures(finger, time_s) | wanted)
+        self.iter_mut().fold(false, |wanted, watch| watch.wants_pressures(finger, time_s) | wanted)
     }
 
     fn wants_every_frame(&self) -> bool {
-        self.others.iter().any(|watch| watch.wants_every_frame())
+        self.iter().any(|watch| watch.wants_every_frame())
     }
 
     fn step(&mut self, step: &Step) {
-        self.meter.step(step);
-        self.others.iter_mut().for_each(|watch| watch.step(step));
+        self.iter_mut().for_each(|watch| watch.step(step));
     }
 }
 

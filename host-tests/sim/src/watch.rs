@@ -118,11 +118,8 @@ pub const BEYOND_MM: f64 = 0.005;
 /// Effects that draw a number for each sample. They draw others on the other board.
 const NOISE: [&str; 2] = ["noise", "burst"];
 
-#[derive(Clone, Copy, Debug)]
-struct Point {
-    time_s: f64,
-    values: [f64; 2],
-}
+/// Time, true force and travel.
+type Point = (f64, [f64; 2]);
 
 /// A run's trajectory, finger by finger.
 #[derive(Clone, Debug, Default)]
@@ -141,31 +138,31 @@ impl Path {
     /// Returns the difference of a step on another board, N and mm; none at times outside of the path.
     pub fn difference(&self, step: &Step) -> Option<[f64; 2]> {
         let points = self.0.get(step.finger)?;
-        let after = points.partition_point(|point| point.time_s < step.time_s);
-        let (to, from) = (points.get(after)?, points.get(after.checked_sub(1)?)?);
-        let share = (step.time_s - from.time_s) / (to.time_s - from.time_s);
-        let here = point(step).values;
-        Some(core::array::from_fn(|n| here[n] - from.values[n] - share * (to.values[n] - from.values[n])))
+        let after = points.partition_point(|(time_s, _)| *time_s < step.time_s);
+        let ((to_s, to), (from_s, from)) = (points.get(after)?, points.get(after.checked_sub(1)?)?);
+        let share = (step.time_s - from_s) / (to_s - from_s);
+        let (_, here) = point(step);
+        Some(core::array::from_fn(|n| here[n] - from[n] - share * (to[n] - from[n])))
     }
 
     /// Returns the distance of a step from the range of the path within the shift.
     fn beyond(&self, step: &Step) -> Option<[f64; 2]> {
         let points = self.0.get(step.finger)?;
-        let first = points.partition_point(|point| point.time_s < step.time_s - SHIFT_S).saturating_sub(1);
-        let near = points[first..].iter().take_while(|point| point.time_s <= step.time_s + 2.0 * SHIFT_S);
+        let first = points.partition_point(|(time_s, _)| *time_s < step.time_s - SHIFT_S).saturating_sub(1);
+        let near = points[first..].iter().take_while(|(time_s, _)| *time_s <= step.time_s + 2.0 * SHIFT_S);
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for point in near {
+        for (_, values) in near {
             for n in 0..2 {
-                (low[n], high[n]) = (low[n].min(point.values[n]), high[n].max(point.values[n]));
+                (low[n], high[n]) = (low[n].min(values[n]), high[n].max(values[n]));
             }
         }
-        let here = point(step).values;
+        let (_, here) = point(step);
         Some(core::array::from_fn(|n| (low[n] - here[n]).max(here[n] - high[n]).max(0.0)))
     }
 }
 
 fn point(step: &Step) -> Point {
-    Point { time_s: step.time_s, values: [step.truth.force_n, step.truth.travel_mm] }
+    (step.time_s, [step.truth.force_n, step.truth.travel_mm])
 }
 
 /// Largest value and its time.

@@ -1,7 +1,7 @@
 //! Plots of a report, each also drawn for a page without a script.
 
 use crate::metrics::shown;
-use crate::report::trace::{Drawn, Instant, Kept, QUANTITIES, Row, Strip, Track, Tracks};
+use crate::report::trace::{Drawn, Instant, Kept, QUANTITIES, Row, Track, Tracks};
 use maud::{Markup, html};
 use output::plot::{Curve, Curves, PlotError, Pressures, curves};
 use serde::Serialize;
@@ -145,7 +145,7 @@ fn steps(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
 const WIDE: f64 = 1000.0;
 
 /// Strip with a line of text and a bar for each mode, fault and limit that occurred.
-pub fn strip(Strip(rows): &Strip, times: &[f64]) -> Markup {
+pub fn strip(rows: &[Row], times: &[f64]) -> Markup {
     let end = times.last().copied().unwrap_or(0.0).max(1e-9);
     // A state of a stretch lasts until the next one.
     let place = |at: usize| times.get(at).map_or(WIDE, |time_s| if at == 0 { 0.0 } else { WIDE * time_s / end });

@@ -158,8 +158,8 @@ pub struct Tracks {
 }
 
 impl Tracks {
-    pub fn strip(&self) -> Strip {
-        Strip::of(&self.states)
+    pub fn strip(&self) -> Vec<Row> {
+        rows(&self.states)
     }
 }
 
@@ -264,15 +264,8 @@ pub struct States(u64);
 impl States {
     pub fn add(&mut self, status: &Status) {
         let Status { mode, fault, limits, .. } = *status;
-        self.set(0, mode as u32);
-        if let Some(fault) = fault {
-            self.set(FAULTS, fault as u32);
-        }
-        self.0 |= u64::from(limits.0) << LIMITS;
-    }
-
-    fn set(&mut self, first: u32, number: u32) {
-        self.0 |= 1 << (first + number);
+        let fault = fault.map_or(0, |fault| 1 << (FAULTS + fault as u32));
+        self.0 |= 1 << mode as u32 | fault | u64::from(limits.0) << LIMITS;
     }
 }
 
@@ -288,21 +281,16 @@ pub struct Row {
 }
 
 /// Modes, faults and limits that occurred, each in the order of their numbers.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Strip(pub Vec<Row>);
-
-impl Strip {
-    pub fn of(states: &[States]) -> Self {
-        let row = |bit: u32| {
-            let spans = spans(states, bit);
-            let (first, kind, names) = NAMES.into_iter().rfind(|(first, ..)| *first <= bit)?;
-            let number = bit - first;
-            let name = names.get(number as usize).filter(|name| !name.is_empty());
-            let name = name.map_or_else(|| number.to_string(), |name| (*name).to_owned());
-            (!spans.is_empty()).then_some(Row { kind, name, spans })
-        };
-        Self((0..u64::BITS).filter_map(row).collect())
-    }
+fn rows(states: &[States]) -> Vec<Row> {
+    let row = |bit: u32| {
+        let spans = spans(states, bit);
+        let (first, kind, names) = NAMES.into_iter().rfind(|(first, ..)| *first <= bit)?;
+        let number = bit - first;
+        let name = names.get(number as usize).filter(|name| !name.is_empty());
+        let name = name.map_or_else(|| number.to_string(), |name| (*name).to_owned());
+        (!spans.is_empty()).then_some(Row { kind, name, spans })
+    };
+    (0..u64::BITS).filter_map(row).collect()
 }
 
 fn spans(states: &[States], bit: u32) -> Vec<[usize; 2]> {
@@ -382,7 +370,7 @@ mod tests {
         states[4].add(&status(Mode::Approach, None, Limits::TORQUE_HELD));
         let row = |kind, name: &str, spans: &[[usize; 2]]| Row { kind, name: name.into(), spans: spans.to_vec() };
         assert_eq!(
-            Strip::of(&states).0,
+            rows(&states),
             [
                 row("mode", "approach", &[[0, 2], [4, 5]]),
                 row("mode", "force", &[[1, 3]]),

@@ -12,6 +12,7 @@ use fingertip::model::Tip;
 use fingertip::units::{Kilopascals, Millimetres};
 use paper::units::{Radians, Ratio};
 use paper::{Displacement, PERIODS_MAX, Relaxation, RelaxationState, RelaxationTerm};
+use std::collections::HashMap;
 use std::error::Error;
 use std::ops::Range;
 use std::path::Path;
@@ -171,14 +172,9 @@ pub fn check() -> Result<[Tally; 5], Box<dyn Error>> {
         Tally::new("F(d)", 0.501),
         Tally::new("k(d)", 0.501),
     ];
-    let mut reader = csv::Reader::from_path(path())?;
-    let columns: Vec<String> = reader.headers()?.iter().map(str::to_owned).collect();
-    for record in reader.records() {
+    for record in csv::Reader::from_path(path())?.deserialize::<HashMap<String, String>>() {
         let record = record?;
-        let read = |name: &str| -> Result<Real, Box<dyn Error>> {
-            let place = columns.iter().position(|column| column == name).ok_or_else(|| format!("no column {name}"))?;
-            parse(record.get(place).unwrap_or_default())
-        };
+        let read = |name: &str| parse(record.get(name).ok_or_else(|| format!("no column {name}"))?);
         let a = fixed(&read("a_mm")?, 24);
         let y = fixed(&read("Y_kPa")?, 16);
         let (d, r) = (fixed(&read("d_mm")?, 24), fixed(&read("r_mm")?, 24));

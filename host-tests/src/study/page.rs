@@ -5,6 +5,7 @@ use super::output::{Cost, Passes};
 use super::{scan, simulation};
 use crate::page::Page;
 use output::plot::{Dot, Front, PlotError, front};
+use serde_json::json;
 use std::fmt::Write as _;
 use std::iter;
 
@@ -91,12 +92,11 @@ pub fn json_lines(studied: &[Studied]) -> String {
     for (kernel, points) in studied {
         for (point, by) in points.iter().zip(beaten_by(points)) {
             let Point { name, firmware, cost, error_max, error_rms, other } = point;
-            let _ = write!(
-                text,
-                "{{\"kernel\":\"{}\",\"variant\":\"{name}\",\"firmware\":{firmware},\"front\":{}",
-                kernel.name,
-                by.is_none()
-            );
+            // What is not finite becomes `null`.
+            let mut figures = json!({
+                "kernel": kernel.name, "variant": name, "firmware": firmware, "front": by.is_none(),
+                "error": kernel.error, "error_max": error_max, "error_rms": error_rms,
+            });
             let Cost { instructions, low, estimate, high, flash } = cost;
             for (key, passes) in [
                 ("instructions", instructions),
@@ -105,20 +105,14 @@ pub fn json_lines(studied: &[Studied]) -> String {
                 ("cycles_high", high),
                 ("cycles_flash", flash),
             ] {
-                let _ = write!(text, ",\"{key}_median\":{},\"{key}_max\":{}", passes.median, passes.max);
+                figures[format!("{key}_median")] = passes.median.into();
+                figures[format!("{key}_max")] = passes.max.into();
             }
-            let number = |value: f64| if value.is_finite() { format!("{value:e}") } else { "null".into() };
-            let _ = write!(text, ",\"error\":\"{}\"", kernel.error);
-            let _ = write!(text, ",\"error_max\":{},\"error_rms\":{}", number(*error_max), number(*error_rms));
             if let (Some([max, rms]), Some(unit)) = (other, kernel.other) {
-                let _ = write!(
-                    text,
-                    ",\"other_error\":\"{unit}\",\"other_max\":{},\"other_rms\":{}",
-                    number(*max),
-                    number(*rms)
-                );
+                figures["other_error"] = unit.into();
+                (figures["other_max"], figures["other_rms"]) = (json!(max), json!(rms));
             }
-            text.push_str("}\n");
+            let _ = writeln!(text, "{figures}");
         }
     }
     text

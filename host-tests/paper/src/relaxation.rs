@@ -35,11 +35,13 @@ pub struct RelaxationTerm {
 }
 
 /// A relaxation function that the filter does not cover.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum RelaxationError {
     /// The period is 0.
+    #[error("a period of 0 us: at least 1 us is needed")]
     Period,
     /// A term's share is not within 0 to 1.
+    #[error("term {term} has the share {}: 0 to 1 are covered", share.0)]
     Share {
         /// Which term.
         term: usize,
@@ -47,8 +49,10 @@ pub enum RelaxationError {
         share: Ratio,
     },
     /// The shares add up to more than 1, in 2^-16.
+    #[error("the shares add up to {0}/65536: at most 65536/65536 can relax")]
     Sum(i64),
     /// The time constant of a term is out of range.
+    #[error("term {term} has a time constant of {value_us} us: {min_us} to {max_us} us are covered")]
     TimeConstant {
         /// Number of the term.
         term: usize,
@@ -60,21 +64,6 @@ pub enum RelaxationError {
         max_us: u32,
     },
 }
-
-impl core::fmt::Display for RelaxationError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Period => write!(f, "a period of 0 us: at least 1 us is needed"),
-            Self::Share { term, share } => write!(f, "term {term} has the share {}: 0 to 1 are covered", share.0),
-            Self::Sum(sum) => write!(f, "the shares add up to {sum}/65536: at most 65536/65536 can relax"),
-            Self::TimeConstant { term, value_us, min_us, max_us } => {
-                write!(f, "term {term} has a time constant of {value_us} us: {min_us} to {max_us} us are covered")
-            }
-        }
-    }
-}
-
-impl core::error::Error for RelaxationError {}
 
 /// A relaxation function of `N` terms, sampled at a fixed period.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -139,12 +128,8 @@ impl<const N: usize> Relaxation<N> {
                 return Err(RelaxationError::Share { term, share });
             }
             if time_constant_us < period_us || time_constant_us > max_us {
-                return Err(RelaxationError::TimeConstant {
-                    term,
-                    value_us: time_constant_us,
-                    min_us: period_us,
-                    max_us,
-                });
+                let (value_us, min_us) = (time_constant_us, period_us);
+                return Err(RelaxationError::TimeConstant { term, value_us, min_us, max_us });
             }
             sum += i64::from(share.to_bits());
         }

@@ -8,6 +8,7 @@ use core::f64::consts::{PI, TAU};
 use fastrand::Rng;
 use fingertip::params::Params;
 use fingertip::shipped::{COLUMNS, Config, ROWS, TactileImage};
+use images::picture;
 use sim::mechanics::pressures::Cell;
 use sim::setup::Setup;
 
@@ -274,22 +275,4 @@ impl Reading {
         }
         (picture(&taxels, bad), seen)
     }
-}
-
-/// Tactile image of the taxels with its sums, as the pipeline computes it; bad taxels read 0.
-pub fn picture(taxels: &[[i32; COLUMNS]; ROWS], bad: [u32; ROWS]) -> TactileImage {
-    let mut picture = TactileImage { taxels: *taxels, bad, ..TactileImage::EMPTY };
-    for (row, line) in picture.taxels.iter_mut().enumerate() {
-        for (column, taxel) in line.iter_mut().enumerate() {
-            if bad[row] >> column & 1 != 0 {
-                *taxel = 0;
-                picture.bad_count += 1;
-            }
-            picture.sum += *taxel;
-            picture.moment_x += *taxel * (2 * column as i32 + 1 - COLUMNS as i32);
-            picture.moment_y += *taxel * (2 * row as i32 + 1 - ROWS as i32);
-            picture.peak = picture.peak.max(*taxel);
-        }
-    }
-    picture
 }

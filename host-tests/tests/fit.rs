@@ -3,8 +3,8 @@
 
 use crate::common::*;
 use fingertip::contact::{CONFIDENCE_LEAST, from_sums};
-use host_tests::fit_cases::picture;
 use host_tests::fit_statistics::{BAD, CUT_MIN, FRAMES, GOOD, Judged, Outcome, Series, WAYS, judge, quantile};
+use images::picture;
 use images::single::{Refined, read};
 
 /// A converter that gives its smallest and its largest code, in sixteenths.

@@ -12,6 +12,7 @@ use fingertip::contact::{Contact, FitLevel};
 use fingertip::control::{Reference, SpeedLoop};
 use fingertip::grip::{Goal, Grip};
 use fingertip::params::Params;
+use fingertip::shipped::{COLUMNS, ROWS, TactileImage};
 use fingertip::state::Limits;
 use fingertip::touch::{Touch, TouchInputs};
 use fingertip::units::Millimetres;
@@ -35,6 +36,24 @@ pub const CORRECTED: Params =
 /// Command of a record for a second controller, which has [`CORRECTED`]: each fit level in turn.
 pub fn varied(record: u32, command: &Command) -> Command {
     Command { fit_level: FitLevel::from_number((record / 500 % 6) as u8), ..*command }
+}
+
+/// Tactile image of the taxels with its sums, as the pipeline computes it; bad taxels read 0.
+pub fn picture(taxels: &[[i32; COLUMNS]; ROWS], bad: [u32; ROWS]) -> TactileImage {
+    let mut picture = TactileImage { taxels: *taxels, bad, ..TactileImage::EMPTY };
+    for (row, line) in picture.taxels.iter_mut().enumerate() {
+        for (column, taxel) in line.iter_mut().enumerate() {
+            if bad[row] >> column & 1 != 0 {
+                *taxel = 0;
+                picture.bad_count += 1;
+            }
+            picture.sum += *taxel;
+            picture.moment_x += *taxel * (2 * column as i32 + 1 - COLUMNS as i32);
+            picture.moment_y += *taxel * (2 * row as i32 + 1 - ROWS as i32);
+            picture.peak = picture.peak.max(*taxel);
+        }
+    }
+    picture
 }
 
 /// Steps touch and grip by a frame of an approach or a hold, without an external force before the array shows one.

@@ -97,16 +97,9 @@ fn one_case(
 fn picture(inputs: &mut Inputs) -> TactileImage {
     let mut bytes = [0; 4 * ROWS * COLUMNS];
     inputs.read(&mut bytes);
-    let mut values = bytes.as_chunks::<4>().0.iter().map(|bytes| i32::from_le_bytes(*bytes));
-    let mut picture = TactileImage::EMPTY;
-    for (row, line) in picture.taxels.iter_mut().enumerate() {
-        for (column, taxel) in line.iter_mut().enumerate() {
-            *taxel = values.next().unwrap_or(0);
-            picture.sum += *taxel;
-            picture.moment_x += *taxel * (2 * column as i32 - 9);
-            picture.moment_y += *taxel * (2 * row as i32 - 9);
-            picture.peak = picture.peak.max(*taxel);
-        }
+    let mut taxels = [[0; COLUMNS]; ROWS];
+    for (taxel, bytes) in taxels.as_flattened_mut().iter_mut().zip(bytes.as_chunks().0) {
+        *taxel = i32::from_le_bytes(*bytes);
     }
-    picture
+    images::picture(&taxels, [0; ROWS])
 }

@@ -72,11 +72,11 @@ pub const PRESSURE: &[Variant] = &[
     variant!("f64, no cancellation", Double f64: |r, d, tools| sound(r * r, d, tools) * 1000.0),
     variant!("I16F16, textbook, `fixed`", Fixed i32, 16, 16: |r, d, tools| {
         let (r, d) = (I16F16::from_bits(r), I16F16::from_bits(d));
-        (textbook(r * r, d, tools) * I16F16::from_small(1000)).to_bits()
+        (textbook(r * r, d, tools) * I16F16::from_bits(1000 << 16)).to_bits()
     }),
     variant!("I16F16, no cancellation, `fixed`", Fixed i32, 16, 16: |r, d, tools| {
         let (r, d) = (I16F16::from_bits(r), I16F16::from_bits(d));
-        (sound(r * r, d, tools) * I16F16::from_small(1000)).to_bits()
+        (sound(r * r, d, tools) * I16F16::from_bits(1000 << 16)).to_bits()
     }),
     variant!("Q16, VSQRT and UDIV", Fixed i32, 16, 16: |r, d, tools| {
         let square = ((i64::from(r) * i64::from(r)) >> 16) as i32;
@@ -95,7 +95,7 @@ fn textbook<T: Number>(square: T, d: T, tools: &Tools) -> T {
     let tip = T::constants(tools);
     let length = (tip.radius * tip.radius - square).root();
     let compression = length - (tip.radius - d);
-    if compression > T::from_small(0) { tip.modulus * compression / length } else { T::from_small(0) }
+    if compression > T::default() { tip.modulus * compression / length } else { T::default() }
 }
 
 /// Y (r_c^2 - r^2) / (L (L + a - d)), in N/mm^2.
@@ -103,11 +103,11 @@ fn textbook<T: Number>(square: T, d: T, tools: &Tools) -> T {
 fn sound<T: Number>(square: T, d: T, tools: &Tools) -> T {
     let tip = T::constants(tools);
     let inside = d * (tip.radius + tip.radius - d) - square;
-    if inside > T::from_small(0) {
+    if inside > T::default() {
         let length = (tip.radius * tip.radius - square).root();
         tip.modulus * inside / (length * (length + tip.radius - d))
     } else {
-        T::from_small(0)
+        T::default()
     }
 }
 

@@ -160,10 +160,9 @@ fn measure(region: u32, call: Call, [x, y]: [i32; 2], tools: &Tools) {
 }
 
 pub trait Number:
-    Copy + PartialOrd + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+    Copy + Default + PartialOrd + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
     fn root(self) -> Self;
-    fn from_small(n: u16) -> Self;
     fn constants(tools: &Tools) -> &Constants<Self>;
 }
 
@@ -171,11 +170,6 @@ impl Number for f32 {
     #[inline(always)]
     fn root(self) -> Self {
         root_f32(self)
-    }
-
-    #[inline(always)]
-    fn from_small(n: u16) -> Self {
-        n.into()
     }
 
     #[inline(always)]
@@ -191,11 +185,6 @@ impl Number for f64 {
     }
 
     #[inline(always)]
-    fn from_small(n: u16) -> Self {
-        n.into()
-    }
-
-    #[inline(always)]
     fn constants(tools: &Tools) -> &Constants<Self> {
         &tools.double
     }
@@ -205,11 +194,6 @@ impl Number for I16F16 {
     #[inline(always)]
     fn root(self) -> Self {
         self.sqrt()
-    }
-
-    #[inline(always)]
-    fn from_small(n: u16) -> Self {
-        Self::from_bits(i32::from(n) << 16)
     }
 
     #[inline(always)]

@@ -65,7 +65,7 @@ impl fmt::Display for MeterError {
 impl std::error::Error for MeterError {}
 
 /// A pass under way.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct Pass {
     number: u32,
     core: Core,
@@ -95,7 +95,10 @@ impl Meter {
         let address = site.address;
         let Some(pass) = &mut self.pass else {
             match &site.code {
-                Ok(Instruction { kind: Kind::Begin, .. }) => self.begin(registers.core(0)),
+                Ok(Instruction { kind: Kind::Begin, .. }) => {
+                    let (number, flash_start) = (registers.core(0), self.flash.now());
+                    self.pass = Some(Pass { number, flash_start, ..Pass::default() });
+                }
                 Ok(Instruction { kind: Kind::End, .. }) => return Err(MeterError::NotBegun(address)),
                 _ => {}
             }
@@ -132,18 +135,6 @@ impl Meter {
     /// Returns the measurements.
     pub fn finish(&self) -> Result<&Regions, MeterError> {
         self.pass.as_ref().map_or(Ok(&self.regions), |pass| Err(MeterError::NotEnded(pass.number)))
-    }
-
-    fn begin(&mut self, number: u32) {
-        self.pass = Some(Pass {
-            number,
-            core: Core::default(),
-            block: IfThen::default(),
-            last: None,
-            instructions: 0,
-            cycles: Cycles::default(),
-            flash_start: self.flash.now(),
-        });
     }
 
     fn end(&mut self) {

@@ -83,7 +83,17 @@ impl Lock {
 
     /// Replaces a file that belongs to it, and that nobody writes without this lock.
     pub fn write_with(&self, path: &Path, bytes: impl AsRef<[u8]>) -> io::Result<()> {
-        replace(path, bytes.as_ref())
+        let new = beside(path, "new");
+        let written = File::create(&new).and_then(|mut file| {
+            file.write_all(bytes.as_ref())?;
+            if let Ok(old) = fs::metadata(path) {
+                file.set_permissions(old.permissions())?;
+            }
+            file.sync_all()
+        });
+        written.and_then(|()| put(&new, path)).inspect_err(|_| {
+            let _ = fs::remove_file(&new);
+        })
     }
 }
 
@@ -168,21 +178,6 @@ pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> io::Result<()> {
         Ok(known) => OpenOptions::new().write(true).open(known)?.write_all(bytes.as_ref()),
         Err(_) => Lock::wait(path)?.write(bytes),
     }
-}
-
-/// Under its lock.
-fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let new = beside(path, "new");
-    let written = File::create(&new).and_then(|mut file| {
-        file.write_all(bytes)?;
-        if let Ok(old) = fs::metadata(path) {
-            file.set_permissions(old.permissions())?;
-        }
-        file.sync_all()
-    });
-    written.and_then(|()| put(&new, path)).inspect_err(|_| {
-        let _ = fs::remove_file(&new);
-    })
 }
 
 fn put(new: &Path, path: &Path) -> io::Result<()> {

@@ -1,6 +1,6 @@
 //! The report of a board, judged.
 
-use crate::checks::{self, Check, FLAT};
+use crate::checks::{self, Check};
 use crate::listen::Report;
 use serde::Serialize;
 use std::collections::HashMap;
@@ -10,8 +10,7 @@ use std::path::Path;
 
 /// Version of the JSON file's fields.
 const SCHEMA_VERSION: u32 = 1;
-/// Allowed difference between measured and estimated cycles: a share, or a number. The model does not know the flash
-/// fully.
+/// Allowed difference between measured and estimated cycles, a share or a number: the model does not know the flash.
 const SHARE: f64 = 0.1;
 const CYCLES: f64 = 10.0;
 /// Cycles of an empty call of a kernel.
@@ -26,11 +25,9 @@ pub enum Board {
     Emulated,
 }
 
-/// Verdict on a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// The value is as expected.
     Pass,
     /// The value is not as expected, or not reported.
     Fail,
@@ -41,7 +38,6 @@ pub enum Verdict {
 #[derive(Debug, Serialize)]
 pub struct Judged {
     pub name: String,
-    /// Description.
     pub what: String,
     pub unit: &'static str,
     /// Measured figure; `None` if it was not reported.
@@ -68,7 +64,6 @@ pub struct Kernel {
     pub verdict: Verdict,
 }
 
-/// All results of a board.
 #[derive(Debug, Serialize)]
 pub struct Judgement {
     pub schema_version: u32,
@@ -76,9 +71,7 @@ pub struct Judgement {
     /// Unique ID of the part.
     pub board_uid: String,
     pub board: Board,
-    /// Number of checks that pass.
     pub passed: usize,
-    /// Number of checks that fail.
     pub failed: usize,
     /// Number of checks that the emulated board cannot show.
     pub not_shown: usize,
@@ -176,7 +169,7 @@ impl Judgement {
             text += &format!("{} {median_cycles:>10}{most_cycles:>10}{estimate:>10}  {name}\n", word(*verdict));
         }
         if self.board == Board::Emulated {
-            text += &format!("{:13}no kernel is shown by the emulator: {FLAT}\n", "");
+            text += &format!("{:13}no kernel is shown by the emulator: it retires a flat number of instructions\n", "");
         }
         let Self { image_sha256, board_uid, passed, failed, not_shown, .. } = self;
         text += &format!("\nsha-256  {image_sha256}\nboard    {board_uid}\n");
@@ -186,11 +179,7 @@ impl Judgement {
 }
 
 const fn word(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::Pass => "pass        ",
-        Verdict::Fail => "FAIL        ",
-        Verdict::NotShown => "(not shown) ",
-    }
+    ["pass        ", "FAIL        ", "(not shown) "][verdict as usize]
 }
 
 fn number(figure: f64) -> String {

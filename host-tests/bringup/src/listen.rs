@@ -37,8 +37,8 @@ pub fn listen(port: &mut (impl Read + Write), frames: u32, progress: &mut dyn Fn
             if let Some(end) = taken.strip_prefix("end ") {
                 return match report {
                     Some(report) if end == format!("{check:08x}") => Ok(report),
-                    Some(_) => Err(Error::new(ErrorKind::InvalidData, "the report is damaged: try again")),
-                    None => Err(Error::new(ErrorKind::InvalidData, "the report has no beginning: try again")),
+                    Some(_) => Err(Error::other("the report is damaged: try again")),
+                    None => Err(Error::other("the report has no beginning: try again")),
                 };
             }
             let begins = taken.strip_prefix("bringup ");
@@ -64,10 +64,7 @@ pub fn listen(port: &mut (impl Read + Write), frames: u32, progress: &mut dyn Fn
 fn uid(begins: &str) -> Result<String, Error> {
     match begins.split_once(' ') {
         Some((version, uid)) if version == VERSION.to_string() => Ok(uid.into()),
-        _ => Err(Error::new(
-            ErrorKind::InvalidData,
-            format!("the image reports by version {begins}, this host by {VERSION}: rebuild both"),
-        )),
+        _ => Err(Error::other(format!("the image reports by version {begins}, this host by {VERSION}: rebuild both"))),
     }
 }
 
@@ -91,11 +88,8 @@ impl Report {
 }
 
 fn silence(error: Error) -> Error {
-    match error.kind() {
-        ErrorKind::TimedOut => Error::new(
-            ErrorKind::TimedOut,
-            "the board is silent: is the image of `cargo xtask bringup` flashed, and is this the ST-LINK's port?",
-        ),
-        _ => error,
+    if error.kind() != ErrorKind::TimedOut {
+        return error;
     }
+    Error::other("the board is silent: is the image of `cargo xtask bringup` flashed, and is this the ST-LINK's port?")
 }

@@ -22,12 +22,10 @@ pub const GOALS: [(i32, u32); 6] =
 pub const STEPS: core::ops::Range<usize> = 1..5;
 /// Frames from the start to torque on, longer than the tare.
 const TORQUE_AT: u32 = TARE_FRAMES + 20;
-/// The first goal.
 const FIRST_AT: u32 = TORQUE_AT + 20;
 /// Records that the step is studied on, with the wall so near: most of them in contact.
 pub const RECORDS: u32 = 1_200;
 const NEAR_MM: f32 = 1.0;
-/// The wall of the demonstration.
 const WALL_MM: f32 = 5.0;
 /// A step counts as settled inside this share of the goal or of the step, whichever is smaller.
 const SETTLED_SHARE: f32 = 0.02;
@@ -125,8 +123,8 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// Bench at rest, before the tare; [`Finger::make_table`] must be called.
-    pub const fn new() -> Self {
+    /// Bench before the tare; [`Finger::make_table`] must be called.
+    pub const fn at_rest() -> Self {
         Self {
             finger: Finger::new(WALL_MM),
             frame: Frame::EMPTY,
@@ -201,12 +199,6 @@ impl Bench {
         self.until = self.frames + frames;
         self.way = Way::new(self.finger.force_n(), goal_mn as f32 * 1e-3);
         answered
-    }
-}
-
-impl Default for Bench {
-    fn default() -> Self {
-        Self::new()
     }
 }
 
@@ -363,14 +355,7 @@ impl Finger {
         // Rounded down, which the cast does for positive numbers only.
         let whole = counts as i32;
         let encoder = if counts < whole as f32 { whole - 1 } else { whole };
-        Sense {
-            encoder,
-            supply_mv: (self.supply_v * 1e3) as u16,
-            bus_silent_ms: 0,
-            bridge_fault: false,
-            chip: None,
-            answer,
-        }
+        Sense { encoder, supply_mv: (self.supply_v * 1e3) as u16, answer, ..AT_REST }
     }
 
     /// The codes of the frame that has just ended.

@@ -1,7 +1,6 @@
 //! Format of a report, that each check can fail, and `bringup-host` at a serial port, with a simulated board.
 
-use bringup::checks;
-use bringup::checks::checks;
+use bringup::checks::{self, checks};
 use bringup::judge::{Board, Judgement, Verdict, judge};
 use bringup::listen::{Report, listen};
 use bringup::script::{Bench, STEPS};
@@ -17,7 +16,6 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::{fs, thread};
 
-/// A report of a sound board.
 fn sound() -> Report {
     let middle = |[least, most]: [f64; 2]| if most.is_finite() { 0.5 * (least + most) } else { least };
     let figures = checks().into_iter().map(|check| (check.name, middle(check.within))).collect();
@@ -117,7 +115,7 @@ fn the_host_asks_for_frames() {
 #[test]
 fn its_steps_are_within_a_tenth_of_the_demonstrations() {
     let config = Config::shipped(&images::CONFIRMED).expect("the defaults make a configuration");
-    let (mut pipeline, mut bench) = (Pipeline::new(&config), Bench::new());
+    let (mut pipeline, mut bench) = (Pipeline::new(&config), Bench::at_rest());
     bench.finger.make_table();
     let mut answers = Vec::new();
     while !bench.done() {

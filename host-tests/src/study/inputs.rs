@@ -160,7 +160,7 @@ impl Inputs {
     /// The same with the records behind it, as that image makes them: what the timing model's image takes.
     pub fn few_with_records(&self) -> Vec<u8> {
         let config = config();
-        let (mut pipeline, mut bench) = (Pipeline::new(&config), Bench::new());
+        let (mut pipeline, mut bench) = (Pipeline::new(&config), Bench::at_rest());
         bench.finger.make_table();
         bench.restart();
         let mut bytes = self.few_to_bytes();

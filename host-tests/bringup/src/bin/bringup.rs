@@ -37,7 +37,7 @@ use kernels::host;
 use stages::{Kept, Stage};
 use static_cell::{ConstStaticCell, StaticCell};
 
-static BENCH: ConstStaticCell<Bench> = ConstStaticCell::new(Bench::new());
+static BENCH: ConstStaticCell<Bench> = ConstStaticCell::new(Bench::at_rest());
 static PIPELINE: StaticCell<Pipeline> = StaticCell::new();
 static CONFIG: StaticCell<Config> = StaticCell::new();
 

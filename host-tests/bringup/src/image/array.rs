@@ -47,7 +47,6 @@ pub fn rows(frames: u32) {
     report::figure("frame_ns", ns(seen.frame_cycles as f32 / seen.frames.max(1) as f32));
 }
 
-/// State of the pins.
 struct Seen {
     frames: u32,
     wrong: u32,
@@ -210,7 +209,6 @@ fn step_at(scan: &mut scan::Scan, at: u16) -> Option<(u16, u16)> {
     scan.copy(scan::newest(), &mut frame).then(|| (stepped, frame.code(SLOT, COLUMN)))
 }
 
-/// Waits for a millisecond at most.
 fn wait_until(mut holds: impl FnMut() -> bool) -> Option<()> {
     let since = DWT::cycle_count();
     while !holds() {

@@ -1,5 +1,4 @@
-//! The study's kernels by the core's cycle counter: the same code and inputs as `cargo xtask study`'s image has under
-//! the timing model.
+//! The study's kernels by the core's cycle counter, with the code and inputs that the timing model gets.
 
 #[path = "../../../images/src/study/kernels.rs"]
 mod study;
@@ -20,7 +19,6 @@ const PASSES: usize = 1_200;
 static PASSED: Mutex<RefCell<Passed>> =
     Mutex::new(RefCell::new(Passed { kernel: heapless::String::new(), cycles: heapless::Vec::new(), most: 0 }));
 
-/// Cycles of the passes of the present kernel.
 struct Passed {
     kernel: heapless::String<64>,
     cycles: heapless::Vec<u32, PASSES>,
@@ -29,7 +27,7 @@ struct Passed {
 
 pub fn run(config: &Config, bench: &mut Bench, pipeline: &mut Pipeline) {
     report::say(format_args!("kernels: a minute or less"));
-    study::run(config, &mut Inputs::new(bench, pipeline));
+    study::run(config, &mut Inputs { place: 0, bench, pipeline });
     begin("");
 }
 
@@ -49,7 +47,6 @@ pub fn begin(kernel: &str) {
     });
 }
 
-/// Records the cycles of a pass.
 fn note(cycles: u32) {
     free(|section| {
         let passed = &mut *PASSED.borrow(section).borrow_mut();
@@ -69,12 +66,7 @@ pub struct Inputs<'a> {
     pipeline: &'a mut Pipeline,
 }
 
-impl<'a> Inputs<'a> {
-    /// Inputs from the start; bench and pipeline make the records.
-    pub fn new(bench: &'a mut Bench, pipeline: &'a mut Pipeline) -> Self {
-        Self { place: 0, bench, pipeline }
-    }
-
+impl Inputs<'_> {
     pub fn read(&mut self, bytes: &mut [u8]) {
         if let Some(kept) = BYTES.get(self.place..self.place + bytes.len()) {
             bytes.copy_from_slice(kept);
@@ -96,7 +88,6 @@ impl<'a> Inputs<'a> {
         })
     }
 
-    /// Position of the next byte.
     pub fn place(&self) -> usize {
         self.place
     }
@@ -138,7 +129,6 @@ mod call {
     use core::arch::asm;
     use core::hint::black_box;
 
-    /// The core's cycle counter.
     const CYCCNT: u32 = 0xE000_1004;
 
     /// Arguments of a call by the hard-float calling convention; after the call its results.

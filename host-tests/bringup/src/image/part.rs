@@ -25,7 +25,6 @@ const LOW_SPEED: u32 = 0b01 << 6;
 /// Periods between two captures.
 const EACH: f32 = 8.0;
 const BY_EIGHT: u8 = 0b11;
-/// Captures between the first and the last.
 const CAPTURES: u32 = 400;
 const SLOW_CAPTURES: u32 = 64;
 /// Looks for a capture: some ms each.
@@ -95,7 +94,6 @@ pub fn core_per_stopwatch() -> f32 {
 const FLASH_WORDS: usize = 64;
 const ERASED: u8 = 0xff;
 
-/// Programs some words and erases the sector.
 pub fn flash_times(flash: Peri<'static, FLASH>) {
     let mut chip = Chip::new(flash);
     let blank = |chip: &Chip, sector| chip.bytes(sector).iter().all(|byte| *byte == ERASED);

@@ -1,5 +1,4 @@
-//! Lines on the virtual COM port, USART2 at 115,200 baud: any terminal shows them without a set-up or a probe's
-//! program.
+//! Lines on the virtual COM port, USART2 at 115,200 baud, which any terminal shows.
 
 use core::fmt::{Arguments, Display, Write};
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -17,7 +16,6 @@ const APB1_HZ: u32 = 42_000_000;
 
 static CHECK: AtomicU32 = AtomicU32::new(bringup::CHECK);
 
-/// Takes the port.
 pub fn start(port: Peri<'static, USART2>, tx: Peri<'static, PA2>, rx: Peri<'static, PA3>) {
     let mut config = usart::Config::default();
     config.baudrate = BAUD;
@@ -96,7 +94,6 @@ pub fn wait_for_go() -> u32 {
     }
 }
 
-/// The next byte, if there is one.
 pub fn received() -> Option<u8> {
     let status = pac::USART2.sr().read();
     // Reading the data clears the errors, too.
@@ -111,7 +108,6 @@ pub fn send(byte: u8) {
     pac::USART2.dr().write(|w| w.set_dr(byte.into()));
 }
 
-/// Waits until all is sent.
 pub fn flush() {
     while !pac::USART2.sr().read().tc() {}
 }

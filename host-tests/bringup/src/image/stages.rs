@@ -12,7 +12,6 @@ use crate::{CYCLES_PER_US, passed, report};
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
-    /// Waits for the host.
     Waits,
     /// Reset by the window watchdog.
     Window,
@@ -20,7 +19,6 @@ pub enum Stage {
     Independent,
     /// Fault by a store below the stack.
     Foot,
-    /// All other checks.
     Rest,
 }
 
@@ -30,7 +28,6 @@ const STAGES: [Stage; 5] = [Stage::Waits, Stage::Window, Stage::Independent, Sta
 const BITES_BY: u32 = 50_000 * CYCLES_PER_US;
 /// Time after which the independent watchdog has accepted its new period: 1 ms.
 const TAKES_BY: u32 = 1_000 * CYCLES_PER_US;
-/// The word below RAM.
 const BELOW_RAM: *mut u32 = 0x1FFF_FFFC as *mut u32;
 
 #[derive(Clone, Copy)]

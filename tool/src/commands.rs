@@ -24,6 +24,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+/// End of a command.
+type Done = Result<(), Error>;
 /// True once output was lost against the user's will.
 static LOST: AtomicBool = AtomicBool::new(false);
 
@@ -78,12 +80,7 @@ fn say_json(value: &Value) {
 
 /// Runs a command for each ID of `--id`, also after an error of one. Before that, all of them get the values `first`, in one
 /// packet each, which no absent ID delays. Several answers in JSON are one array.
-pub fn each(
-    reach: &Reach,
-    titled: bool,
-    first: &[(u16, i64)],
-    command: impl Fn(&mut Client) -> Result<(), Error>,
-) -> Result<(), Error> {
+pub fn each(reach: &Reach, titled: bool, first: &[(u16, i64)], command: impl Fn(&mut Client) -> Done) -> Done {
     let mut client = Client::open(reach)?;
     let mut ids = reach.ids.clone();
     if ids.contains(&BROADCAST) {

@@ -1,19 +1,15 @@
-//! Numbers on the command line: a value that is no valid time or rate is refused, so no command waits for ever or
-//! panics.
+//! Numbers on the command line. Invalid times and rates are refused: no command waits for ever or panics.
 
 use std::ops::RangeInclusive;
 
-/// Range of times, s: up to more than thirty years.
-const SECONDS: RangeInclusive<f64> = 0.0..=1e9;
-/// Range of rates, Hz: from one in a quarter of an hour to more than there are frames.
-const RATES_HZ: RangeInclusive<f64> = 0.001..=1e6;
-
+/// A time, s: up to more than thirty years.
 pub fn seconds(text: &str) -> Result<f64, String> {
-    within(text, &SECONDS)
+    within(text, &(0.0..=1e9))
 }
 
+/// A rate: from one in a quarter of an hour to more than there are frames.
 pub fn rate_hz(text: &str) -> Result<f64, String> {
-    within(text, &RATES_HZ)
+    within(text, &(0.001..=1e6))
 }
 
 /// A rate in Hz, or 0 for as fast as it goes.
@@ -33,6 +29,11 @@ pub fn goal_mn(text: &str) -> Result<i64, String> {
 /// Force that a scale shows, N, to a mN.
 pub fn shown_n(text: &str) -> Result<f64, String> {
     within(text, &(0.0..=150.0)).map(|newtons| (newtons * 1e3).round() * 1e-3)
+}
+
+/// Resistance of a winding and what drives it.
+pub fn ohm(text: &str) -> Result<f64, String> {
+    within(text, &(0.05..=200.0))
 }
 
 fn within(text: &str, range: &RangeInclusive<f64>) -> Result<f64, String> {

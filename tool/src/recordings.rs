@@ -32,14 +32,14 @@ const ABOUT: &str = "fingertip.capture";
 /// Entry of the metadata: host's time of the last frame, ns since 1970.
 pub const ENDED: &str = "ended_unix_ns";
 
-/// Metadata of a capture, by name.
-pub type About = std::collections::BTreeMap<String, String>;
+/// Metadata of a capture or of a controller, by name.
+pub type About = BTreeMap<String, String>;
+
+type Frame = CapturedFrame<ROWS, COLUMNS>;
+type Fed = Result<Replayed<ROWS, COLUMNS>, ReplayError>;
 
 /// Feeds a capture through the core on this machine.
-pub fn through_the_core(
-    bytes: &[u8],
-    each: impl FnMut(&CapturedFrame<ROWS, COLUMNS>, &Status),
-) -> Result<Replayed<ROWS, COLUMNS>, ReplayError> {
+pub fn through_the_core(bytes: &[u8], each: impl FnMut(&Frame, &Status)) -> Fed {
     replay(bytes, &CLOCKS, each)
 }
 
@@ -102,10 +102,7 @@ pub fn of_bytes(mut rest: &[u8]) -> Result<Kept, String> {
         _ => return Err(damaged(&"it has no end of its messages, or no footer")),
     }
     let (Some(bytes), Some(about)) = (bytes, about) else {
-        return Err(
-            "the file holds no capture: it is a recording of another kind (a scene's is replayed by its own tests)"
-                .into(),
-        );
+        return Err("the file holds no capture: a scene's recording is replayed by the scene's own tests".into());
     };
     Ok(Kept { bytes, about })
 }
@@ -143,7 +140,7 @@ fn put(
     bytes: &[u8],
     about: &About,
     head: &Head<ROWS, COLUMNS>,
-    shown: &[(CapturedFrame<ROWS, COLUMNS>, Status)],
+    shown: &[(Frame, Status)],
 ) -> mcap::McapResult<()> {
     let ended_ns = about.get(ENDED).and_then(|ended| ended.parse().ok()).unwrap_or(0_u64);
     let attached = Attachment {
@@ -171,9 +168,7 @@ fn put(
     let codes = out.add_schema(FRAME_SCHEMA[0], "jsonschema", FRAME_SCHEMA[1].as_bytes())?;
     let codes = out.add_channel(codes, &topic(id, "frame"), "json", about)?;
     let first = shown.first().map_or(0, |(taken, _)| taken.frame.sequence);
-    let since_ns = |taken: &CapturedFrame<ROWS, COLUMNS>| {
-        u64::from(taken.frame.sequence.wrapping_sub(first)) * u64::from(head.frame_ns)
-    };
+    let since_ns = |taken: &Frame| u64::from(taken.frame.sequence.wrapping_sub(first)) * u64::from(head.frame_ns);
     let begun_ns = ended_ns.saturating_sub(shown.last().map_or(0, |(taken, _)| since_ns(taken)));
     for (frame, (taken, status)) in (0..).zip(shown) {
         let since_ns = since_ns(taken);
@@ -197,7 +192,7 @@ fn put(
     out.finish().map(drop)
 }
 
-fn state(taken: &CapturedFrame<ROWS, COLUMNS>, status: &Status, frame_ns: u32) -> State {
+fn state(taken: &Frame, status: &Status, frame_ns: u32) -> State {
     let thousandths = |value: f64| (value * 1e3).round() as i64;
     let contact = &status.contact;
     State {
@@ -232,18 +227,11 @@ pub enum Topic {
 
 impl Topic {
     pub fn name(self, id: u8) -> String {
-        let kind = match self {
-            Self::Scalars => "scalars",
-            Self::Image => "image",
-        };
-        topic(id, kind)
+        topic(id, if self == Self::Scalars { "scalars" } else { "image" })
     }
 
     pub fn schema_name(self) -> &'static str {
-        match self {
-            Self::Scalars => "fingertip.Scalars",
-            Self::Image => "foxglove.RawImage",
-        }
+        if self == Self::Scalars { "fingertip.Scalars" } else { "foxglove.RawImage" }
     }
 
     pub fn schema(self) -> Vec<u8> {
@@ -259,18 +247,11 @@ impl Topic {
         }
     }
 
-    /// Adds the topic of a controller to a file.
-    pub fn add_to<W: Write + Seek>(
-        self,
-        out: &mut mcap::Writer<W>,
-        id: u8,
-        device: &BTreeMap<String, String>,
-    ) -> mcap::McapResult<u16> {
+    pub fn add_to(self, out: &mut Writer<impl Write + Seek>, id: u8, device: &About) -> mcap::McapResult<u16> {
         let schema = out.add_schema(self.schema_name(), "jsonschema", &self.schema())?;
         out.add_channel(schema, &self.name(id), "json", device)
     }
 
-    /// A state's message, in JSON.
     pub fn message(self, stamp: &Stamp, state: &State) -> Vec<u8> {
         let message = match self {
             Self::Scalars => {
@@ -289,7 +270,7 @@ pub fn topic(id: u8, kind: &str) -> String {
 }
 
 /// Identity of a controller, for the metadata of a recording and of its channels.
-pub fn device(client: &mut Client) -> Result<BTreeMap<String, String>, Error> {
+pub fn device(client: &mut Client) -> Result<About, Error> {
     let (pong, information) = (client.ping()?, client.number(address::MODEL_INFORMATION)?);
     let entries = [
         ("model_number", pong.model.to_string()),
@@ -304,6 +285,7 @@ pub fn device(client: &mut Client) -> Result<BTreeMap<String, String>, Error> {
 /// The scene's scalars that a controller knows: name, description and value.
 fn scalars(time_s: f64, state: &State) -> [(&'static str, &'static str, Value); 13] {
     let thousandth = |value: i64| json!(value as f64 * 1e-3);
+    let confidence_percent = json!(state.confidence as f64 / 2.55);
     [
         ("time_s", "The controller's time from the first state", json!(time_s)),
         ("goal_n", "The force asked for", thousandth(state.goal_mn)),
@@ -314,11 +296,7 @@ fn scalars(time_s: f64, state: &State) -> [(&'static str, &'static str, Value); 
         ("duty_percent", "Share of the supply at the motor; positive presses", json!(state.duty_permille as f64 * 0.1)),
         ("centre_x_mm", "Sensed centre of the contact along the columns", thousandth(state.centre_x_um)),
         ("centre_y_mm", "Sensed centre of the contact along the rows", thousandth(state.centre_y_um)),
-        (
-            "confidence_percent",
-            "Confidence that the contact is a tip on a plane",
-            json!(state.confidence as f64 / 2.55),
-        ),
+        ("confidence_percent", "Confidence that the contact is a tip on a plane", confidence_percent),
         ("mode", "Mode, by its number on the bus", json!(state.mode)),
         ("fault", "Fault, by its number on the bus; 0 is none", json!(state.fault)),
         ("limits", "Limits, a bit each as on the bus", json!(state.limits)),

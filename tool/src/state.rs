@@ -186,7 +186,6 @@ impl Stamps {
     }
 }
 
-/// Host's time, ns since 1970.
 pub fn unix_ns() -> u64 {
     SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos() as u64
 }
@@ -196,15 +195,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_clock_goes_on_beyond_its_wrap() {
+    fn the_clock_goes_on_beyond_its_wrap_and_begins_again_after_a_restart() {
         let mut clock = Clock::default();
         let times = [u32::MAX - 999, u32::MAX, 999_000];
         let times = times.map(|time_us| clock.time_s(&State { time_us, ..State::default() }));
         assert_eq!(times, [Some(0.0), Some(0.000_999), Some(1.0)]);
-    }
-
-    #[test]
-    fn a_clock_that_began_again_tells_no_time() {
+        // One that began again tells no time.
         let mut clock = Clock::default();
         let mut at = |time_us, frame| clock.time_s(&State { time_us, frame, ..State::default() });
         // Frames wrap too, though after days.

@@ -54,7 +54,8 @@ pub fn find(wanted: &str) -> Result<&'static Register, String> {
     found.ok_or_else(|| {
         let wanted = wanted.to_lowercase();
         let mut near: Vec<String> = REGISTERS.iter().filter(|r| is_stored(r)).map(name).collect();
-        near.retain(|known| known.contains(&wanted) || wanted.contains(known.as_str()) || begins_alike(known, &wanted));
+        let alike = |known: &str| known.get(..4).is_some_and(|begin| wanted.starts_with(begin));
+        near.retain(|known| known.contains(&wanted) || wanted.contains(known.as_str()) || alike(known));
         let near = if near.is_empty() { String::new() } else { format!("; did you mean {}?", near.join(" or ")) };
         format!("no register `{wanted}`{near} (`fingertip params get` lists those that are stored)")
     })
@@ -68,11 +69,6 @@ pub fn find_number(wanted: &str) -> Result<&'static Register, String> {
     }
     let (name, count) = (name(register), register.count);
     Err(format!("{name} has {count} numbers (`fingertip record --pressures` and `params backup` write maps to a file)"))
-}
-
-fn begins_alike(a: &str, b: &str) -> bool {
-    let same = a.bytes().zip(b.bytes()).take_while(|(a, b)| a == b).count();
-    same >= 4
 }
 
 /// True if it outlives a reset once it is saved.

@@ -12,8 +12,6 @@ fn is_same(there: &Metadata, file: &File) -> bool {
     file.metadata().is_ok_and(|own| (own.dev(), own.ino()) == (there.dev(), there.ino()))
 }
 
-/// A file that is being written.
-#[derive(Debug)]
 pub struct Part {
     file: File,
     part: PathBuf,
@@ -83,7 +81,6 @@ pub fn write(place: &Path, force: bool, bytes: &[u8]) -> Result<(), Error> {
     part.place()
 }
 
-/// Fails if a file is there.
 fn free(place: &Path) -> Result<(), Error> {
     if fs::symlink_metadata(place).is_err() {
         return Ok(());

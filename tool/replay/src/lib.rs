@@ -49,12 +49,7 @@ pub enum Field {
 
 impl Field {
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::Duty => "duty",
-            Self::Mode => "mode",
-            Self::Fault => "fault",
-            Self::Digest => "digest",
-        }
+        ["duty", "mode", "fault", "digest"][self as usize]
     }
 }
 
@@ -108,7 +103,6 @@ pub fn replay<const ROWS: usize, const COLUMNS: usize>(
 
 /// Reason why bytes cannot be replayed as a capture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[allow(missing_docs, reason = "their texts say it")]
 pub enum ReplayError {
     #[error("no capture: it does not begin as one")]
     NoCapture,
@@ -116,10 +110,7 @@ pub enum ReplayError {
     Version(u8),
     #[error("a capture of {rows} x {columns} taxels, which this is not built for")]
     Shape { rows: u8, columns: u8 },
-    #[error(
-        "a capture of a firmware with other parameters than these {}: replay it with the version that it names",
-        Params::COUNT
-    )]
+    #[error("a capture of a firmware with other parameters than these {}: replay it with that version", Params::COUNT)]
     Layout,
     #[error("the capture was not ended on the board")]
     Unfinished,
@@ -131,7 +122,6 @@ pub enum ReplayError {
     Damaged,
     #[error("the capture's parameters make no configuration: {0}")]
     Config(ConfigError),
-    /// The board had other clocks.
     #[error("captured with a frame each {captured} ns; by its parameters it is {here} ns here")]
     FrameTime { captured: u32, here: u32 },
     /// Number, from 0, of a frame whose bits are invalid.
@@ -150,7 +140,6 @@ pub struct CapturedFrame<const ROWS: usize, const COLUMNS: usize> {
     pub duty: Duty,
     /// The mode after it, by its number.
     pub mode: u8,
-    /// Number of the fault; 0 without one.
     pub fault: u8,
     /// The upper half of the digest of all that the steps so far reported.
     pub digest: u16,
@@ -199,7 +188,7 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> Frames<'a, ROWS, COLUMNS> {
         for code in frame.codes.rows.as_flattened_mut().iter_mut().chain(&mut frame.codes.undriven) {
             let folded = bits.folded(width, 16)?;
             spread = spread.wrapping_add(folded);
-            *code = unfold(folded, *code);
+            *code = code.wrapping_add(unfold(folded) as u16);
         }
         *last = Last { frame, sense, command, duty, spread, ..*last };
         Some(CapturedFrame { frame, sense, command, duty: Duty(duty), mode: last.mode, fault: last.fault, digest })
@@ -336,24 +325,18 @@ impl Reader<'_> {
 
     /// A difference of 32 bits.
     fn signed(&mut self, width: u32) -> Option<i32> {
-        let folded = self.folded(width, 32)?;
-        Some((folded >> 1).cast_signed() ^ -(folded & 1).cast_signed())
+        self.folded(width, 32).map(unfold)
     }
 }
 
 /// The check sum over all words of the frames' bits, the last one filled up with zeros.
 fn check(bytes: &[u8], bits: u32) -> u32 {
-    let words = (0..=bits / 32).map(|place| {
-        let rest = bytes.get(4 * place as usize..).unwrap_or_default();
-        let mut word = [0; 4];
-        word.iter_mut().zip(rest).for_each(|(to, byte)| *to = *byte);
-        u32::from_le_bytes(word)
-    });
-    digest_words(0, words)
+    let byte = |place: u32| u32::from(bytes.get(place as usize).copied().unwrap_or(0));
+    let word = |place: u32| (0..4).fold(0, |word, part| word | byte(4 * place + part) << (8 * part));
+    digest_words(0, (0..=bits / 32).map(word))
 }
 
-/// Undoes the folding of a difference of 16 bits.
-fn unfold(folded: u32, last: u16) -> u16 {
-    let difference = (folded >> 1) as u16 ^ ((folded & 1) as u16).wrapping_neg();
-    last.wrapping_add(difference)
+/// Undoes the folding of a difference.
+fn unfold(folded: u32) -> i32 {
+    (folded >> 1).cast_signed() ^ -(folded & 1).cast_signed()
 }

@@ -72,10 +72,8 @@ impl Calibrate {
         let fits = shown.is_empty() || shown.len() == goals.len();
         if !stored.is_empty() && (goals != stored || !fits) {
             let [stored, goals] = [n(&stored), n(&goals)];
-            return Err(format!(
-                "the session has holds of {stored:?} N, which --scale-n {goals:?} or --shown-n {shown:?} does not fit"
-            )
-            .into());
+            let differs = format!("--scale-n {goals:?} or --shown-n {shown:?} does not fit");
+            return Err(format!("the session has holds of {stored:?} N, which {differs}").into());
         }
         if !fits {
             let [shown, goals] = [shown.len(), goals.len()];
@@ -104,8 +102,7 @@ pub fn calibrate(args: &Calibrate, client: &mut Client, json: bool) -> Result<()
     procedure.finish()
 }
 
-/// Modulus, and with a scale the array's sensitivity: a press measures the product of modulus and common gain, a scale the
-/// common gain by itself.
+/// Modulus, and with a scale the sensitivity: a press measures modulus times common gain, a scale that gain.
 fn scale(args: &Calibrate, goals_mn: &[i64], modulus: &Modulus, procedure: &mut Procedure<'_>) -> Result<(), Error> {
     let share = modulus.sigma_kpa / modulus.kpa;
     if goals_mn.is_empty() {
@@ -151,11 +148,8 @@ fn scale(args: &Calibrate, goals_mn: &[i64], modulus: &Modulus, procedure: &mut 
     found.row("codes_per_kpa_milli", codes, Some(codes * part));
     found.more.insert("scale".into(), json!({ "factor": factor, "sigma": scale.sigma }));
     found.more.insert("remaining".into(), json!({ "force_percent": 100.0 * part, "worst_hold_percent": 100.0 * left }));
-    found.notes.push(format!(
-        "forces times {}; after that the worst held force differs from the scale by {:.1} %",
-        scale,
-        100.0 * left
-    ));
+    let worst = format!("the worst held force differs from the scale by {:.1} %", 100.0 * left);
+    found.notes.push(format!("forces times {scale}; after that {worst}"));
     Ok(())
 }
 
@@ -163,15 +157,14 @@ fn creep(seconds: f64, args: &Calibrate, procedure: &mut Procedure<'_>) -> Resul
     if !procedure.session.steps.contains_key(WEIGHT) {
         procedure.tare_after(args.how.pause_s)?;
     }
-    match solve::creep(&procedure.weight(seconds)?) {
-        Ok(creep) => {
-            let found = &mut procedure.found;
-            found.row("creep_permille", 1e3 * creep.share.value.max(0.0), Some(1e3 * creep.share.sigma));
-            found.row("creep_time_ms", 1e3 * creep.time_s.value, Some(1e3 * creep.time_s.sigma));
-            found.notes.push(format!("creep leaves {:.2} % of a held reading", 100.0 * creep.left));
-        }
+    let creep = match solve::creep(&procedure.weight(seconds)?) {
+        Ok(creep) => creep,
         Err(why) => return procedure.without(WEIGHT, format!("the creep was not measured: {why}")),
-    }
+    };
+    let found = &mut procedure.found;
+    found.row("creep_permille", 1e3 * creep.share.value.max(0.0), Some(1e3 * creep.share.sigma));
+    found.row("creep_time_ms", 1e3 * creep.time_s.value, Some(1e3 * creep.time_s.sigma));
+    found.notes.push(format!("creep leaves {:.2} % of a held reading", 100.0 * creep.left));
     Ok(())
 }
 
@@ -196,13 +189,12 @@ fn temperature(args: &Calibrate, procedure: &mut Procedure<'_>) -> Result<(), Er
     }
     let question = "the controller is warm: leave finger and plate where they were in the last press";
     procedure.press(&warm, question, &args.how)?;
-    match solve::temperature(&cold, &procedure.pressed(&warm)?) {
-        Ok(found) => {
-            procedure.found.row("array_gain_ppm_per_k", 1e6 * found.per_k.value, Some(1e6 * found.per_k.sigma));
-            procedure.found.row("array_gain_at_c", found.chip_c[0], None);
-        }
+    let solved = match solve::temperature(&cold, &procedure.pressed(&warm)?) {
+        Ok(solved) => solved,
         Err(why) => return procedure.without(&warm, format!("the temperature coefficient was not measured: {why}")),
-    }
+    };
+    procedure.found.row("array_gain_ppm_per_k", 1e6 * solved.per_k.value, Some(1e6 * solved.per_k.sigma));
+    procedure.found.row("array_gain_at_c", solved.chip_c[0], None);
     Ok(())
 }
 
@@ -247,18 +239,13 @@ const STROKES: &str = "strokes.fts";
     fingertip commission --forward yes --apply --json       (no questions, for programs)")]
 pub struct Commission {
     /// Resistance of motor and bridge together, Ohm, by an ohmmeter; resistance_mohm without it
-    #[arg(long, value_name = "OHM", value_parser = ohm)]
+    #[arg(long, value_name = "OHM", value_parser = numbers::ohm)]
     resistance_ohm: Option<f64>,
     /// Answer to whether the jog first moves the tip towards the object: without it the command asks
     #[arg(long, value_name = "yes|no", value_parser = yes_or_no)]
     forward: Option<bool>,
     #[command(flatten)]
     options: Options,
-}
-
-fn ohm(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|number| (0.05..=200.0).contains(number));
-    number.ok_or_else(|| "a number from 0.05 to 200 is expected".into())
 }
 
 /// Proves the motor's direction, then measures the drive by strokes in the air.

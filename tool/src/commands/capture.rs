@@ -21,7 +21,6 @@ const LOOK: Duration = Duration::from_millis(5);
 const ARMED: i64 = CaptureState::Armed as i64;
 const RECORDING: i64 = CaptureState::Recording as i64;
 const DONE: i64 = CaptureState::Done as i64;
-/// Licence of contributed captures.
 const LICENCE: &str = "Apache-2.0 OR MIT, as the project: contributed by who captured it";
 
 #[derive(Debug, clap::Args)]
@@ -60,7 +59,6 @@ pub struct Args {
 }
 
 impl Args {
-    /// Judges the file's name.
     pub fn check(&self) -> Result<(), Error> {
         if self.out.extension().is_some_and(|ending| ending == "mcap") {
             return Ok(());
@@ -119,8 +117,8 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
         None if args.press.is_some() => interrupt.check(),
         None => Ok(()),
         Some(at) => {
-            Err(format!("the core of this version does not answer as the board did: it {at}. Are both of one version?")
-                .into())
+            let why = format!("the core of this version does not answer as the board did: it {at}");
+            Err(format!("{why}. Are both of one version?").into())
         }
     }
 }

@@ -4,9 +4,10 @@ use super::{Interrupt, aside, say, say_json};
 use crate::client::{BAUD_MIN, Pong, Reach};
 use crate::state::{SHAPE, State};
 use crate::{Client, Error, client, numbers, table};
+use fingertip::link::table::Register;
 use fingertip::shipped::address;
 use fingertip::store::BAUD_RATES;
-use serde_json::{Map, json};
+use serde_json::json;
 use std::time::{Duration, Instant};
 
 #[derive(Debug, clap::Args)]
@@ -69,6 +70,21 @@ pub fn scan(args: &Scan, reach: &Reach, json: bool) -> Result<(), Error> {
     Ok(())
 }
 
+/// Registers that `info` shows beside identity and state.
+const SHOWN: &str = "chip_id return_delay_time torque_enable bus_watchdog hardware_error_status supply_mv \
+                     loop_time_max_us missed_frames bad_taxels tare_state saved_state fit_level fit_level_in_use reset_cause \
+                     crash_cause crash_count good_packets result_errors instruction_errors crc_errors range_errors \
+                     length_errors limit_errors access_errors framing_errors";
+
+/// Name of a register whose number has the register's scale in it.
+fn scaled_name(register: &Register) -> String {
+    match register.address {
+        address::RETURN_DELAY_TIME => "return_delay_us".into(),
+        address::BUS_WATCHDOG => "bus_watchdog_ms".into(),
+        _ => table::name(register),
+    }
+}
+
 /// Shows identity and status of the controller.
 pub fn info(client: &mut Client, json: bool) -> Result<(), Error> {
     let pong = client.ping()?;
@@ -76,44 +92,12 @@ pub fn info(client: &mut Client, json: bool) -> Result<(), Error> {
     let information = client.number(address::MODEL_INFORMATION)?;
     let shape = [information & 0xFF, information >> 8 & 0xFF];
     let version = information >> 16;
-    let mut numbers = Map::new();
-    let wanted = [
-        address::CHIP_ID,
-        address::RETURN_DELAY_TIME,
-        address::TORQUE_ENABLE,
-        address::BUS_WATCHDOG,
-        address::HARDWARE_ERROR_STATUS,
-        address::SUPPLY_MV,
-        address::LOOP_TIME_MAX_US,
-        address::MISSED_FRAMES,
-        address::BAD_TAXELS,
-        address::TARE_STATE,
-        address::SAVED_STATE,
-        address::FIT_LEVEL,
-        address::FIT_LEVEL_IN_USE,
-        address::RESET_CAUSE,
-        address::CRASH_CAUSE,
-        address::CRASH_COUNT,
-        address::GOOD_PACKETS,
-        address::RESULT_ERRORS,
-        address::INSTRUCTION_ERRORS,
-        address::CRC_ERRORS,
-        address::RANGE_ERRORS,
-        address::LENGTH_ERRORS,
-        address::LIMIT_ERRORS,
-        address::ACCESS_ERRORS,
-        address::FRAMING_ERRORS,
-    ];
-    for place in wanted {
-        let scale = table::register_at(place).map_or(1, |register| register.scale);
-        let name = match place {
-            address::RETURN_DELAY_TIME => "return_delay_us".to_owned(),
-            address::BUS_WATCHDOG => "bus_watchdog_ms".to_owned(),
-            _ => table::place(place),
-        };
-        let number = client.number(place)?;
-        let number = if number < 0 { number } else { number * i64::from(scale) };
-        numbers.insert(name, json!(number));
+    let mut numbers = Vec::new();
+    for name in SHOWN.split_whitespace() {
+        let register = table::find(name)?;
+        let number = client.number(register.address)?;
+        let scale = if number < 0 { 1 } else { i64::from(register.scale) };
+        numbers.push((register, number * scale));
     }
     let known = shape == SHAPE.map(|side| side as i64);
     if json {
@@ -123,7 +107,7 @@ pub fn info(client: &mut Client, json: bool) -> Result<(), Error> {
         });
         let mut all = identity.as_object().cloned().unwrap_or_default();
         all.extend(state.json());
-        all.extend(numbers);
+        all.extend(numbers.into_iter().map(|(register, number)| (scaled_name(register), json!(number))));
         say_json(&json!(all));
         return Ok(());
     }
@@ -140,15 +124,14 @@ pub fn info(client: &mut Client, json: bool) -> Result<(), Error> {
     say(format_args!("force     {} mN, goal {} mN", state.force_mn, state.goal_mn));
     let hz = if state.period_ns > 0 { 1e9 / state.period_ns as f64 } else { 0.0 };
     say(format_args!("frames    {hz:.0} a second, frame {}", state.frame));
-    for (name, number) in numbers {
-        let place = table::find(&name).map_or(0, |register| register.address);
-        let words = match place {
+    for (register, number) in numbers {
+        let words = match register.address {
             address::TARE_STATE | address::SAVED_STATE | address::RESET_CAUSE | address::CRASH_CAUSE => {
-                format!(" ({})", table::meaning(place, number.as_i64().unwrap_or(0)))
+                format!(" ({})", table::meaning(register.address, number))
             }
             _ => String::new(),
         };
-        say(format_args!("{name:22} {number}{words}"));
+        say(format_args!("{:22} {number}{words}", scaled_name(register)));
     }
     Ok(())
 }

@@ -16,7 +16,6 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
-/// Options of every guided procedure.
 #[derive(Debug, clap::Args)]
 pub struct Options {
     /// Folder that keeps each record and step; the same folder resumes the procedure
@@ -33,7 +32,6 @@ pub struct Options {
     within_s: f64,
 }
 
-/// Options of the presses.
 #[derive(Debug, clap::Args)]
 pub struct Presses {
     /// Pause in the air before each tare: creep of the press before would shift the zeros
@@ -65,14 +63,9 @@ pub(super) struct Procedure<'a> {
 
 impl<'a> Procedure<'a> {
     /// Catches signals from here on, and begins or resumes the session.
-    pub(super) fn begin(
-        command: &'static str,
-        options: &'a Options,
-        json: bool,
-        client: &'a mut Client,
-    ) -> Result<Self, Error> {
+    pub fn begin(name: &'static str, options: &'a Options, json: bool, client: &'a mut Client) -> Result<Self, Error> {
         let run = Run { options, interrupt: Interrupt::catch()?, json };
-        let session = Session::open(options.session.as_deref(), command, client)?;
+        let session = Session::open(options.session.as_deref(), name, client)?;
         let mut procedure = Self { run, client, session, found: Found::default() };
         procedure.settings()?;
         Ok(procedure)
@@ -218,8 +211,6 @@ impl Settings {
     }
 }
 
-/// What is kept of a procedure.
-#[derive(Debug)]
 pub(super) struct Session {
     folder: Option<PathBuf>,
     command: &'static str,
@@ -313,7 +304,6 @@ impl Session {
     }
 }
 
-/// A parameter that was measured.
 pub struct Row {
     /// Name of the parameter, which ends with its unit.
     name: &'static str,
@@ -364,8 +354,7 @@ pub(super) const DIRECTION: &str = "direction_confirmed";
 const WRITTEN: &str = "written";
 
 impl Session {
-    /// Names of parameters, and `gains`, whose values are neither those before the session nor, with `written`, those that
-    /// it began to write.
+    /// Names of what has neither its value before the session nor, with `written`, one that it began to write.
     fn changed(&self, now: &Settings, written: bool) -> Vec<&'static str> {
         let written = if written { self.numbers(WRITTEN) } else { &[] };
         let sent: Vec<Settings> = written.iter().filter_map(Settings::of).chain([self.before.clone()]).collect();
@@ -377,16 +366,15 @@ impl Session {
 }
 
 impl Procedure<'_> {
-    /// Reads the controller's parameters and gains. Fails if one has neither its value from before the session nor one that
-    /// the session sent.
+    /// Reads parameters and gains. Fails if one is neither as before the session nor as the session sent it.
     fn settings(&mut self) -> Result<Settings, Error> {
         let now = Settings::read(self.client)?;
         let names = self.session.changed(&now, true).join(", ");
         if names.is_empty() {
             return Ok(now);
         }
-        Err(format!("the controller's {names} changed since this session began (did it restart?): begin another one")
-            .into())
+        let why = format!("the controller's {names} changed since this session began (did it restart?)");
+        Err(format!("{why}: begin another one").into())
     }
 
     /// Fails unless the settings are those before the session: all motions of a session are made and solved with them.

@@ -18,8 +18,7 @@ const REWRITE: Duration = Duration::from_millis(100);
 const CLEAR: &str = "\r\x1b[K";
 /// Least tolerance of a held force, for small goals: the resolution of a usual array, mN.
 const TOLERANCE_MN: f64 = 20.0;
-/// Time within the tolerance after which a force counts as reached, s of the controller's clock: an overshoot passes
-/// through faster.
+/// Time within the tolerance after which a force counts as reached, s: an overshoot passes through faster.
 const SETTLED_S: f64 = 0.1;
 /// A status packet's error for a value beyond what other registers allow.
 const BEYOND: u8 = 6;
@@ -93,21 +92,16 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     }
     interrupt.check()?;
     if !reached {
-        let (mode, force_mn, travel_mm) =
-            (held.last.mode_name(), held.last.force_mn, held.last.travel_um as f64 * 1e-3);
-        let limits = held.last.limits_text();
-        return Err(format!(
-            "{goal_mn} mN are not reached within {} s: mode {mode}, {force_mn} mN, travel {travel_mm:.2} mm, \
-             limits: {limits}. Is there something to press on?",
-            args.within_s
-        )
-        .into());
+        let (mode, limits, force_mn) = (held.last.mode_name(), held.last.limits_text(), held.last.force_mn);
+        let (within_s, travel_mm) = (args.within_s, held.last.travel_um as f64 * 1e-3);
+        let state = format!("mode {mode}, {force_mn} mN, travel {travel_mm:.2} mm, limits: {limits}");
+        let why = format!("{goal_mn} mN are not reached within {within_s} s: {state}");
+        return Err(format!("{why}. Is there something to press on?").into());
     }
     if outside > 0 {
-        return Err(Error::NotHeld(format!(
-            "{goal_mn} mN were reached, but not held: {outside} of {count} states are outside {goal_mn} +- \
-             {tolerance_mn:.0} mN (--tolerance-percent)"
-        )));
+        let band = format!("{goal_mn} +- {tolerance_mn:.0} mN (--tolerance-percent)");
+        let why = format!("{goal_mn} mN were reached, but not held: {outside} of {count} states are outside {band}");
+        return Err(Error::NotHeld(why));
     }
     Ok(())
 }

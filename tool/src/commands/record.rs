@@ -1,7 +1,7 @@
 //! `fingertip record`.
 
 use super::{Interrupt, aside, say_json};
-use crate::recordings::{Topic, device, in_words, write_options};
+use crate::recordings::{About, Topic, device, in_words, write_options};
 use crate::state::{RESTARTED, SHAPE, Stamp, Stamps, State};
 use crate::whole::Part;
 use crate::{Client, Error, numbers};
@@ -10,7 +10,6 @@ use mcap::Writer;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use serde_json::json;
-use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufWriter, Seek as _, Write};
 use std::path::PathBuf;
@@ -50,7 +49,6 @@ pub struct Args {
     format: Option<Format>,
 }
 
-/// Output of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Format {
     /// A row for each state.
@@ -117,13 +115,11 @@ struct Counts {
     last_s: f64,
 }
 
-/// Records states until an end; returns the counts, and the reason of a loss.
-fn take(
-    args: &Args,
-    client: &mut Client,
-    interrupt: &Interrupt,
-    sink: &mut dyn Sink,
-) -> Result<(Counts, Option<Error>), Error> {
+/// Counts of a recording, and the reason of a loss.
+type Taken = (Counts, Option<Error>);
+
+/// Records states until an end.
+fn take(args: &Args, client: &mut Client, interrupt: &Interrupt, sink: &mut dyn Sink) -> Result<Taken, Error> {
     let period = if args.rate_hz > 0.0 { Duration::from_secs_f64(1.0 / args.rate_hz) } else { Duration::ZERO };
     let (mut counts, mut stamps, mut frame, mut row) = (Counts::default(), Stamps::default(), None, 0);
     let (mut due, mut flushed) = (Instant::now(), Instant::now());
@@ -177,10 +173,10 @@ pub fn format(args: &Args) -> Result<Format, Error> {
         (None, Some("csv")) => Ok(Format::Csv),
         _ if file.as_os_str() == "-" => Ok(Format::Csv),
         (None, Some("mcap")) => Ok(Format::Mcap),
-        _ => Err(Error::NotUnderstood(format!(
-            "{}: a name that ends with .csv or .mcap is asked for, or --format",
-            file.display()
-        ))),
+        _ => {
+            let why = "a name that ends with .csv or .mcap is asked for, or --format";
+            Err(Error::NotUnderstood(format!("{}: {why}", file.display())))
+        }
     }
 }
 
@@ -193,9 +189,8 @@ impl Csv {
         let names = State::default().numbers().map(|(name, _)| name.to_owned());
         let [rows, columns] = if pressures { SHAPE } else { [0, 0] };
         let taxels = (0..rows).flat_map(|row| (0..columns).map(move |column| format!("pressure_{row}_{column}_pa")));
-        let head: Vec<String> =
-            ["time_s", "unix_time_s"].map(String::from).into_iter().chain(names).chain(taxels).collect();
-        writeln!(out, "{}", head.join(","))?;
+        let names: Vec<String> = names.into_iter().chain(taxels).collect();
+        writeln!(out, "time_s,unix_time_s,{}", names.join(","))?;
         Ok(Self(out))
     }
 }
@@ -265,7 +260,7 @@ impl Write for Chunks {
 
 impl Mcap {
     /// Into a file, or to standard output.
-    fn new(file: Option<File>, id: u8, device: BTreeMap<String, String>, pressures: bool) -> mcap::McapResult<Self> {
+    fn new(file: Option<File>, id: u8, device: About, pressures: bool) -> mcap::McapResult<Self> {
         let to = NoSeek::new(Chunks { file, buffer: Vec::new() });
         let mut out = write_options().disable_seeking(true).create(to)?;
         let metadata = Metadata { name: "fingertip.device".into(), metadata: device };
@@ -310,7 +305,7 @@ mod tests {
     fn a_file_is_whole_after_every_flush() {
         let path = std::env::temp_dir().join(format!("fingertip-flushed-{}.mcap", std::process::id()));
         let file = File::create(&path).expect("a file");
-        let mut sink = Box::new(Mcap::new(Some(file), 1, BTreeMap::new(), true).expect("it can be written"));
+        let mut sink = Box::new(Mcap::new(Some(file), 1, About::new(), true).expect("it can be written"));
         let read = || {
             let bytes = std::fs::read(&path).expect("it is there");
             let messages = MessageStream::new(&bytes).expect("MCAP").map(|message| message.expect("whole").sequence);
@@ -323,9 +318,8 @@ mod tests {
         }
         sink.finish().expect("it can be written");
         assert_eq!(read(), ((0..20).flat_map(|n| [n, n]).collect(), true));
-        assert!(
-            std::fs::read(&path).is_ok_and(|bytes| bytes.windows(8).filter(|eight| *eight == mcap::MAGIC).count() == 2)
-        );
+        let bytes = std::fs::read(&path).expect("it is there");
+        assert_eq!(bytes.windows(8).filter(|eight| *eight == mcap::MAGIC).count(), 2);
         std::fs::remove_file(&path).expect("it is there");
     }
 }

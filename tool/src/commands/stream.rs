@@ -1,7 +1,5 @@
 //! `fingertip stream`.
 
-#[cfg(feature = "foxglove")]
-use super::{Interrupt, aside};
 use crate::numbers;
 #[cfg(feature = "foxglove")]
 pub use server::run;
@@ -29,7 +27,8 @@ pub fn run(_: &Args, _: &mut crate::Client) -> Result<(), crate::Error> {
 /// The WebSocket that Foxglove opens, by its own SDK.
 #[cfg(feature = "foxglove")]
 mod server {
-    use super::{Args, Interrupt, aside};
+    use super::Args;
+    use crate::commands::{Interrupt, aside};
     use crate::recordings::{Topic, device};
     use crate::state::{Stamps, State};
     use crate::{Client, Error};

@@ -3,8 +3,10 @@
 use crate::state::{Clock, SHAPE, State};
 use crate::{Client, Error, numbers};
 use crossterm::event::{self, Event, KeyCode, KeyModifiers};
+use ratatui::DefaultTerminal;
 use ratatui::buffer::Buffer;
-use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::layout::Constraint::{Length, Min};
+use ratatui::layout::{Layout, Rect};
 use ratatui::style::{Color, Style, Stylize as _};
 use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
@@ -13,7 +15,6 @@ use std::collections::VecDeque;
 use std::io::{self, IsTerminal as _};
 use std::time::{Duration, Instant};
 
-/// Time span that is shown.
 const PAST_S: f64 = 10.0;
 
 #[derive(Debug, clap::Args)]
@@ -39,7 +40,6 @@ pub struct Seen {
     pub rate_hz: f64,
     /// Why there is nothing new.
     pub lost: Option<String>,
-    /// The controller's time.
     pub clock: Clock,
 }
 
@@ -70,22 +70,16 @@ pub fn run(args: &Args, client: &mut Client) -> Result<(), Error> {
     if !io::stdout().is_terminal() {
         return Err("the output is no terminal: `fingertip record` writes states to a file or a pipe".into());
     }
-    let period = Duration::from_secs_f64(1.0 / args.rate_hz.clamp(0.1, 1e3));
     let mut seen = Seen { name: format!("ID {} on {}", client.id, client.port), ..Seen::default() };
     let failed = |why: io::Error| Error::Other(format!("the terminal: {why}"));
     let mut terminal = ratatui::try_init().map_err(failed)?;
-    let watched = watch(args, period, client, &mut seen, &mut terminal).map_err(failed);
+    let watched = watch(args, client, &mut seen, &mut terminal).map_err(failed);
     ratatui::try_restore().map_err(failed)?;
     watched
 }
 
-fn watch(
-    args: &Args,
-    period: Duration,
-    client: &mut Client,
-    seen: &mut Seen,
-    terminal: &mut ratatui::DefaultTerminal,
-) -> io::Result<()> {
+fn watch(args: &Args, client: &mut Client, seen: &mut Seen, terminal: &mut DefaultTerminal) -> io::Result<()> {
+    let period = Duration::from_secs_f64(1.0 / args.rate_hz.clamp(0.1, 1e3));
     let begun = Instant::now();
     let (mut due, mut counted, mut updates) = (begun, begun, 0);
     loop {
@@ -127,14 +121,8 @@ const HOTTEST_PA: i64 = 20_000;
 
 pub fn draw(seen: &Seen, area: Rect, buffer: &mut Buffer) {
     let [rows, columns] = SHAPE.map(|side| side as u16);
-    let [head, middle, past, foot] = Layout::vertical([
-        Constraint::Length(1),
-        Constraint::Length(rows + 1),
-        Constraint::Min(5),
-        Constraint::Length(1),
-    ])
-    .areas(area);
-    let [map, words] = Layout::horizontal([Constraint::Length(TAXEL * columns + 1), Constraint::Min(20)]).areas(middle);
+    let [head, middle, past, foot] = Layout::vertical([Length(1), Length(rows + 1), Min(5), Length(1)]).areas(area);
+    let [map, words] = Layout::horizontal([Length(TAXEL * columns + 1), Min(20)]).areas(middle);
     let rate = format!("{:.0} updates a second", seen.rate_hz);
     Line::from(vec!["fingertip ".bold(), Span::from(seen.name.as_str()), "  ".into(), rate.dim()]).render(head, buffer);
     match &seen.state {
@@ -174,17 +162,14 @@ fn draw_words(state: &State, area: Rect, buffer: &mut Buffer) {
     // Of a mN and of a um.
     let thousandths = |number: i64| number as f64 * 1e-3;
     let fault = state.fault_name();
-
+    let fault = fault.map_or("  none".into(), |name| format!("  {} {name}", state.fault).red().bold());
     let [x_mm, y_mm, travel_mm, mm_per_s] =
         [state.centre_x_um, state.centre_y_um, state.travel_um, state.speed_um_per_s].map(thousandths);
     let lines = vec![
         Line::from(vec!["force   ".into(), format!("{:8.3} N", thousandths(state.force_mn)).bold()]),
         Line::from(format!("goal    {:8.3} N", thousandths(state.goal_mn))),
         Line::from(vec!["mode    ".into(), Span::from(format!("  {}", state.mode_name())).cyan()]),
-        Line::from(vec![
-            "fault   ".into(),
-            fault.map_or("  none".into(), |name| format!("  {} {name}", state.fault).red().bold()),
-        ]),
+        Line::from(vec!["fault   ".into(), fault]),
         Line::from(format!("centre  {x_mm:8.2} {y_mm:.2} mm")),
         Line::from(format!("depth   {:8.3} mm", thousandths(state.indentation_um))),
         Line::from(format!("travel  {travel_mm:8.2} mm at {mm_per_s:.1} mm/s")),
@@ -194,7 +179,6 @@ fn draw_words(state: &State, area: Rect, buffer: &mut Buffer) {
     Paragraph::new(lines).wrap(ratatui::widgets::Wrap { trim: false }).render(area, buffer);
 }
 
-/// Force and goal over the last seconds.
 fn draw_past(seen: &Seen, area: Rect, buffer: &mut Buffer) {
     let now_s = seen.past.back().map_or(0.0, |(at_s, ..)| *at_s);
     let of = |value: fn(&(f64, i64, i64)) -> i64| -> Vec<(f64, f64)> {
@@ -204,16 +188,11 @@ fn draw_past(seen: &Seen, area: Rect, buffer: &mut Buffer) {
     let most_n = forces.iter().chain(&goals).map(|(_, newtons)| *newtons).fold(0.5, f64::max);
     let top_n = (most_n * 2.0).ceil() / 2.0;
     let line = |points, colour| {
-        Dataset::default()
-            .marker(Marker::Braille)
-            .graph_type(GraphType::Line)
-            .style(Style::new().fg(colour))
-            .data(points)
+        let style = Style::new().fg(colour);
+        Dataset::default().marker(Marker::Braille).graph_type(GraphType::Line).style(style).data(points)
     };
     let x = Axis::default().bounds([-PAST_S, 0.0]).labels([format!("-{PAST_S:.0} s"), "now".into()]);
     let y = Axis::default().bounds([0.0, top_n]).labels(["0".to_owned(), format!("{top_n:.1} N")]);
-    Chart::new(vec![line(&goals, Color::DarkGray), line(&forces, Color::Green)])
-        .x_axis(x)
-        .y_axis(y)
-        .render(area, buffer);
+    let chart = Chart::new(vec![line(&goals, Color::DarkGray), line(&forces, Color::Green)]);
+    chart.x_axis(x).y_axis(y).render(area, buffer);
 }

@@ -32,7 +32,6 @@ fn presses(commander: &mut Client) {
     commander.set(address::GOAL_FORCE_MN, 1_000).expect("it obeys");
 }
 
-/// Ends the broker. Returns its error.
 fn error_at_its_end(mut shared: Shared) -> String {
     Served::interrupt(&shared.broker);
     let mut said = String::new();
@@ -49,10 +48,7 @@ fn a_killed_commander_is_stopped_though_others_read() {
         let mut press = shared.press();
         let signal = [rustix::process::Signal::KILL, rustix::process::Signal::STOP][round];
         Served::signal(&press, signal);
-        let begun = std::time::Instant::now();
-        while reader.number(address::PRESENT_MODE).expect("it answers") != 0 {
-            assert!(begun.elapsed().as_secs() < 60, "{}", shared.finger.command("look"));
-        }
+        shared.soon(|| reader.number(address::PRESENT_MODE).expect("it answers") == 0);
         shared.until_released();
         let _ = press.kill();
         press.wait().expect("it ends");
@@ -108,10 +104,7 @@ fn the_other_fingers_of_a_stopped_commander_are_stopped_once_it_has_left() {
     second.id = 2;
     assert_eq!(second.number(address::TORQUE_ENABLE).expect("it answers"), 1, "{}", shared.finger.command("look"));
     drop(first);
-    let begun = std::time::Instant::now();
-    while second.number(address::TORQUE_ENABLE).expect("it answers") != 0 {
-        assert!(begun.elapsed().as_secs() < 60, "{}", shared.finger.command("look"));
-    }
+    shared.soon(|| second.number(address::TORQUE_ENABLE).expect("it answers") == 0);
 }
 
 /// A script starts one program after the other.

@@ -1,5 +1,4 @@
-//! Every command against a served finger: the native core and link behind a pseudo-terminal. Judged by words, bytes and
-//! counts, never by the clock.
+//! Every command against a served finger behind a pseudo-terminal, judged by words, bytes and counts.
 
 mod failed;
 mod guided;

@@ -1,7 +1,7 @@
 //! Recordings: their times, their owners, and the rest of one whose program was killed. Captures: taken, kept as files,
 //! replayed; and files that are not as they were written. And what the program shows on a screen.
 
-use crate::served::{Served, ended, program};
+use crate::served::{Served, fails, program};
 use fingertip::shipped::address;
 use fingertip_cli::commands::view::{Seen, draw};
 use fingertip_cli::recordings::{Topic, of_bytes, through_the_core};
@@ -86,8 +86,7 @@ fn a_recording_that_is_interrupted_is_whole() {
     let child = finger.start(&["record", &lost]);
     Served::begun(&format!("{lost}.part"));
     finger.end();
-    let (code, said) = ended(&child.wait_with_output().expect("it ends"));
-    assert_eq!(code, Some(1), "{said}");
+    fails(&child.wait_with_output().expect("it ends"), &[]);
 }
 
 #[test]
@@ -216,8 +215,7 @@ fn no_file_is_written_over_without_force() {
     Served::recorded(&part);
     fs::write(&file, "mine").expect("a file");
     Served::interrupt(&child);
-    let (code, said) = ended(&child.wait_with_output().expect("it ends"));
-    assert!(code == Some(1) && said.contains(&part), "{said}");
+    fails(&child.wait_with_output().expect("it ends"), &[&part]);
     assert_eq!(fs::read(&file).expect("it is there"), b"mine");
     assert!(fs::read_to_string(&part).expect("it is there").starts_with("time_s,"));
 }
@@ -227,11 +225,7 @@ fn a_capture_is_taken_and_replays() {
     let finger = Served::begin("wall");
     let file = finger.file("press.mcap");
     let taken = finger.json(&["capture", "--press", "0.5", "--out", &file, "--board", "a served one", "--contribute"]);
-    assert_eq!(
-        (taken["replays"].as_bool(), taken["ended"].as_str()),
-        (Some(true), Some("its memory is full")),
-        "{taken}"
-    );
+    assert_eq!((&taken["replays"], &taken["ended"]), (&true.into(), &"its memory is full".into()), "{taken}");
     let frames = taken["frames"].as_u64().expect("a number");
     assert!(frames > 600 && taken["bytes"].as_u64() <= Some(44 << 10), "{taken}");
     let kept = recordings::open(file.as_ref()).expect("a capture");

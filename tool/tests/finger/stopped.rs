@@ -109,7 +109,11 @@ fn end_at_any_instant(ends: &[End]) {
         let arguments: Vec<&str> = short.collect();
         let packets = packets_of(&arguments);
         for end in ends.iter().flat_map(|end| std::iter::repeat_n(end, instants)) {
-            ends_without_force(&arguments, *end, random.u64(1..packets));
+            let (finger, packets) = (Served::patient("wall"), random.u64(1..packets));
+            finger.done(&["tare"]);
+            end_behind(&finger, packets, &with_file(&arguments, &finger.file("ended.mcap")), *end);
+            let state = finger.command("state");
+            assert!(finger.true_force_n() < RESIDUAL_N, "{arguments:?} {end:?} after {packets} packets: {state}");
         }
         println!("{arguments:?}: no force left at {instants} instants of each end, {packets} packets");
     }
@@ -128,15 +132,6 @@ fn packets_of(arguments: &[&str]) -> u64 {
     let begun = finger.heard();
     finger.done(&with_file(arguments, &finger.file("ended.mcap")));
     finger.heard() - begun
-}
-
-/// Ends a command behind a number of its packets, and judges the true force 1 s later.
-fn ends_without_force(arguments: &[&str], end: End, packets: u64) {
-    let finger = Served::patient("wall");
-    finger.done(&["tare"]);
-    end_behind(&finger, packets, &with_file(arguments, &finger.file("ended.mcap")), end);
-    let state = finger.command("state");
-    assert!(finger.true_force_n() < RESIDUAL_N, "{arguments:?} {end:?} after {packets} packets: {state}");
 }
 
 /// Ends a command behind a number of its packets; then 1 s goes by. Without power it ends by itself.
@@ -194,7 +189,6 @@ fn stop_stops_every_mode() {
     }
 }
 
-/// The release has begun, nobody feeds the watchdog, and torque is still on.
 /// Sends a signal to a command while the line stalls in this mode: the command leaves the finger at rest.
 fn is_signalled_in(mode: &str, finger: &Served, arguments: &[&str], signal: Signal) {
     finger.command(&format!("stall at {mode}: -1"));
@@ -207,6 +201,7 @@ fn is_signalled_in(mode: &str, finger: &Served, arguments: &[&str], signal: Sign
     is_at_rest(finger, arguments[0]);
 }
 
+/// The release has begun, nobody feeds the watchdog, and torque is still on.
 #[test]
 fn a_signal_does_not_end_a_stop_before_torque_is_off() {
     let finger = Served::patient("wall");
@@ -300,9 +295,8 @@ fn a_signal_amid_a_restore_mixes_no_gains_with_parameters() {
     let (old, new) = (finger.file("old.toml"), finger.file("new.toml"));
     finger.done(&["params", "backup", &old]);
     let text = fs::read_to_string(&old).expect("it was written");
-    let text =
-        text.replace("row_3 = [16384, ", "row_3 = [20000, ").replace("modulus_pa = 250000", "modulus_pa = 300000");
-    fs::write(&new, text).expect("a file");
+    let text = text.replace("row_3 = [16384, ", "row_3 = [20000, ");
+    fs::write(&new, text.replace("modulus_pa = 250000", "modulus_pa = 300000")).expect("a file");
     let restore = ["--timeout-ms", "1000", "params", "restore", &new];
     let begun = finger.heard();
     finger.done(&restore);

@@ -50,12 +50,10 @@ struct Line {
     trap: Option<(String, u8)>,
     /// A word of the finger's state and a force, N: the line stalls as soon as it has the word and presses so hard.
     stall_at: Option<(String, f64)>,
-    /// Packets on a line that stalls.
     stalled: Option<Vec<Vec<u8>>>,
     /// Number of packets before it restarts.
     restart: Option<u64>,
-    /// Its clock waits for the host: it goes on for `PATIENT_S` after a packet. On a loaded machine the bus watchdog must not
-    /// outrun the program under test.
+    /// Its clock goes on for `PATIENT_S` after each packet, so that no watchdog outruns a slow program under test.
     patient: bool,
     /// Time of the last packet, s, and the number of packets.
     heard_s: f64,
@@ -204,7 +202,6 @@ impl Served {
         finger
     }
 
-    /// A client of its own.
     pub fn client(&self) -> Client {
         client(&self.port)
     }
@@ -218,7 +215,6 @@ impl Served {
         client
     }
 
-    /// Writes registers of one number.
     pub fn set(&self, values: &[(u16, i64)]) {
         let mut client = self.client();
         values.iter().for_each(|(register, value)| client.set(*register, *value).expect("it obeys"));
@@ -231,7 +227,6 @@ impl Served {
         answered.recv().expect("it is served").expect("a command")
     }
 
-    /// Stops serving it.
     pub fn end(&self) {
         self.stop.stop();
         if let Some(thread) = self.thread.borrow_mut().take() {
@@ -290,10 +285,11 @@ impl Served {
 
     /// Output of a command that succeeds.
     pub fn done(&self, arguments: &[&str]) -> String {
-        said(&self.fingertip(arguments).output().expect("it starts"))
+        let output = self.fingertip(arguments).output().expect("it starts");
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8_lossy(&output.stdout).into_owned()
     }
 
-    /// The same in JSON.
     pub fn json(&self, arguments: &[&str]) -> serde_json::Value {
         let text = self.done(&[arguments, &["--json"]].concat());
         serde_json::from_str(&text).unwrap_or_else(|why| panic!("{why}: {text}"))
@@ -306,8 +302,7 @@ impl Served {
     /// Asserts that a command fails, and that its error has these words.
     #[track_caller]
     pub fn refuses(&self, arguments: &[&str], words: &[&str]) {
-        let said = self.refused(arguments);
-        assert!(words.iter().all(|word| said.contains(word)), "{arguments:?}: {said}");
+        fails(&self.fingertip(arguments).output().expect("it starts"), words);
     }
 
     /// The same without a port.
@@ -424,11 +419,14 @@ pub fn ended(output: &Output) -> (Option<i32>, String) {
     (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
 }
 
-fn said(output: &Output) -> String {
-    assert!(output.status.success(), "{output:?}");
-    String::from_utf8_lossy(&output.stdout).into_owned()
+/// Asserts that a command failed, and that its error has these words.
+#[track_caller]
+pub fn fails(output: &Output, words: &[&str]) {
+    let said = complained(output);
+    assert!(words.iter().all(|word| said.contains(word)), "{said}");
 }
 
+#[track_caller]
 fn complained(output: &Output) -> String {
     let (code, err) = ended(output);
     assert_eq!(code, Some(1), "{output:?}");

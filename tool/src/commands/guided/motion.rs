@@ -1,5 +1,4 @@
-//! Steps of a guided procedure: motions that measure, what presses onto a hard plate give, forces that are held on a scale,
-//! and a weight that lies on the tip.
+//! Steps of a guided procedure: motions that measure, presses, forces held on a scale, a weight on the tip.
 
 use super::{GainRows, Presses, Procedure, Run};
 use crate::commands::stop::{Moving, measure_tare};
@@ -16,13 +15,11 @@ use solve::gains::Condition;
 use solve::modulus::Modulus;
 use solve::press::Press;
 use solve::record::{self, Reason};
-use solve::scale::HeldSeries;
-use solve::scale::{Held, SWINGS};
+use solve::scale::{Held, HeldSeries, SWINGS};
 use std::time::{Duration, Instant};
 
 /// Time between two looks at the motion.
 const LOOK: Duration = Duration::from_millis(10);
-/// Time between two reports of progress.
 const REPORT: Duration = Duration::from_secs(1);
 const TARE: Duration = Duration::from_secs(5);
 /// Longest wait for a controller that releases the object by itself.
@@ -30,17 +27,11 @@ const RELEASE: Duration = Duration::from_secs(2);
 
 /// Words for an early end: reason with its number, and what to do.
 fn ended_early(task: Task, number: i64, value: i64) -> Error {
-    let what = match task {
-        Task::Stop => "motion",
-        Task::Jog => "jog",
-        Task::Strokes => "strokes",
-        Task::Press => "press",
+    let what = format!("{task:?}").to_lowercase();
+    let why = match u8::try_from(number).ok().and_then(Reason::of) {
+        None => table::meaning(address::MEASURE_ENDED, number),
+        Some(reason) => record::Ended { reason, value: value as i32 }.to_string(),
     };
-    let reason = u8::try_from(number).ok().and_then(Reason::of);
-    let why = reason.map_or_else(
-        || table::meaning(address::MEASURE_ENDED, number),
-        |reason| record::Ended { reason, value: value as i32 }.to_string(),
-    );
     format!("{what} ended early: {why} (measure_ended {number}, value {value})").into()
 }
 
@@ -67,9 +58,7 @@ impl Procedure<'_> {
     /// Waits in the air with torque off, then tares.
     pub fn tare_after(&mut self, seconds: f64) -> Result<(), Error> {
         self.ready()?;
-        self.run.report(format_args!(
-            "pause of {seconds} s in the air: after a press the sensor's creep needs that time to decay"
-        ));
+        self.run.report(format!("pause of {seconds} s in the air: after a press the creep needs that time to decay"));
         self.run.interrupt.pause(Instant::now() + Duration::from_secs_f64(seconds));
         self.run.interrupt.check()?;
         self.tare()
@@ -93,8 +82,7 @@ impl Procedure<'_> {
         if measure_tare(TARE, self.client)?.touched { Err(TOUCHED.into()) } else { Ok(()) }
     }
 
-    /// Carries out a motion. Whatever ends it, the finger is at rest with torque off afterwards. Returns the record, which a
-    /// jog does not have.
+    /// Carries out a motion, which always ends at rest with torque off. Returns the record; a jog has none.
     pub fn motion(&mut self, task: Task) -> Result<Vec<u8>, Error> {
         self.ready()?;
         self.run.interrupt.check()?;
@@ -108,10 +96,9 @@ impl Procedure<'_> {
         let kept = self.client.block(address::CAPTURE_STATE, address::CAPTURE_COUNT)?;
         let now = kept.number(address::CAPTURE_COUNT);
         if kept.number(address::CAPTURE_STATE) != CaptureState::Done as i64 || now == count {
-            return Err(format!(
-                "the controller has no record of the motion: {RESTARTED}, or another host began a capture"
-            )
-            .into());
+            let why =
+                format!("the controller has no record of the motion: {RESTARTED}, or another host began a capture");
+            return Err(why.into());
         }
         let bytes = capture::fetch(self.client, now, self.run.json)?;
         self.unchanged().map(|()| bytes)
@@ -204,18 +191,16 @@ impl Procedure<'_> {
         let (before, found) = (&self.session.before, &mut self.found);
         let (mut after, mut sigma) = (before.gains.clone(), Vec::new());
         let [least, most] = [f64::from(GAIN_ONE) / 2.0, f64::from(GAIN_MAX)];
-        for (row, (gains, taxels)) in
-            after.iter_mut().zip(modulus.gains.taxels.chunks(modulus.gains.columns)).enumerate()
-        {
+        let taxels = modulus.gains.taxels.chunks(modulus.gains.columns);
+        for (row, (gains, taxels)) in after.iter_mut().zip(taxels).enumerate() {
             let one = |(column, (gain, taxel)): (usize, (&mut u16, &solve::gains::Gain))| {
                 let wanted = (f64::from(*gain) * taxel.factor(before.params.curve_permille)).round();
                 if taxel.condition != Condition::Sound {
                     return None;
                 }
                 if !(least..=most).contains(&wanted) {
-                    found.refused.push(format!(
-                        "the taxel in row {row}, column {column} keeps its gain: {wanted} is outside of {least} to {most}"
-                    ));
+                    let why = format!("{wanted} is outside of {least} to {most}");
+                    found.refused.push(format!("the taxel in row {row}, column {column} keeps its gain: {why}"));
                     return None;
                 }
                 *gain = wanted as u16;
@@ -261,9 +246,8 @@ fn carry_out(task: Task, run: &Run<'_>, client: &mut Client) -> Result<(), Error
             };
         }
         if Instant::now() > until {
-            return Err(
-                format!("the motion takes longer than {within_s} s: it was stopped; --within-s allows more").into()
-            );
+            let why = format!("the motion takes longer than {within_s} s: it was stopped; --within-s allows more");
+            return Err(why.into());
         }
         if reported.elapsed() >= REPORT {
             reported = Instant::now();
@@ -279,7 +263,6 @@ const REACHED_S: f64 = 30.0;
 const SETTLED: Duration = Duration::from_secs(1);
 /// Time for each goal of [`SWINGS`].
 const SWING: Duration = Duration::from_millis(500);
-/// Time over which readings are averaged.
 const AVERAGED: Duration = Duration::from_millis(500);
 /// Largest difference between goal and settled force: this share, at least this.
 const NEAR: f64 = 0.05;
@@ -292,8 +275,7 @@ const WEIGHT_MN: i64 = 100;
 const WEIGHT_WITHIN: Duration = Duration::from_secs(60);
 
 impl Procedure<'_> {
-    /// Holds each force in turn. Before its reading the finger goes to the goals of [`SWINGS`] around it. The tip is at rest
-    /// and clear of the plate afterwards.
+    /// Holds each force in turn, after the goals of [`SWINGS`] around it. The tip is clear of the plate afterwards.
     pub fn hold_all(&mut self, goals_mn: &[i64], shown_n: &[f64]) -> Result<(), Error> {
         self.ready()?;
         let moving = Moving::begin(self.client, &self.run.interrupt)?;
@@ -308,9 +290,8 @@ impl Procedure<'_> {
     pub fn weight(&mut self, seconds: f64) -> Result<HeldSeries, Error> {
         if !self.reuses(WEIGHT) {
             self.ready()?;
-            self.run.report(format_args!(
-                "lay a weight of 50 to 500 g on the tip within 60 s, and leave it there for {seconds} s"
-            ));
+            let what = "lay a weight of 50 to 500 g on the tip within 60 s, and leave it there for";
+            self.run.report(format_args!("{what} {seconds} s"));
             if !self.force_within(|force_mn| force_mn >= WEIGHT_MN)? {
                 return Err("no weight of 100 mN was laid on the tip within 60 s: run without --creep-s".into());
             }
@@ -352,8 +333,7 @@ impl Procedure<'_> {
     }
 }
 
-/// Shown and read forces of holds. `factors` are gains to write over gains before, by which each taxel's part of a force
-/// changes.
+/// Shown and read forces of holds, the latter as after the change of each taxel's gain by its factor.
 pub fn held(holds: &[Value], factors: &[f64]) -> Vec<Held> {
     let one = |hold: &Value| {
         let pressures = hold["pressures_pa"].as_array()?.iter().filter_map(Value::as_f64);
@@ -433,10 +413,8 @@ fn reach(goal_mn: i64, run: &Run<'_>, client: &mut Client) -> Result<(), Error> 
         }
         if begun.elapsed().as_secs_f64() > REACHED_S {
             let (mode, force_mn) = (state.mode_name(), state.force_mn);
-            return Err(format!(
-                "{goal_mn} mN are not held within {REACHED_S} s: mode {mode}, {force_mn} mN. Is the plate on the scale within reach?"
-            )
-            .into());
+            let why = format!("{goal_mn} mN are not held within {REACHED_S} s: mode {mode}, {force_mn} mN");
+            return Err(format!("{why}. Is the plate on the scale within reach?").into());
         }
         std::thread::sleep(LOOK);
     }

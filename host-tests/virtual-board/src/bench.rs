@@ -27,15 +27,12 @@ const DUTY_REGISTERS: [u64; 2] = [0x34, 0x38];
 const CR3: u64 = 0x14;
 const HDSEL: u64 = 1 << 3;
 
-/// State around the board.
-#[derive(Debug)]
 pub struct Bench {
     /// Next instant of the world's grid, ns; all stops of the bench itself lie on this grid.
     pub next_ns: u64,
     /// The world and the converters' inputs.
     pub front_end: Shared,
     pub trace: Trace,
-    /// Latency from frame to duty.
     pub latency: Latency,
     /// Times at which the bridge turned on and off.
     pub bridge_edges: Vec<BridgeEdge>,
@@ -46,7 +43,6 @@ pub struct Bench {
     pub received: Vec<TimedByte>,
     /// True while the core is held, until the next reset.
     pub core_held: bool,
-    /// Flash content that the image wrote.
     pub flash: Programmer,
     pub clock: ExternalClock,
     /// The host of a scene, once the board is set up.
@@ -57,17 +53,12 @@ pub struct Bench {
     encoder_ns: u64,
     resets: usize,
     grid_ns: u64,
-    follows_frames: bool,
     frames: u64,
 }
 
 impl Bench {
-    /// Bench at time 0.
     pub fn new(front_end: Shared, image: &Firmware) -> Self {
-        let (grid_ns, follows_frames) = {
-            let world = &front_end.lock().world;
-            (world.grid_ns(), world.follows_frames())
-        };
+        let grid_ns = front_end.lock().world.grid_ns();
         Self {
             next_ns: STEP_NS,
             front_end,
@@ -87,7 +78,6 @@ impl Bench {
             encoder_ns: 0,
             resets: 0,
             grid_ns,
-            follows_frames,
             frames: 0,
         }
     }
@@ -155,10 +145,7 @@ impl Bench {
     /// end of a frame the image looks at the encoder next.
     pub fn stopped(&mut self, board: &mut Part, at_ns: u64) {
         self.watch_bridge(board, at_ns);
-        if !self.follows_frames {
-            return;
-        }
-        let frames = self.front_end.lock().counts.frames;
+        let frames = self.front_end.lock().frames_of_scene();
         if frames != self.frames {
             self.frames = frames;
             self.advance_world(at_ns);
@@ -173,7 +160,7 @@ impl Bench {
         self.watch_bridge(board, now_ns);
         self.advance_world(now_ns);
         self.turn_encoder(board, now_ns);
-        for byte in board.wire().take_received() {
+        for byte in std::mem::take(&mut board.wire().incoming) {
             self.trace.add(byte.at_ns, Record::Sent(byte.byte));
             self.received.push(byte);
         }
@@ -186,7 +173,7 @@ impl Bench {
             }
         }
         if let (Some(host), Surroundings::Scene(finger)) = (&mut self.host, &mut self.front_end.lock().world) {
-            let (received, seen) = (std::mem::take(&mut self.received), finger.take_seen());
+            let (received, seen) = (std::mem::take(&mut self.received), std::mem::take(&mut finger.seen));
             host.turn(now_ns, now_ns + self.grid_ns, received, seen, session.board_mut().wire());
         }
         if now_ns.is_multiple_of(LOG_NS) {
@@ -199,8 +186,7 @@ impl Bench {
         self.next_ns = (self.next_ns / self.grid_ns + 1) * self.grid_ns;
     }
 
-    /// Time of the next stop: the next instant of the grid, or an earlier one at which the host begins to send. A byte
-    /// begins at a stop.
+    /// Time of the next stop: the next instant of the grid, or an earlier one at which the host sends a byte.
     pub fn next_stop(&self, board: &mut Part, now: VirtualNanos) -> VirtualNanos {
         let sends_ns = board.wire().sends_ns().filter(|sends_ns| *sends_ns > now.0);
         VirtualNanos(sends_ns.map_or(self.next_ns, |sends_ns| sends_ns.min(self.next_ns)))

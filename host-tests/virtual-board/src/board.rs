@@ -16,8 +16,7 @@ use sim::plant::Plant;
 use std::num::{NonZeroU32, NonZeroU64};
 
 const CORE_HZ: NonZeroU64 = NonZeroU64::new(168_000_000).expect("the core is clocked");
-/// Instructions that the core retires in a second, constant: a CPI of 1.34 at 168 MHz, as in the cycle estimate of the
-/// control step.
+/// Instructions that the core retires in a second: a CPI of 1.34 at 168 MHz, as the control step is estimated.
 const INSTRUCTIONS_PER_SECOND: NonZeroU64 = NonZeroU64::new(125_000_000).expect("the core runs");
 /// Divider of the SysTick clock.
 const REFCLK_DIVIDER: NonZeroU32 = NonZeroU32::new(8).expect("a divider divides");
@@ -35,8 +34,7 @@ impl Part {
         level(self, PORT_C, 8) == Level::High
     }
 
-    /// State of the bridge by its inputs: IN1 and IN2 averaged over the PWM period. It coasts while it sleeps or both
-    /// are low.
+    /// State of the bridge by IN1 and IN2 averaged over the PWM period. It coasts asleep, or with both low.
     pub fn bridge(&mut self) -> Bridge {
         if level(self, PORT_C, 9) == Level::Low {
             return Bridge::Coast;
@@ -99,7 +97,6 @@ impl Board for Part {
 #[derive(Debug)]
 pub enum Surroundings {
     Plant(Box<Plant>),
-    /// A scene's.
     Scene(Box<Finger>),
 }
 
@@ -140,11 +137,6 @@ impl Surroundings {
         }
     }
 
-    /// Returns true if the world is also stepped at the end of each frame: its grid is too coarse for the control step.
-    pub fn follows_frames(&self) -> bool {
-        matches!(self, Self::Scene(_))
-    }
-
     pub fn supply_v(&self) -> f64 {
         match self {
             Self::Plant(world) => world.finger().supply_v(),
@@ -168,10 +160,15 @@ impl Surroundings {
         }
     }
 
+    /// Costs of a scene's effects.
+    pub fn costs(&self) -> Vec<sim::watch::Cost> {
+        if let Self::Scene(finger) = self { finger.costs() } else { Vec::new() }
+    }
+
     pub fn reference_v(&self) -> f64 {
         match self {
             Self::Plant(world) => world.finger().setup.array.reference_v,
-            Self::Scene(finger) => finger.reference_v(),
+            Self::Scene(finger) => finger.reference_v,
         }
     }
 }

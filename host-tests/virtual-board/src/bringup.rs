@@ -23,8 +23,7 @@ pub fn run(
     let mut rig = Rig::new(image, Plant::new(&Setup::default()), options)?;
     let flash = Flashable::of(rig.image())?;
     flash.check_loaded(&mut rig)?;
-    let report =
-        listen(&mut Port { rig: &mut rig, heard: VecDeque::new() }, frames, progress).map_err(Error::Report)?;
+    let report = listen(&mut Port { rig: &mut rig, heard: VecDeque::new() }, frames, progress)?;
     Ok((judge(&report, Board::Emulated, flash.sha256(), estimates), rig))
 }
 

@@ -8,15 +8,16 @@
 //! once, by a device that does not exist.
 
 use crate::Error;
-use crate::rig::Rig;
+use crate::rig::{Rig, Stand};
 use crate::wire::TimedByte;
 use dynamixel2::Bus;
+use fingertip::link::Reply;
+use fingertip::link::packet::Sender;
 use serial2::SerialPort;
 use std::io::ErrorKind;
 use std::sync::mpsc;
 use std::time::Duration;
 
-/// The client's end of the bus.
 pub type Client = Bus<Vec<u8>, Vec<u8>>;
 
 /// The client's timeouts believe a byte to take 10 s.
@@ -41,7 +42,6 @@ impl Rig {
         })
     }
 
-    /// Takes the bytes that the image has sent.
     pub fn take_received(&mut self) -> Result<Vec<TimedByte>, Error> {
         self.with(|stand| std::mem::take(&mut stand.bench.received))
     }
@@ -53,7 +53,7 @@ impl Rig {
         self.send(packet)?;
         let (mut reply, mut quiet_since_ns) = (Vec::new(), self.now_ns());
         let (answer, answered) = mpsc::channel();
-        self.run_while(LOOK_NS, move |stand| {
+        let look = move |stand: &mut Stand<'_>| {
             let (now_ns, received) = (stand.bench.next_ns, std::mem::take(&mut stand.bench.received));
             if !received.is_empty() || stand.session.board_mut().wire().pending() > 0 {
                 quiet_since_ns = now_ns;
@@ -63,7 +63,8 @@ impl Rig {
             // An error means that nobody waits for the reply any more.
             let _ = goes_on || answer.send(std::mem::take(&mut reply)).is_ok();
             goes_on
-        })?;
+        };
+        self.run_while(LOOK_NS, Box::new(look))?;
         self.answer(&answered)
     }
 
@@ -77,7 +78,7 @@ impl Rig {
         }
         near.set_read_timeout(Duration::from_secs(3600))?;
         let mut client = Client::with_buffers(far, vec![0; BUFFER], vec![0; BUFFER])
-            .map_err(|why| Error::Client(std::io::Error::other(why.to_string())))?;
+            .map_err(|why| std::io::Error::other(why.to_string()))?;
         std::thread::scope(|scope| {
             let client = scope.spawn(move || job(&mut client));
             let pumped = self.pump(&near, wait_ns);
@@ -107,6 +108,15 @@ impl Rig {
             }
         }
     }
+}
+
+/// The bytes of an instruction.
+pub fn packet(id: u8, instruction: u8, params: &[u8]) -> Vec<u8> {
+    let mut bytes = Reply::new();
+    let mut sender = Sender::new(&mut bytes, id, instruction);
+    params.iter().for_each(|byte| sender.push(*byte));
+    sender.finish();
+    bytes.to_vec()
 }
 
 /// Returns true if the bytes hold a whole packet of the protocol: FF FF FD 00, ID, length of the rest.

@@ -1,5 +1,4 @@
-//! The converters, with features that the crate's own lack: the external trigger, two of them at once, and the array at
-//! their inputs.
+//! The converters, with what the crate's own lack: the external trigger, two at once, the array at their inputs.
 //!
 //! A sequence with DMA is one event, at its last conversion: the inputs are sampled at each rank's own instant, and the
 //! words wait together for [`crate::streams`]. Nothing that the image can see depends on the words in between, and 110
@@ -8,6 +7,7 @@
 //! watchdog, resolutions other than 12 bits; a request for one is reported as a gap.
 
 use crate::front_end::{LAST_ROW, Shared, Slot};
+use crate::report::PinEdge;
 use crate::timers::COMPARE_1;
 use fingertip::chip::Factory;
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
@@ -60,10 +60,7 @@ impl Converter {
         if let Some(running) = self.running.take_if(|running| running.event.is_none()) {
             self.finish(running, registers, context);
         }
-        let mut front_end = self.front_end.lock();
-        front_end.counts.triggers += u64::from(self.nth == 1);
-        let slot = front_end.scan.as_ref().map(|scan| scan.slot);
-        drop(front_end);
+        let slot = self.front_end.lock().scan.as_ref().map(|scan| scan.slot);
         self.triggered(slot, registers, context);
     }
 
@@ -184,13 +181,13 @@ impl Device for Converter {
         if change.instance == ROW_PORT.0 && change.request < ROW_PORT.1 {
             self.front_end.lock().drive_row(change.request, change.level == Level::High, context.now().0);
         } else if change.instance == ROW_PORT.0 && self.nth == 0 {
-            self.front_end.lock().note_edge(change.request, change.level == Level::High, context.now().0);
+            let edge = PinEdge { pin: change.request, at_ns: context.now().0, high: change.level == Level::High };
+            self.front_end.lock().pin_edges.iter_mut().for_each(|edges| edges.push(edge));
         } else if change.instance == "TIM8" && change.request == COMPARE_1 {
             let mut front_end = self.front_end.lock();
             if front_end.trigger_cut || front_end.scan.is_some() {
                 return;
             }
-            front_end.counts.triggers += 1;
             let missed = std::mem::take(&mut front_end.trigger_missed);
             drop(front_end);
             self.triggered(None, registers, context);
@@ -202,28 +199,23 @@ impl Device for Converter {
         }
     }
 
-    fn read(
-        &mut self,
-        register: Register,
-        registers: &mut RegisterFile,
-        context: &mut DeviceContext<'_>,
-    ) -> Option<u64> {
-        self.status = self.injected.show(context.now().0, self.status, registers);
+    fn read(&mut self, register: Register, file: &mut RegisterFile, context: &mut DeviceContext<'_>) -> Option<u64> {
+        self.status = self.injected.show(context.now().0, self.status, file);
         let taken = match register {
             Register::Dr => self.front_end.lock().waiting[self.nth].pop_front().is_some(),
             // Words that the streams fetched were read, too.
-            Register::Sr => {
-                cr2::DMA.is_set(registers.get(Register::Cr2)) && self.front_end.lock().waiting[self.nth].is_empty()
+            Register::Sr if cr2::DMA.is_set(file.get(Register::Cr2)) => {
+                self.front_end.lock().waiting[self.nth].is_empty()
             }
             _ => false,
         };
         if register == Register::Sr {
-            registers.set(Register::Sr, self.status);
+            file.set(Register::Sr, self.status);
         }
         if taken {
-            let value = registers.get(register);
+            let value = file.get(register);
             self.status = sr::EOC.set(self.status, 0);
-            registers.set(Register::Sr, self.status);
+            file.set(Register::Sr, self.status);
             return (register == Register::Dr).then_some(value);
         }
         None
@@ -237,17 +229,10 @@ impl Device for Converter {
             Register::Dr => return self.triggered(None, registers, context),
             Register::Cr1 => {
                 let control = registers.get(Register::Cr1);
-                if cr1::RES.get(control) != 0
-                    || cr1::EOCIE.is_set(control)
-                    || cr1::OVRIE.is_set(control)
-                    || cr1::JEOCIE.is_set(control)
-                    || cr1::DISCEN.is_set(control)
-                    || cr1::AWDEN.is_set(control)
-                {
-                    context.tell(
-                        "CR1",
-                        "resolutions but 12 bits, interrupts, discontinuous mode and watchdog are not modelled",
-                    );
+                let more = [cr1::RES, cr1::EOCIE, cr1::OVRIE, cr1::JEOCIE, cr1::DISCEN, cr1::AWDEN];
+                if more.iter().any(|field| field.get(control) != 0) {
+                    let what = "resolutions but 12 bits, interrupts, discontinuous mode and watchdog are not modelled";
+                    context.tell("CR1", what);
                 }
             }
             _ => {}
@@ -320,7 +305,6 @@ struct Injected {
 }
 
 impl Injected {
-    /// Returns true while conversions run.
     fn runs(&self, now_ns: u64) -> bool {
         now_ns < self.done_ns
     }
@@ -369,7 +353,6 @@ pub fn volts(converter: usize, input: usize, chip_c: f64) -> Option<f64> {
     }
 }
 
-/// The factory's codes.
 pub fn factory() -> Factory {
     let code = |input, chip_c| (volts(CONVERTER, input, chip_c).unwrap_or(0.0) / FACTORY_V * CODES) as u16;
     Factory { reference: code(REFERENCE_INPUT, 30.0), sensor: [30.0, 110.0].map(|chip_c| code(SENSOR_INPUT, chip_c)) }

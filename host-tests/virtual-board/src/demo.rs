@@ -31,7 +31,7 @@ pub fn run(image: &Path, quick: bool) -> Result<(Figures, Run), Error> {
     let flash = Flashable::of(boards.rigs[0].image())?;
     flash.check_loaded(&mut boards.rigs[0])?;
     let from = Counts::of(&mut boards.rigs[0])?;
-    let mut screen = Screen::new(&scene);
+    let mut screen = Screen { trace: Trace::new(&scene), scene: scene.clone(), told: 0 };
     let summary = boards.run(&scene, &mut screen)?;
     let rig: &mut Rig = &mut boards.rigs[0];
     let to = Counts::of(rig)?;
@@ -48,7 +48,6 @@ pub fn run(image: &Path, quick: bool) -> Result<(Figures, Run), Error> {
     Ok((figures, run))
 }
 
-/// Longest wait for an answer, ns.
 const WAIT_NS: u64 = 20_000_000;
 /// Pause of the line after the last request, ms.
 const QUIET_MS: u64 = 2;
@@ -62,10 +61,14 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Now.
     pub fn of(rig: &mut Rig) -> Result<Self, Error> {
         let (at_ns, duties) = (rig.now_ns(), rig.latency()?.frames);
-        Ok(Self { at_ns, scans: rig.scan_counts()?, instructions: rig.instructions()?, duties })
+        Ok(Self {
+            at_ns,
+            scans: rig.scan_counts()?,
+            instructions: rig.with(|stand| stand.stop.instruction_count)?,
+            duties,
+        })
     }
 }
 
@@ -79,7 +82,6 @@ pub struct Figures {
     pub virtual_time_s: f64,
     /// Time that the run took on this machine.
     pub wall_time_s: f64,
-    /// Frames in that virtual time.
     pub frames: u64,
     pub frame_rate_hz: f64,
     pub missed_frames: u32,
@@ -95,7 +97,6 @@ pub struct Figures {
     pub trace_sha256: String,
     /// The same digest of the second run; `None` without a second run.
     pub repeated_trace_sha256: Option<String>,
-    /// Every figure that has a bound.
     pub checks: Vec<Check>,
 }
 
@@ -122,7 +123,7 @@ impl Figures {
         rig.run_ms(QUIET_MS)?;
         rig.take_received()?;
         let answer = rig.client(WAIT_NS, |bus: &mut Client| bus.read_u16(ID, address::LOOP_TIME_MAX_US))?;
-        let loop_time = answer.map_err(|why| Error::Client(std::io::Error::other(format!("loop time: {why}"))))?;
+        let loop_time = answer.map_err(|why| std::io::Error::other(format!("loop time: {why}")))?;
         let mut figures = Self {
             image_sha256: flash.sha256(),
             image_bytes: flash.bytes.len(),
@@ -141,12 +142,11 @@ impl Figures {
         };
         // The last frame may be under way at either instant.
         let unanswered = (frames + from.duties).abs_diff(to.duties).saturating_sub(2);
-        let unknown_gaps = rig.gaps()?.iter().filter(|gap| gap.reason().is_none()).count();
+        let unknown_gaps = rig.gaps()?.len();
         figures.checks = figures.checked(unanswered, unknown_gaps);
         Ok(figures)
     }
 
-    /// Holds each figure against its bound.
     fn checked(&self, unanswered: u64, unknown_gaps: usize) -> Vec<Check> {
         let at_most = |most: f64| [None, Some(most)];
         let within = |least: f64, most: f64| [Some(least), Some(most)];
@@ -171,14 +171,7 @@ impl Figures {
 pub struct Screen {
     trace: Trace,
     scene: Scene,
-    /// Number of goals reported.
     told: usize,
-}
-
-impl Screen {
-    pub fn new(scene: &Scene) -> Self {
-        Self { trace: Trace::new(scene), scene: scene.clone(), told: 0 }
-    }
 }
 
 impl Watch for Screen {

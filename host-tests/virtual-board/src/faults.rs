@@ -7,8 +7,8 @@ use rigless::device::{DeviceContext, RegisterFile};
 use rigless::emulator::{Access, AccessKind, Host, InterruptLine, Stop};
 use rigless::session::Session;
 use rigless::soc::Width;
-use rigless::soc::stm32f427::generated::RCC;
 use rigless::soc::stm32f427::generated::rcc::{Register, cr};
+use rigless::soc::stm32f427::generated::{RCC, TIM5};
 use rigless::soc::stm32f427::peripherals::rcc::Rcc;
 
 /// DMA1's flags of streams 4 to 7, and the registers of stream 5, which receives the bus.
@@ -43,13 +43,8 @@ pub enum Fault {
     StoreAt(u32),
     /// The bus's receiving DMA stream points where nothing answers, so its next byte is a transfer error: a panic.
     BusMemoryLost,
-    /// The core's next access to these addresses is a bus error: a hard fault.
-    BusError {
-        /// The first address.
-        from: u64,
-        /// The first address after them.
-        to: u64,
-    },
+    /// The core's next access to TIM5, which times the frame guard, is a bus error: a hard fault.
+    BusError,
 }
 
 impl Fault {
@@ -85,8 +80,8 @@ impl Fault {
                 access(AccessKind::Write, DMA1_S5M0AR, NOWHERE);
                 access(AccessKind::Write, DMA1_S5CR, control | ENABLE);
             }
-            Self::BusError { from, to } if defect => session.fail_next(from, to),
-            Self::StoreAt(_) | Self::BusMemoryLost | Self::BusError { .. } => {}
+            Self::BusError if defect => session.fail_next(TIM5.base, TIM5.base + 0x400),
+            Self::StoreAt(_) | Self::BusMemoryLost | Self::BusError => {}
         }
     }
 }
@@ -100,7 +95,6 @@ fn store_at(address: u64) -> [u64; 6] {
     [low, low_rest, high, high_rest, 0x6000, 0x4770]
 }
 
-/// Writes to the flash.
 pub fn program(host: &mut dyn Host, address: u64, width: Width, value: u64) {
     host.program(address, width, value).expect("the flash can be programmed");
 }
@@ -111,7 +105,6 @@ impl Rig {
         self.with(move |stand| fault.apply(true, stand))
     }
 
-    /// Mends it again.
     pub fn mend(&mut self, fault: Fault) -> Result<(), Error> {
         self.with(move |stand| fault.apply(false, stand))
     }
@@ -131,7 +124,6 @@ const NMI_VECTOR: u64 = 0x0800_0008;
 const GUARD_VECTOR: u64 = 0x0800_0000 + 4 * (16 + 50);
 const GUARD_LINE: InterruptLine = InterruptLine::new(50).expect("there are more lines");
 
-/// State of the external clock.
 #[derive(Clone, Debug, Default)]
 pub struct ExternalClock {
     lost: bool,
@@ -173,7 +165,6 @@ impl ExternalClock {
         }
     }
 
-    /// The part was reset.
     pub fn restarted(&mut self, host: &mut dyn Host) {
         if let Some(vector) = self.vector.take() {
             program(host, GUARD_VECTOR, Width::W32, vector);

@@ -39,13 +39,11 @@ pub fn layout(of: &Bus) -> Result<Bus, Error> {
     Bus::builder(CPU, &PROGRAMMABLE, of.peripherals().copied()).build()
 }
 
-/// Flash that the image programs.
 #[derive(Clone, Debug)]
 pub struct Programmer {
     /// Time for which the core stalls while a word is programmed, ns: typically 16 us, at most 100 us (DS10693).
     pub word_ns: u64,
     pub words: u64,
-    /// Number of sectors erased.
     pub erases: u64,
     /// Time at which a stall of the core ends.
     stands_until_ns: Option<u64>,
@@ -58,7 +56,6 @@ impl Default for Programmer {
 }
 
 impl Programmer {
-    /// The core stored something somewhere.
     pub fn stored(&mut self, session: &mut Session<Part>, host: &mut dyn Host, access: &Access) {
         if access.kind != AccessKind::Write {
             return;

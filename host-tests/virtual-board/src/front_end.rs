@@ -26,11 +26,9 @@ struct RowDrive {
     since_ns: u64,
 }
 
-/// A slot of a scene's scan. The update that moves the rows begins it, and the converters are triggered a fixed time
-/// later.
+/// A slot of a scene's scan: begins with the update that moves the rows; a fixed time later the trigger comes.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Slot {
-    /// Start time of the conversions, ns.
     pub begun_ns: u64,
     /// Bits of the driven rows; 0 in the first slot of a frame.
     pub rows: u16,
@@ -64,8 +62,8 @@ impl Scan {
 /// The drive of a frame's last slot.
 pub const LAST_ROW: u16 = 1 << (ROWS - 1);
 
-/// Index of a row drive, with the settled voltages of the columns under it and under the drive before it.
-type Settled = Option<(usize, [f64; COLUMNS], [f64; COLUMNS])>;
+/// Begin of a row drive, with the settled voltages of the columns under it and under the drive before it.
+type Settled = Option<(u64, [f64; COLUMNS], [f64; COLUMNS])>;
 
 /// The DAC's first channel, on the pin of column 5: codes, newest first, and since when. Its buffer is off; it is quick.
 #[derive(Clone, Copy, Debug, Default)]
@@ -84,14 +82,11 @@ pub struct ScanCounts {
     pub frames: u64,
     /// End time of the last of these scans, ns.
     pub frame_end_ns: u64,
-    /// Triggers that reached the converters.
-    pub triggers: u64,
 }
 
 /// The board's analogue side, with the world behind it. Converters and stepping share it.
 #[derive(Debug)]
 pub struct FrontEnd {
-    /// Simulated world around the board.
     pub world: Surroundings,
     /// The trigger line between timer and converters is cut.
     pub trigger_cut: bool,
@@ -117,9 +112,8 @@ pub struct FrontEnd {
 pub struct Shared(Arc<Mutex<FrontEnd>>);
 
 impl Shared {
-    /// A front end with no row driven.
     pub fn new(world: Surroundings) -> Self {
-        let scan = world.follows_frames().then(Scan::default);
+        let scan = matches!(world, Surroundings::Scene(_)).then(Scan::default);
         Self(Arc::new(Mutex::new(FrontEnd {
             world,
             scan,
@@ -141,7 +135,11 @@ impl Shared {
 }
 
 impl FrontEnd {
-    /// A row's pin changed.
+    /// Frames of a scene, whose world is also stepped at the end of each: its grid is too coarse for the control step.
+    pub fn frames_of_scene(&self) -> u64 {
+        if self.scan.is_some() { self.counts.frames } else { 0 }
+    }
+
     pub fn drive_row(&mut self, row: usize, high: bool, at_ns: u64) {
         let bit = 1 << row;
         let rows = if high { self.drives[0].rows | bit } else { self.drives[0].rows & !bit };
@@ -151,7 +149,6 @@ impl FrontEnd {
         self.drives[0] = RowDrive { rows, since_ns: at_ns };
     }
 
-    /// The image wrote to a register of the DAC.
     pub fn write_dac(&mut self, offset: u64, value: u64, at_ns: u64) {
         match (offset, &mut self.dac) {
             (DAC_CR, None) if value & 1 == 1 => self.dac = Some(Dac::default()),
@@ -161,13 +158,6 @@ impl FrontEnd {
                 codes[0] = ((value & 0xfff) as u16, at_ns);
             }
             _ => {}
-        }
-    }
-
-    /// Records an edge of a pin of the rows' port that is no row.
-    pub fn note_edge(&mut self, pin: usize, high: bool, at_ns: u64) {
-        if let Some(edges) = &mut self.pin_edges {
-            edges.push(PinEdge { pin, at_ns, high });
         }
     }
 
@@ -241,11 +231,12 @@ impl FrontEnd {
                     let newest = self.drives.iter().position(|drive| drive.since_ns <= at_ns).unwrap_or(0);
                     match &mut self.world {
                         Surroundings::Plant(world) => {
-                            let volts = column_volts(world, &self.drives, newest, column, at_ns, &mut settled);
+                            let drives = [self.drives[newest], self.drives[(newest + 1).min(2)]];
+                            let volts = column_volts(world, drives, column, at_ns, &mut settled);
                             self.code(volts)
                         }
                         Surroundings::Scene(finger) => {
-                            slot.map_or(0, |slot| finger.code(column, slot.rows, slot.begun_ns))
+                            slot.map_or(0, |slot| finger.slot(slot.rows, slot.begun_ns)[column])
                         }
                     }
                 }
@@ -279,19 +270,12 @@ impl FrontEnd {
 }
 
 /// A column's voltage under the drive of a place.
-fn column_volts(
-    world: &mut Plant,
-    drives: &[RowDrive; 3],
-    newest: usize,
-    column: usize,
-    at_ns: u64,
-    settled: &mut Settled,
-) -> f64 {
-    let (drive, before) = (drives[newest], drives[(newest + 1).min(2)]);
+fn column_volts(world: &mut Plant, drives: [RowDrive; 2], column: usize, at_ns: u64, settled: &mut Settled) -> f64 {
+    let [drive, before] = drives;
     let mut settles = |drive: RowDrive| world.settled_volts(&std::array::from_fn(|row| drive.rows >> row & 1 == 1));
     let (_, end, start) = *match settled {
-        Some(known) if known.0 == newest => known,
-        _ => settled.insert((newest, settles(drive), settles(before))),
+        Some(known) if known.0 == drive.since_ns => known,
+        _ => settled.insert((drive.since_ns, settles(drive), settles(before))),
     };
     let since_s = (at_ns - drive.since_ns.min(at_ns)) as f64 * 1e-9;
     let left = decay(since_s / world.finger().setup.array.settle_tau_s);

@@ -10,17 +10,14 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug)]
 pub struct Firmware {
     pub path: PathBuf,
-    /// The file's bytes.
     pub elf: Vec<u8>,
     symbols: Vec<(String, u64)>,
 }
 
 impl Firmware {
-    /// Reads an image.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let elf = std::fs::read(path).map_err(|why| Error::ReadImage(path.into(), why))?;
-        let file =
-            object::File::parse(elf.as_slice()).map_err(|why| Error::NotAnImage(path.into(), why.to_string()))?;
+        let file = object::File::parse(&*elf).map_err(|why| Error::NotAnImage(path.into(), why.to_string()))?;
         let symbols = file.symbols().filter_map(|symbol| Some((symbol.name().ok()?.to_owned(), symbol.address())));
         Ok(Self { path: path.into(), symbols: symbols.collect(), elf })
     }
@@ -42,7 +39,6 @@ impl Firmware {
 /// Address of the first byte of flash.
 const FLASH: u64 = 0x0800_0000;
 
-/// The flash's content.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Flashable {
     /// Bytes from the first address of the flash on.
@@ -57,7 +53,6 @@ impl Flashable {
         Ok(Self { bytes })
     }
 
-    /// SHA-256, in hexadecimal.
     pub fn sha256(&self) -> String {
         rigless::snapshot::digest(&self.bytes).iter().map(|byte| format!("{byte:02x}")).collect()
     }
@@ -67,16 +62,12 @@ impl Flashable {
         let bytes = self.bytes.clone();
         let path = rig.image().path.clone();
         let differs = rig.with(move |stand| {
-            let at = |place: usize| FLASH + place as u64;
-            let mut places = bytes.iter().enumerate();
-            let mut same =
-                |place, byte| stand.host.read(at(place), Width::W8).is_ok_and(|read| read == u64::from(byte));
-            let wrong = places.find(|(place, byte)| !same(*place, **byte));
-            wrong.map(|(place, _)| at(place))
+            let mut places = (FLASH..).zip(bytes);
+            places.find(|(at, byte)| stand.host.read(*at, Width::W8).ok() != Some(u64::from(*byte)))
         })?;
         match differs {
             None => Ok(()),
-            Some(at) => Err(Error::NotAnImage(path, format!("the emulated flash differs from it at {at:#010x}"))),
+            Some((at, _)) => Err(Error::NotAnImage(path, format!("the emulated flash differs from it at {at:#010x}"))),
         }
     }
 }

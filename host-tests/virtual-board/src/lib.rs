@@ -47,19 +47,15 @@ pub enum Error {
     /// The last instant that the run is known to have reached, and the emulator's reason.
     #[error("the emulator stopped at {0} ns: {1}")]
     Emulator(u64, String),
-    #[error("the bus client's pseudo-terminal: {0}")]
-    Client(#[from] std::io::Error),
-    #[error("the report of the bring-up image: {0}")]
-    Report(std::io::Error),
-    #[error("{0} checks fail; see the table")]
+    #[error(transparent)]
+    Io(#[from] std::io::Error),
+    #[error("{0} figures are outside of their bounds; see the table")]
     Failed(usize),
     /// The plant was requested, but the board runs in a scene, or the other way round.
     #[error("the world around the board is another one")]
     OtherWorld,
     #[error(transparent)]
     Demo(#[from] sim::run::RunError),
-    #[error("{0} of the bounds missed; see the table")]
-    Missed(usize),
     #[error(transparent)]
     Scene(#[from] sim::SimError),
     /// Time since power-on, and what the board did not do for a scene's host.

@@ -10,23 +10,14 @@ const SIZE: u64 = 32;
 const WRITTEN: u64 = 36;
 const READ: u64 = 40;
 
-/// Whole frames, still encoded.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Frames {
-    /// Virtual time at which they were read, ns.
-    pub at_ns: u64,
-    /// Frames, each ended by a zero.
-    pub bytes: Vec<u8>,
-}
-
 /// Reads the log out. [`text`] makes lines of it.
 #[derive(Debug, Default)]
 pub struct Log {
     block: Option<u64>,
     /// Bytes received since the last whole frame.
     partial: Vec<u8>,
-    /// All frames so far.
-    pub frames: Vec<Frames>,
+    /// Whole frames, still encoded, each ended by a zero; and the virtual time at which they were read, ns.
+    pub frames: Vec<(u64, Vec<u8>)>,
 }
 
 impl Log {
@@ -51,7 +42,7 @@ impl Log {
             return;
         }
         let Some(end) = self.partial.iter().rposition(|byte| *byte == 0) else { return };
-        self.frames.push(Frames { at_ns, bytes: self.partial.drain(..=end).collect() });
+        self.frames.push((at_ns, self.partial.drain(..=end).collect()));
     }
 
     /// Drops a half-written line: the image restarts.
@@ -63,24 +54,13 @@ impl Log {
 /// The log as text, by the table in the ELF of the image.
 #[cfg(feature = "log")]
 pub mod text {
-    use super::Frames;
     use crate::Error;
     use crate::rig::Rig;
     use defmt_decoder::{DecodeError, Table};
 
-    #[derive(Clone, Debug, PartialEq, Eq)]
-    pub struct LogLine {
-        /// Virtual time at which it was read, ns.
-        pub at_ns: u64,
-        /// Level, if it has one.
-        pub level: Option<String>,
-        /// The image's own timestamp and its text.
-        pub text: String,
-    }
-
     impl Rig {
-        /// The image's log so far; one without a log has none.
-        pub fn log(&mut self) -> Result<Vec<LogLine>, Error> {
+        /// The image's log so far: the instant at which a line was read, ns, and its level, time and text.
+        pub fn log(&mut self) -> Result<Vec<(u64, String)>, Error> {
             let frames = self.with(|stand| {
                 stand.bench.log.drain(stand.bench.next_ns, stand.host);
                 stand.bench.log.frames.clone()
@@ -89,24 +69,26 @@ pub mod text {
             let table = Table::parse(&image.elf).map_err(|why| {
                 Error::NotAnImage(image.path.clone(), format!("its defmt table cannot be read: {why}"))
             })?;
-            Ok(table.map_or_else(Vec::new, |table| frames.iter().flat_map(|frames| decode(&table, frames)).collect()))
+            let Some(table) = table else { return Ok(Vec::new()) };
+            let mut lines = Vec::new();
+            for (at_ns, bytes) in &frames {
+                lines.extend(decode(&table, bytes).map(|line| (*at_ns, line)));
+            }
+            Ok(lines)
         }
     }
 
-    fn decode(table: &Table, frames: &Frames) -> Vec<LogLine> {
+    fn decode(table: &Table, bytes: &[u8]) -> impl Iterator<Item = String> {
         let mut decoder = table.new_stream_decoder();
-        decoder.received(&frames.bytes);
-        let mut lines = Vec::new();
-        loop {
-            let (level, text) = match decoder.decode() {
-                Ok(frame) => {
-                    let time = frame.display_timestamp().map(|time| format!("{time} ")).unwrap_or_default();
-                    (frame.level().map(|level| level.as_str().to_owned()), format!("{time}{}", frame.display_message()))
-                }
-                Err(DecodeError::UnexpectedEof) => return lines,
-                Err(DecodeError::Malformed) => (None, "(a damaged log frame)".to_owned()),
-            };
-            lines.push(LogLine { at_ns: frames.at_ns, level, text });
-        }
+        decoder.received(bytes);
+        std::iter::from_fn(move || match decoder.decode() {
+            Ok(frame) => {
+                let level = frame.level().map_or("", |level| level.as_str());
+                let time = frame.display_timestamp().map(|time| time.to_string()).unwrap_or_default();
+                Some(format!("{level} {time} {}", frame.display_message()))
+            }
+            Err(DecodeError::UnexpectedEof) => None,
+            Err(DecodeError::Malformed) => Some("a damaged frame of the log".to_owned()),
+        })
     }
 }

@@ -19,6 +19,9 @@ use virtual_board::{Error, Options, Rig};
 #[derive(Debug, Parser)]
 #[command(name = "virtual-board", version)]
 struct Arguments {
+    /// The image, an ELF for the STM32F446RE.
+    #[arg(long, value_name = "ELF", global = true, default_value = "target/thumbv7em-none-eabihf/release/firmware")]
+    image: PathBuf,
     #[command(subcommand)]
     command: Command,
 }
@@ -28,9 +31,6 @@ enum Command {
     /// Runs the image of `cargo xtask bringup` and judges its report.
     #[cfg(feature = "bringup")]
     Bringup {
-        /// The image, an ELF.
-        #[arg(long, value_name = "ELF")]
-        image: PathBuf,
         /// Number of frames for which the rows are read back.
         #[arg(long, default_value_t = 1_000)]
         frames: u32,
@@ -43,9 +43,6 @@ enum Command {
     },
     /// Touches an object, holds forces, releases it; checks the figures and draws pictures.
     Demo {
-        /// The flash image, an ELF for the STM32F446RE.
-        #[arg(long, value_name = "ELF")]
-        image: PathBuf,
         /// Writes the figures to this file.
         #[arg(long, value_name = "FILE")]
         json: Option<PathBuf>,
@@ -58,9 +55,6 @@ enum Command {
     },
     /// Keeps the board alive for any DYNAMIXEL client, behind a pseudo-terminal or a TCP port.
     Serve {
-        /// The flash image, an ELF for the STM32F446RE.
-        #[arg(long, value_name = "ELF")]
-        image: PathBuf,
         /// Makes a symbolic link of this name to the pseudo-terminal.
         #[arg(long, value_name = "PATH", conflicts_with = "tcp")]
         pty: Option<PathBuf>,
@@ -73,37 +67,23 @@ enum Command {
     },
     /// Runs a scene with the image.
     #[cfg(feature = "scenes")]
-    Sim {
-        /// The flash image, an ELF for the STM32F446RE.
-        #[arg(long, value_name = "ELF")]
-        image: PathBuf,
-        #[command(flatten)]
-        scene: sim::cli::Args,
-    },
+    Sim(sim::cli::Args),
     /// Runs drawn fingers with the image.
     #[cfg(feature = "scenes")]
-    Population {
-        /// The flash image, an ELF for the STM32F446RE.
-        #[arg(long, value_name = "ELF")]
-        image: PathBuf,
-        #[command(flatten)]
-        population: sim::population::Args,
-    },
+    Population(sim::population::Args),
 }
 
 fn main() -> ExitCode {
-    let result = match Arguments::parse().command {
+    let Arguments { image, command } = Arguments::parse();
+    let result = match command {
         #[cfg(feature = "bringup")]
-        Command::Bringup { image, frames, estimates, json } => {
-            bringup(&image, frames, estimates.as_deref(), json.as_deref())
-        }
-        Command::Demo { image, json, out, quick } => demo(&image, json.as_deref(), &out, quick),
-        Command::Serve { image, pty, tcp, distance_mm } => {
-            let place = tcp.map_or_else(|| Place::Pty(pty), Place::Tcp);
-            serve(&image, &place, distance_mm)
+        Command::Bringup { frames, estimates, json } => bringup(&image, frames, estimates.as_deref(), json.as_deref()),
+        Command::Demo { json, out, quick } => demo(&image, json.as_deref(), &out, quick),
+        Command::Serve { pty, tcp, distance_mm } => {
+            serve(&image, &tcp.map_or_else(|| Place::Pty(pty), Place::Tcp), distance_mm)
         }
         #[cfg(feature = "scenes")]
-        Command::Sim { image, scene } => {
+        Command::Sim(scene) => {
             use sim::cli::{Board, answer};
             return answer(&scene, &|of, watch| match scene.board {
                 Board::Native => sim::native::board(of, watch),
@@ -111,7 +91,7 @@ fn main() -> ExitCode {
             });
         }
         #[cfg(feature = "scenes")]
-        Command::Population { image, population } => {
+        Command::Population(population) => {
             use sim::population::{Board, answer};
             return answer(&population, &|of, watch| match population.board {
                 Board::Native => sim::native::board(of, watch),
@@ -120,47 +100,39 @@ fn main() -> ExitCode {
             });
         }
     };
-    let shown = output::say::end();
-    match result {
-        Ok(()) if shown => ExitCode::SUCCESS,
-        Ok(()) => ExitCode::FAILURE,
-        Err(error) => {
-            output::say::aside(format_args!("virtual-board: {error}"));
-            ExitCode::FAILURE
-        }
+    let shown = say::end();
+    if let Err(error) = &result {
+        say::aside(format_args!("virtual-board: {error}"));
     }
+    if shown && result.is_ok() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
 /// Time after which an answer is reported as late: the shortest time-out of the known clients.
 const LATE: Duration = Duration::from_millis(10);
 
-/// Runs it and prints the table.
 #[cfg(feature = "bringup")]
-pub fn bringup(image: &Path, frames: u32, estimates: Option<&Path>, json: Option<&Path>) -> Result<(), Error> {
-    let estimates = estimates.map(::bringup::judge::estimates).transpose().map_err(Error::Report)?.unwrap_or_default();
+fn bringup(image: &Path, frames: u32, estimates: Option<&Path>, json: Option<&Path>) -> Result<(), Error> {
+    let estimates = estimates.map(::bringup::judge::estimates).transpose()?.unwrap_or_default();
     let told = &mut |said: &str| say::line(said);
     let (judgement, _) = virtual_board::bringup::run(image, &Options::default(), frames, &estimates, told)?;
-    if let Some(path) = json {
-        let text = serde_json::to_string_pretty(&judgement).map_err(std::io::Error::from).map_err(Error::Report)?;
-        kept::write(path, text + "\n").map_err(Error::Report)?;
-    }
+    json.map_or(Ok(()), |path| write(path, &judgement))?;
     say::text(judgement.text());
-    match judgement.failed {
-        0 => Ok(()),
-        failed => Err(Error::Failed(failed)),
-    }
+    if judgement.failed == 0 { Ok(()) } else { Err(Error::Failed(judgement.failed)) }
+}
+
+/// Writes figures as JSON.
+fn write(path: &Path, figures: &impl serde::Serialize) -> Result<(), std::io::Error> {
+    let written = serde_json::to_string_pretty(figures).map_err(std::io::Error::from);
+    let written = written.and_then(|text| kept::write(path, text + "\n"));
+    written.map_err(|why| std::io::Error::new(why.kind(), format!("cannot write {}: {why}", path.display())))
 }
 
 /// Runs it, prints the table, writes figures and pictures.
-pub fn demo(image: &Path, json: Option<&Path>, out: &Path, quick: bool) -> Result<(), Error> {
+fn demo(image: &Path, json: Option<&Path>, out: &Path, quick: bool) -> Result<(), Error> {
     let (figures, run) = demo::run(image, quick)?;
     // The files first: the reader of the output may close the pipe.
     let drawn = draw(&run, &figures.forces, out);
-    if let Some(path) = json {
-        let written = serde_json::to_string_pretty(&figures).map_err(std::io::Error::from);
-        let written = written.and_then(|text| kept::write(path, text + "\n"));
-        written.map_err(|error| sim::run::RunError::from(format!("cannot write {}: {error}", path.display())))?;
-    }
+    json.map_or(Ok(()), |path| write(path, &figures))?;
     say::line(format_args!("sha-256  {} ({} bytes, as flashed)\n", figures.image_sha256, figures.image_bytes));
     say::text(table(&figures.checks, &figures.forces));
     say::line(format_args!("\ntrace    {}", figures.trace_sha256));
@@ -173,20 +145,17 @@ pub fn demo(image: &Path, json: Option<&Path>, out: &Path, quick: bool) -> Resul
     if let Some(path) = json {
         say::line(format_args!("figures  {}", path.display()));
     }
-    match missed(&figures.checks) {
-        0 => Ok(()),
-        missed => Err(Error::Missed(missed)),
-    }
+    let missed = missed(&figures.checks);
+    if missed == 0 { Ok(()) } else { Err(Error::Failed(missed)) }
 }
 
-/// Serves the board until Ctrl-C.
-pub fn serve(image: &Path, place: &Place, distance_mm: f64) -> Result<(), Error> {
+fn serve(image: &Path, place: &Place, distance_mm: f64) -> Result<(), Error> {
     let mut setup = Setup::default();
     setup.wall.distance_mm = distance_mm;
     let mut board = Board::warm(Rig::new(image, Plant::new(&setup), &Options::confirmed())?)?;
     let mut port = Port::open(place)?;
     let stop = port.stopper();
-    ctrlc::set_handler(move || stop.stop()).map_err(|why| Error::Client(std::io::Error::other(why)))?;
+    ctrlc::set_handler(move || stop.stop()).map_err(std::io::Error::other)?;
     say::line(format_args!("serving  {} (DYNAMIXEL Protocol 2.0, 1 Mbaud, ID 1; Ctrl-C ends)", port.name()));
     std::io::stdout().flush()?;
     let served = ::serve::serve(&mut board, &mut port, LATE, true)?;

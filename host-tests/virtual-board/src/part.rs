@@ -66,7 +66,6 @@ pub struct Part {
     window_watchdog: WindowWatchdog,
     /// Phase of the encoder in its quadrature cycle, 0 to 3.
     quarter: u8,
-    /// nFAULT of the bridge.
     bridge_well: bool,
     front_end: Shared,
     layout: Bus,
@@ -130,7 +129,6 @@ impl Part {
         std::array::from_fn(|nth| Converter::new(nth, front_end.clone(), RESET_HZ / 2))
     }
 
-    /// The host's end of the bus.
     pub fn wire(&mut self) -> &mut Wire {
         self.bus_port.wire()
     }
@@ -159,7 +157,7 @@ impl Part {
         let level = Level::from(well);
         self.hold_pin(at, 1, 12, level);
         let (registers, mut context) = self.chip.bus_mut().drive(at, self.pwm_slot);
-        self.pwm_timer.drive_break(level, registers, &mut context);
+        self.pwm_timer.timer.drive_break(level, registers, &mut context);
     }
 
     fn drive_encoder(&mut self, at: VirtualNanos) {

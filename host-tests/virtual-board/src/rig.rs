@@ -9,7 +9,6 @@ use crate::flash::SECTOR;
 use crate::front_end::{ScanCounts, Shared};
 use crate::image::Firmware;
 use crate::part::Part;
-use crate::scene::finger::Finger;
 use crate::{Error, converter};
 use fingertip::chip::Factory;
 use fingertip::params::Params;
@@ -25,10 +24,9 @@ use std::thread::JoinHandle;
 
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Addresses and bytes that memory holds beside the image, for example a parameter sector.
-    pub presets: Vec<(u64, Vec<u8>)>,
-    /// Bits 3:2 of the option bytes: 0 is the brown-out level 3, as `cargo xtask flash` leaves them, and 3 is off, as
-    /// the factory does.
+    /// First bytes of the parameter sector.
+    pub stored: Vec<u8>,
+    /// Bits 3:2 of the option bytes: 0 is level 3, as `cargo xtask flash` leaves them; 3 is off, as the factory does.
     pub brown_out_bits: u8,
     /// Factory codes of the reference and of the temperature sensor.
     pub factory: Factory,
@@ -41,19 +39,18 @@ impl Options {
         Self::stored(&Record { params, ..Record::DEFAULT })
     }
 
-    /// A board with a record in its flash.
     pub fn stored(record: &Record) -> Self {
-        Self { presets: vec![(SECTOR.start, sim::encode(record, 0))], ..Self::default() }
+        Self { stored: sim::encode(record, 0), ..Self::default() }
     }
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { presets: Vec::new(), brown_out_bits: 0, factory: converter::factory() }
+        Self { stored: Vec::new(), brown_out_bits: 0, factory: converter::factory() }
     }
 }
 
-/// The image, the factory's calibration, and the presets.
+/// The image, the factory's calibration, and the parameter sector.
 fn images(image: &Firmware, options: &Options) -> Result<Vec<Image>, Error> {
     let read = |path: &Path, bytes: Vec<u8>, at| {
         Image::new(path, bytes, at).map_err(|why| Error::NotAnImage(path.into(), why.to_string()))
@@ -63,17 +60,16 @@ fn images(image: &Firmware, options: &Options) -> Result<Vec<Image>, Error> {
     let codes = [reference, cold, hot].map(u16::to_le_bytes);
     let factory = [&converter::UNIQUE_ID[..], codes.as_flattened()].concat();
     images.push(read(Path::new("factory"), factory, Some(converter::FACTORY_AT))?);
-    for (address, bytes) in &options.presets {
-        images.push(read(Path::new("preset"), bytes.clone(), Some(*address))?);
+    if !options.stored.is_empty() {
+        images.push(read(Path::new("parameters"), options.stored.clone(), Some(SECTOR.start))?);
     }
     Ok(images)
 }
 
 type Job = Box<dyn FnOnce(&mut Stand<'_>) + Send>;
 /// A look at the run; returns true while the run goes on.
-type Look = Box<dyn FnMut(&mut Stand<'_>) -> bool + Send>;
+pub type Look = Box<dyn FnMut(&mut Stand<'_>) -> bool + Send>;
 
-/// Orders to the emulator's thread.
 enum Order {
     /// Run to an instant of the grid, then on in steps of this many ns as long as a look behind each wants.
     Run(u64, u64, Look),
@@ -140,22 +136,14 @@ impl Rig {
         self.run_until_ns(self.now_ns + ms * 1_000_000)
     }
 
-    /// Runs in steps of this many ns until a look behind a step returns false. The emulator's thread looks, so a step
-    /// costs no switch between threads.
-    pub fn run_while(
-        &mut self,
-        step_ns: u64,
-        look: impl FnMut(&mut Stand<'_>) -> bool + Send + 'static,
-    ) -> Result<(), Error> {
-        self.order(Order::Run(self.now_ns + step_ns, step_ns, Box::new(look)))?;
+    /// Runs in steps of this many ns until a look behind a step, on the emulator's thread, returns false.
+    pub fn run_while(&mut self, step_ns: u64, look: Look) -> Result<(), Error> {
+        self.order(Order::Run(self.now_ns + step_ns, step_ns, look))?;
         self.await_reached()
     }
 
     /// Executes a job at the present halt, between two instructions.
-    pub fn with<T: Send + 'static>(
-        &mut self,
-        job: impl FnOnce(&mut Stand<'_>) -> T + Send + 'static,
-    ) -> Result<T, Error> {
+    pub fn with<T: Send + 'static>(&mut self, job: impl FnOnce(&mut Stand) -> T + Send + 'static) -> Result<T, Error> {
         let asked = self.ask(job)?;
         self.answer(&asked)
     }
@@ -165,17 +153,6 @@ impl Rig {
         self.with(|stand| match &mut stand.bench.front_end.lock().world {
             Surroundings::Plant(world) => Ok(job(world)),
             Surroundings::Scene(_) => Err(Error::OtherWorld),
-        })?
-    }
-
-    /// The finger in its scene.
-    pub fn finger<T: Send + 'static>(
-        &mut self,
-        job: impl FnOnce(&mut Finger) -> T + Send + 'static,
-    ) -> Result<T, Error> {
-        self.with(|stand| match &mut stand.bench.front_end.lock().world {
-            Surroundings::Scene(finger) => Ok(job(finger)),
-            Surroundings::Plant(_) => Err(Error::OtherWorld),
         })?
     }
 
@@ -254,11 +231,9 @@ pub struct Stand<'a> {
     /// The guest's memory and interrupt lines.
     pub host: &'a mut dyn Host,
     pub stop: Stop,
-    /// All around the board.
     pub bench: &'a mut Bench,
 }
 
-/// Drives a run by orders.
 struct Hall {
     bench: Bench,
     orders: mpsc::Receiver<Order>,

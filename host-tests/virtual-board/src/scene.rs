@@ -47,7 +47,6 @@ const SET_UP_NS: u64 = 9 * MS;
 const WAIT_NS: u64 = 2 * MS;
 /// 3 Mbaud by the protocol's code, and no pause before a reply: a read a millisecond leaves room for goals.
 const BAUD_CODE: u8 = 5;
-/// The unit of the bus watchdog's register.
 const WATCHDOG_MS: i64 = 20;
 
 /// Runs a scene. The times of the board and of the scene's script begin together.
@@ -135,11 +134,10 @@ impl Boards {
         }
         let (mut costs, mut digests) = (self.clock_link.costs().collect::<Vec<_>>(), Vec::new());
         for rig in &mut self.rigs {
-            costs.extend(rig.finger(|finger| finger.costs())?);
+            costs.extend(rig.with(|stand| stand.bench.front_end.lock().world.costs())?);
             // The host is removed: the line is free for other requests.
-            let of_link =
-                rig.with(|stand| stand.bench.host.take().map(|host| host.link.costs().collect::<Vec<_>>()))?;
-            costs.extend(of_link.into_iter().flatten());
+            let host = rig.with(|stand| stand.bench.host.take())?;
+            costs.extend(host.iter().flat_map(|host| host.link.costs()));
             digests.push(rig.trace_hash()?);
         }
         Ok(Summary {
@@ -155,7 +153,6 @@ impl Boards {
 /// Steps to show of a millisecond, and the failure of the board, if there is one.
 type Made = (Vec<Shown>, Option<&'static str>);
 
-/// Starts the next millisecond of a board.
 fn set_out(rig: &mut Rig, now_ns: u64, second_s: f64, wants_pressures: bool) -> Result<Receiver<Made>, Error> {
     rig.post(move |Stand { bench, .. }| {
         if let Surroundings::Scene(finger) = &mut bench.front_end.lock().world {
@@ -176,9 +173,8 @@ fn set_out(rig: &mut Rig, now_ns: u64, second_s: f64, wants_pressures: bool) -> 
 /// Tares and enables torque before the scene begins.
 fn set_up(rig: &mut Rig, scene: &Scene, start_ns: u64) -> Result<(), Error> {
     rig.run_until_ns(BOOT_NS)?;
-    if let Some(reset) = rig.resets()?.first() {
-        let why = format!("the board does not start: it resets, by {}", reset.cause);
-        return Err(Error::Host(reset.at_ns, why));
+    if let Some((cause, at_ns)) = rig.resets()?.pop() {
+        return Err(Error::Host(at_ns, format!("the board does not start: it resets, by {cause}")));
     }
     write_u8(rig, "tare", address::TARE, 1)?;
     rig.run_until_ns(start_ns - 4 * MS)?;
@@ -203,16 +199,14 @@ fn set_up(rig: &mut Rig, scene: &Scene, start_ns: u64) -> Result<(), Error> {
 
 /// Offset from the converters' frame number to the image's own, which is in memory at the symbol.
 ///
-/// The status alone does not tell it: by how many frames an answer is late at the least depends on the load of the
-/// core.
+/// The status alone does not tell it: the least delay of an answer depends on the load of the core.
 fn frame_offset(rig: &mut Rig) -> Result<u32, Error> {
     let Some(address) = rig.image().item("scan", "SEQUENCE") else {
         let why = "the image has no counter of frames named `scan::SEQUENCE`".into();
         return Err(Error::Host(rig.now_ns(), why));
     };
     let mut offset = i32::MIN;
-    // Where a frame has just ended the image is about to count it: of several looks the largest difference is the right
-    // one.
+    // Just after a frame's end the image has not counted it yet: the largest difference of several looks is right.
     for _ in 0..3 {
         rig.run_until_ns(rig.now_ns() + MS / 10)?;
         let (number, frames) = rig.with(move |stand| {

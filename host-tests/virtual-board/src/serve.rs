@@ -56,8 +56,7 @@ impl Board {
 
 /// Has a client ask the board, which must answer.
 fn asked<E: Display + Send>(rig: &mut Rig, job: fn(&mut Client) -> Result<(), E>) -> Result<(), Error> {
-    let silent = |why| Error::Client(std::io::Error::other(format!("the board does not answer: {why}")));
-    rig.client(WAIT_NS, job)?.map_err(silent)
+    rig.client(WAIT_NS, job)?.map_err(|why| std::io::Error::other(format!("the board does not answer: {why}")).into())
 }
 
 impl Finger for Board {

@@ -86,8 +86,7 @@ impl Streams {
         }
     }
 
-    /// In a scene: uses a row's word to begin a slot of both converters instead of moving it; requests the next word if
-    /// more updates have passed.
+    /// In a scene: begins a slot of both converters by a row's word, and requests the next one if updates have passed.
     fn begin_slot(&mut self, stream: usize, word: u64, context: &mut DeviceContext<'_>) -> bool {
         let state = &self.streams[stream];
         let mut front_end = self.front_end.lock();
@@ -102,7 +101,6 @@ impl Streams {
         true
     }
 
-    /// Items have been moved.
     fn count(&mut self, stream: usize, items: u64, registers: &mut RegisterFile) {
         let state = &mut self.streams[stream];
         let before = state.items - state.left;
@@ -273,7 +271,6 @@ const STREAMS: usize = 8;
 /// Registers of a stream, and the first stream's first.
 const STREAM_ROWS: usize = 6;
 const FIRST_ROW: usize = 4;
-/// A stream's flags in the status registers.
 const TRANSFER_ERROR: u64 = 1 << 3;
 const HALF: u64 = 1 << 4;
 const COMPLETE: u64 = 1 << 5;

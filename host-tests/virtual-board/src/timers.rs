@@ -2,16 +2,13 @@
 
 use crate::front_end::Shared;
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
-use rigless::soc::RegisterSpec;
 use rigless::soc::stm32f427::generated::tim1::{bdtr, ccer, ccmr1_output, cr1, egr};
 use rigless::soc::stm32f427::peripherals::tim::{Advanced, Channel, Counter, Family, Tim, UPDATE_REQUEST};
 use rigless::time::{EventId, VirtualNanos};
 
 type Register = <Advanced as Family>::Register;
 
-/// TIM1 of the part.
-///
-/// The bridge's timer, which sleeps while its registers do not change.
+/// TIM1, the bridge's timer, which sleeps while its registers do not change.
 ///
 /// The crate's timer wakes at each edge that it makes, 50,000 times a virtual second, and the emulated core is stopped
 /// each time. Nothing depends on these edges: the world only uses the duty, which follows from the registers in use
@@ -19,7 +16,7 @@ type Register = <Advanced as Family>::Register;
 /// then sleeps until it is read or written; it then catches up by itself.
 #[derive(Debug)]
 pub struct PwmTimer {
-    timer: Tim<Advanced>,
+    pub timer: Tim<Advanced>,
     clock_hz: u64,
     awake_until_ns: u64,
     on: bool,
@@ -56,11 +53,6 @@ impl PwmTimer {
         registers.get(Register::Arr) + 1
     }
 
-    /// The bridge's nFAULT.
-    pub fn drive_break(&mut self, level: Level, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
-        self.timer.drive_break(level, registers, context);
-    }
-
     /// Keeps the timer awake until the present period has ended and written values are in use, rounded up to 1 ns.
     fn wake(&mut self, registers: &RegisterFile, now: VirtualNanos) {
         let cycles = self.period_ticks(registers) * (registers.get(Register::Psc) + 1);
@@ -70,10 +62,6 @@ impl PwmTimer {
 
 impl Device for PwmTimer {
     type Register = Register;
-
-    fn layout(&self) -> &'static [RegisterSpec] {
-        Device::layout(&self.timer)
-    }
 
     fn read(&mut self, register: Register, file: &mut RegisterFile, context: &mut DeviceContext<'_>) -> Option<u64> {
         // No edge changes it, so the timer sleeps on: a break does, at once.
@@ -129,10 +117,7 @@ pub const COMPARE_1: usize = 32;
 const PWM_MODE_2: u64 = 0b111;
 const CHANNEL_1: Channel = Channel::new(1).expect("timers have a channel 1");
 
-/// TIM8 of the part.
-///
-/// A timer that reports two events which the crate's timer does not: the edge of its first channel, and that its update
-/// request was served.
+/// TIM8. Reports two events that the crate's timer does not: its first channel's edge, and a served update request.
 ///
 /// In a scene the edge is no separate event, and only updates that raise an interrupt are events, see
 /// [`crate::front_end::Scan`]: the timer sleeps through the other updates, and catches up with them.
@@ -252,10 +237,6 @@ impl ScanTimer {
 
 impl Device for ScanTimer {
     type Register = Register;
-
-    fn layout(&self) -> &'static [RegisterSpec] {
-        Device::layout(&self.timer)
-    }
 
     fn read(&mut self, register: Register, file: &mut RegisterFile, context: &mut DeviceContext<'_>) -> Option<u64> {
         let value = Device::read(&mut self.timer, register, file, context);

@@ -13,7 +13,6 @@ const END: u64 = 0x40;
 /// Cycles of APB1 in a tick at the quickest.
 const CYCLES: u64 = 4_096;
 
-/// WWDG of the part.
 #[derive(Debug, Default)]
 pub struct WindowWatchdog {
     pub clock_hz: u64,

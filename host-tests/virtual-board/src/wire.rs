@@ -4,7 +4,6 @@ use rigless::chip::Timeline;
 use rigless::chip::uart::Peer;
 use rigless::device::{Device, DeviceContext, RegisterFile};
 use rigless::snapshot::Store;
-use rigless::soc::RegisterSpec;
 use rigless::soc::stm32f427::generated::usart6::{Register, cr3, sr};
 use rigless::soc::stm32f427::peripherals::usart::{Kind, Usart};
 use rigless::time::{EventId, VirtualNanos};
@@ -22,7 +21,8 @@ pub struct TimedByte {
 #[derive(Debug, Default)]
 pub struct Wire {
     outgoing: VecDeque<(u64, u8)>,
-    incoming: Vec<TimedByte>,
+    /// Bytes that the image has sent and nobody has taken.
+    pub incoming: Vec<TimedByte>,
     /// Single-wire mode: the receiver is on the transmit pin and receives what the port sends.
     pub single: bool,
 }
@@ -44,11 +44,6 @@ impl Wire {
     /// Bytes that have not started yet.
     pub fn pending(&self) -> usize {
         self.outgoing.len()
-    }
-
-    /// Takes what the image has sent since the last time.
-    pub fn take_received(&mut self) -> Vec<TimedByte> {
-        std::mem::take(&mut self.incoming)
     }
 }
 
@@ -73,8 +68,7 @@ impl Peer for Wire {
 // port asks for the DMA [`FETCH_NS`] later. A read of the data register in between consumes the byte, as on the part:
 // the DMA never sees it, and no flag reports the loss.
 
-/// Time from a stop bit's end to the DMA's read: ten cycles of the core, for arbitration, bus matrix and bridge. An
-/// estimate.
+/// Time from a stop bit's end to the DMA's read: ten cycles of the core, for arbitration and bridge; an estimate.
 const FETCH_NS: u64 = 60;
 
 /// USART2 of the microcontroller, at which the bus is.
@@ -92,7 +86,6 @@ impl BusPort {
         Self { port, fetch: None }
     }
 
-    /// The host's end of the bus.
     pub fn wire(&mut self) -> &mut Wire {
         self.port.chip_mut().expect("the wire was attached when the port was made")
     }
@@ -100,10 +93,6 @@ impl BusPort {
 
 impl Device for BusPort {
     type Register = Register;
-
-    fn layout(&self) -> &'static [RegisterSpec] {
-        Device::layout(&self.port)
-    }
 
     fn on_clock(&mut self, hz: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         Device::on_clock(&mut self.port, hz, registers, context);

@@ -1,21 +1,14 @@
 //! What the bus of the flash image does in time: the frames' times, the line's direction, the bridge, and much traffic.
 
-use crate::common::{
-    PING, WAIT_NS, fast_bus, hold_again, holding, let_go, on_bus, poke, read_u8, read_u32, travel_mm, write_and_run_ms,
-};
-use fingertip::link::Reply;
-use fingertip::link::packet::Sender;
+use crate::common::*;
+use fingertip::link::packet::{BROADCAST, instruction};
 use fingertip::params::Params;
 use fingertip::shipped::{CLOCKS, Config, REGISTERS, TAXELS, address};
 use rigless::soc::stm32f427::generated::USART2;
 use virtual_board::Rig;
-use virtual_board::client::Client;
+use virtual_board::client::{Client, packet};
 
-sim::sizes!(
-    a_host_finds_what_it_expects_on_the_bus_of_a_board_that_holds_1_n,
-    a_fast_bus(20_000),
-    a_fast_bus(1_000_000)
-);
+sim::sizes!(a_host_finds_what_it_expects_on_the_bus_of_a_board_at_1_n, a_fast_bus(20_000), a_fast_bus(1_000_000));
 
 /// A bus of 3 Mbaud, the fastest that a host can set.
 fn a_fast_bus(noisy_bytes: usize) {
@@ -65,14 +58,6 @@ fn frames_have_true_times(rig: &mut Rig) {
     }
     let force_mn = first.word(address::PICTURE_FORCE_MN);
     assert!((980..=1_020).contains(&force_mn), "{force_mn} mN");
-}
-
-fn broadcast(instruction: u8, params: &[u8]) -> Vec<u8> {
-    let mut packet = Reply::new();
-    let mut sender = Sender::new(&mut packet, 254, instruction);
-    params.iter().for_each(|byte| sender.push(*byte));
-    sender.finish();
-    packet.to_vec()
 }
 
 /// The stop bit ends at many instants of a frame, also while control computes a fit.
@@ -128,8 +113,7 @@ fn turning_the_bridge_on_keeps_the_phase_of_the_pwm(rig: &mut Rig) {
     assert_eq!((turned_on, restarted), (TURNS, 0));
 }
 
-/// The deepest calls: all pictures read at once, then with torque off a parameter changed, which makes a configuration,
-/// and everything saved.
+/// The deepest calls: all pictures read at once, a parameter changed with torque off, and everything saved.
 fn at_least_half_of_the_stack_is_never_used(rig: &mut Rig) {
     hold_again(rig);
     let read = |bus: &mut Client| {
@@ -149,7 +133,6 @@ fn at_least_half_of_the_stack_is_never_used(rig: &mut Rig) {
 
 // Much traffic: no byte is lost, and noise moves nothing. `host-tests/tests/link/table.rs` tries all values out of their ranges.
 
-/// Packets at each speed.
 const PACKETS: u64 = 1_000;
 
 /// Reads with pauses of 10 to 110 us: the image takes some of them while the next one arrives.
@@ -160,7 +143,7 @@ fn no_byte_of_a_fast_bus_is_lost(rig: &mut Rig) {
         let before = read_u32(rig, address::GOOD_PACKETS);
         let end_ns = rig
             .with(move |stand| {
-                let packet = broadcast(2, &[0, 0, 4, 0]);
+                let packet = packet(BROADCAST, instruction::READ, &[0, 0, 4, 0]);
                 let packet_ns = packet.len() as u64 * 10 * 1_000_000_000 / baud;
                 (0..PACKETS).fold(stand.bench.next_ns, |at_ns, nth| {
                     stand.session.board_mut().wire().send(at_ns, &packet);

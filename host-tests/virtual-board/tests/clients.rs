@@ -104,8 +104,7 @@ impl Board {
     }
 
     fn interrupt(mut self) -> bool {
-        let pid = i32::try_from(self.child.id()).expect("a process number");
-        let pid = rustix::process::Pid::from_raw(pid).expect("a process number");
+        let pid = rustix::process::Pid::from_child(&self.child);
         rustix::process::kill_process(pid, rustix::process::Signal::INT).expect("it runs");
         self.child.wait().expect("it ends").success()
     }

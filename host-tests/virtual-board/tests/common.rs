@@ -8,7 +8,7 @@ use rigless::emulator::{Access, AccessKind};
 use rigless::soc::Width;
 use sim::plant::{Plant, Setup};
 use std::fmt::Debug;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use virtual_board::client::Client;
 use virtual_board::{Options, Rig};
 
@@ -22,7 +22,6 @@ pub fn image() -> PathBuf {
     named("FINGERTIP_IMAGE")
 }
 
-/// Path that a variable of the environment names.
 pub fn named(variable: &str) -> PathBuf {
     let path = std::env::var_os(variable);
     path.unwrap_or_else(|| panic!("{variable} must be set: run `cargo xtask test`, which does")).into()
@@ -60,7 +59,6 @@ pub fn write_goal(rig: &mut Rig, goal_mn: u32) {
     write_u32(rig, address::GOAL_FORCE_MN, goal_mn);
 }
 
-/// Turns torque on with a goal.
 pub fn drive(rig: &mut Rig, goal_mn: u32) {
     write_u8(rig, address::TORQUE_ENABLE, 1);
     write_goal(rig, goal_mn);
@@ -108,7 +106,6 @@ pub fn read_u32(rig: &mut Rig, register: u16) -> u32 {
     on_bus(rig, move |bus| bus.read_u32(1, register).map(|reply| reply.data))
 }
 
-/// Reboots the board, and gives it time to start.
 pub fn reboot(rig: &mut Rig, ms: u64) {
     on_bus(rig, |bus| bus.reboot(1).map(drop));
     rig.run_ms(ms).expect("it runs");
@@ -150,14 +147,6 @@ pub fn away(distance_mm: f64) -> Setup {
     setup
 }
 
-/// A file of this test program's in the build folder.
-pub fn scratch(name: &str) -> PathBuf {
-    let program = std::env::current_exe().expect("it runs");
-    let folder = program.parent().and_then(Path::parent).expect("target/debug/deps").join("scratch");
-    std::fs::create_dir_all(&folder).expect("the build folder can be written");
-    folder.join(format!("{}-{name}", program.file_stem().expect("it has a name").display()))
-}
-
 pub fn write_param(rig: &mut Rig, name: &str, value: u32) {
     write_u32(rig, register(name), value);
     // A changed parameter restarts the scan.
@@ -188,7 +177,6 @@ pub fn holding(options: &Options) -> Rig {
     rig
 }
 
-/// Has a board hold 1 N again.
 pub fn hold_again(rig: &mut Rig) {
     drive(rig, 1_000);
     let mut held_ms = 0;
@@ -202,7 +190,6 @@ pub fn hold_again(rig: &mut Rig) {
     panic!("1 N is not held again within 200 ms");
 }
 
-/// True force of the tip.
 pub fn force_n(rig: &mut Rig) -> f64 {
     rig.world(|world| world.force_n()).expect("it runs")
 }
@@ -218,8 +205,7 @@ pub fn causes_since(rig: &mut Rig, from_ns: u64) -> Vec<String> {
 
 /// Causes and times of all resets after a time, in their order.
 pub fn resets_since(rig: &mut Rig, from_ns: u64) -> Vec<(String, u64)> {
-    let resets = rig.resets().expect("it runs").into_iter().filter(|reset| reset.at_ns > from_ns);
-    resets.map(|reset| (reset.cause, reset.at_ns)).collect()
+    rig.resets().expect("it runs").into_iter().filter(|(_, at_ns)| *at_ns > from_ns).collect()
 }
 
 pub fn frames(rig: &mut Rig) -> u64 {

@@ -1,11 +1,8 @@
 //! Jog, strokes and a press over the bus, on the flash image: each completes, and its record is read and parsed by the
 //! host's solver. At the usual size strokes and press are stopped on their way.
 
-use crate::common::{
-    away, drive, fast_bus, let_go, on_bus, read_u8, read_u8_beside_a_capture, read_u16, read_u32, reboot, refused,
-    running, write_and_run_ms, write_goal, write_param, write_u8, write_u16,
-};
-use fingertip::capture::{Ended, Head};
+use crate::common::*;
+use fingertip::capture::{CaptureState, Ended, Head};
 use fingertip::measure::{MeasureState, Task};
 use fingertip::params::Params;
 use fingertip::shipped::{CAPTURE_BYTES, CLOCKS, COLUMNS, ROWS, address};
@@ -97,10 +94,6 @@ sim::sizes!(motions_are_recorded_and_what_they_measure_is_solved, motions(false)
 // A capture over the bus, on the flash image: it replays to the bit on this machine, also with calibrated gains; and
 // what becomes of one that is asked for out of turn, interrupted, or read while it is under way.
 
-const NONE: u8 = 0;
-const ARMED: u8 = 1;
-const RECORDING: u8 = 2;
-const DONE: u8 = 3;
 /// Errors of a status packet.
 const RESULT: u8 = 1;
 const ACCESS: u8 = 7;
@@ -126,10 +119,14 @@ fn captures_replay() {
     a_reset_in_the_middle_leaves_nothing(rig);
 }
 
+fn capture_state(rig: &mut Rig) -> u8 {
+    read_u8(rig, address::CAPTURE_STATE)
+}
+
 /// Arms, tares, and presses with half a newton from then on.
 fn press(rig: &mut Rig) {
     write_and_run_ms(rig, address::CAPTURE, 1, 1);
-    assert_eq!(read_u8(rig, address::CAPTURE_STATE), ARMED);
+    assert_eq!(capture_state(rig), CaptureState::Armed as u8);
     write_u8(rig, address::TARE, 1);
     drive(rig, 500);
     rig.run_ms(1).expect("it runs");
@@ -138,11 +135,11 @@ fn press(rig: &mut Rig) {
 fn until_done(rig: &mut Rig) {
     for _ in 0..100 {
         rig.run_ms(5).expect("it runs");
-        if read_u8_beside_a_capture(rig, address::CAPTURE_STATE) == DONE {
+        if read_u8_beside_a_capture(rig, address::CAPTURE_STATE) == CaptureState::Done as u8 {
             return;
         }
     }
-    panic!("state {}, {} frames", read_u8(rig, address::CAPTURE_STATE), read_u32(rig, address::CAPTURE_FRAMES));
+    panic!("state {}, {} frames", capture_state(rig), read_u32(rig, address::CAPTURE_FRAMES));
 }
 
 /// Reads windows of a capture from the first byte to this length or beyond.
@@ -185,7 +182,7 @@ fn a_press_replays_to_the_bit(rig: &mut Rig) -> Head<ROWS, COLUMNS> {
     let missed = read_u32(rig, address::MISSED_FRAMES);
     let before_us = read_u16(rig, address::LOOP_TIME_MAX_US);
     press(rig);
-    assert_eq!((read_u8(rig, address::CAPTURE_STATE), read_u32(rig, address::CAPTURE_BYTES)), (RECORDING, 0));
+    assert_eq!((capture_state(rig), read_u32(rig, address::CAPTURE_BYTES)), (CaptureState::Recording as u8, 0));
     // Read while it is under way: nothing, and no harm.
     assert_eq!(windows(rig, 1), [0; WINDOW as usize]);
     assert_eq!(refused(rig, address::CAPTURE, &[1]), ACCESS, "with torque on");
@@ -208,16 +205,16 @@ fn out_of_turn_and_interrupted(rig: &mut Rig) {
     // Armed twice is armed; called off is off.
     write_and_run_ms(rig, address::CAPTURE, 1, 1);
     write_and_run_ms(rig, address::CAPTURE, 1, 1);
-    assert_eq!(read_u8(rig, address::CAPTURE_STATE), ARMED);
+    assert_eq!(capture_state(rig), CaptureState::Armed as u8);
     write_and_run_ms(rig, address::CAPTURE, 0, 1);
-    assert_eq!(read_u8(rig, address::CAPTURE_STATE), NONE);
+    assert_eq!(capture_state(rig), CaptureState::None as u8);
 
     // Parameters between arming and the tare: those of the tare count.
     write_and_run_ms(rig, address::CAPTURE, 1, 1);
     write_param(rig, "modulus_pa", 260_000);
-    assert_eq!(read_u8(rig, address::CAPTURE_STATE), ARMED);
+    assert_eq!(capture_state(rig), CaptureState::Armed as u8);
     write_and_run_ms(rig, address::TARE, 1, 8);
-    assert_eq!(read_u8(rig, address::CAPTURE_STATE), RECORDING);
+    assert_eq!(capture_state(rig), CaptureState::Recording as u8);
     assert_eq!(refused(rig, address::CAPTURE, &[1]), RESULT, "frames are being kept");
     write_and_run_ms(rig, address::CAPTURE, 0, 1);
     let (replayed, _, _) = same(rig);
@@ -238,6 +235,6 @@ fn a_reset_in_the_middle_leaves_nothing(rig: &mut Rig) {
     write_and_run_ms(rig, address::CAPTURE, 1, 1);
     write_and_run_ms(rig, address::TARE, 1, 5);
     reboot(rig, 30);
-    assert_eq!((read_u8(rig, address::CAPTURE_STATE), read_u8(rig, address::CAPTURE_COUNT)), (NONE, 0));
+    assert_eq!((capture_state(rig), read_u8(rig, address::CAPTURE_COUNT)), (CaptureState::None as u8, 0));
     assert_eq!((read_u32(rig, address::CAPTURE_BYTES), windows(rig, 1)), (0, vec![0; WINDOW.into()]));
 }

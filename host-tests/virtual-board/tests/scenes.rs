@@ -1,10 +1,11 @@
 //! Scenes with the flash image: it does what the native board does, and what is made of a run holds.
 
-use crate::common::{image, scratch};
+use crate::common::image;
 use sim::cores;
 use sim::demo::{draw, missed, table};
 use sim::scene::{self, Scene, read};
-use sim::watch::{Agreement, BEYOND_MM, BEYOND_N, Controller, Path, Step, Summary, Watch};
+use sim::watch::{Agreement, BEYOND_MM, BEYOND_N, Controller, Step, Summary, Watch};
+use std::path::Path;
 use virtual_board::demo;
 use virtual_board::scene::simulate;
 
@@ -61,7 +62,7 @@ fn run(scene: &Scene, watch: &mut dyn Watch) -> Summary {
 
 /// The path of the native board in a scene, to which another board's is compared.
 fn native(of: &Scene) -> Agreement {
-    let mut path = Path::default();
+    let mut path = sim::watch::Path::default();
     sim::simulate(of, &mut path).expect("the scene runs natively");
     Agreement::new(of, path)
 }
@@ -154,7 +155,6 @@ fn long_two_boards_hold_one_object() {
 
 // The library of scenes with the flash image: each holds its bounds there, too.
 
-/// Runs a scene. Says which bounds it breaks.
 fn broken(name: &str) -> Vec<String> {
     let scene = sim::cli::load(name, &[], None).unwrap_or_else(|error| panic!("{error}"));
     let outcome = sim::run::run(&scene, &|scene, watch| Ok(simulate(&image(), scene, watch)?), &mut []);
@@ -167,11 +167,7 @@ fn broken(name: &str) -> Vec<String> {
 /// Scene of the usual size: all effects at once, on a free object that two fingers hold.
 const USUAL: &str = "everything";
 
-sim::sizes!(
-    scenes_of_the_library_hold_their_bounds_on_the_image,
-    assert_eq!(broken(USUAL), [""; 0]),
-    every_other_scene()
-);
+sim::sizes!(the_library_holds_its_bounds_on_the_image, assert_eq!(broken(USUAL), [""; 0]), every_other_scene());
 
 fn every_other_scene() {
     let mut names = scene::library_names().expect("the library is there");
@@ -202,7 +198,7 @@ fn every_bound_holds_and_the_pictures_are_drawn() {
         assert!((sum_n - picture.goal_n).abs() < 0.03 * picture.goal_n, "{sum_n} N in {picture:?}");
     }
 
-    let folder = scratch("pictures");
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("pictures");
     let drawn = draw(&run, &figures.forces, &folder).expect("the pictures are drawn");
     for path in &drawn {
         let svg = std::fs::read_to_string(path).expect("it was written");

@@ -1,5 +1,4 @@
-//! The microcontroller's temperature and the analogue supply as the board measures them while it runs, and the drift that
-//! it computes from them.
+//! Temperature and analogue supply as the board measures them, and the drift that it computes from them.
 
 use crate::common::{drive, image, poke, read_u16, read_u32, write_and_run_ms, write_param, write_u8};
 use fingertip::chip::Factory;
@@ -50,7 +49,7 @@ fn warming(factory: Factory) -> Rig {
 
 fn true_c(rig: &mut Rig) -> f64 {
     let now_ns = rig.now_ns();
-    rig.finger(move |finger| finger.chip_c(now_ns)).expect("it runs")
+    rig.with(move |stand| stand.bench.front_end.lock().world.chip_c(now_ns)).expect("it runs")
 }
 
 #[test]

@@ -1,9 +1,7 @@
 //! The loop's time on the flash image, on a contact half of which is off the array, so that it is refined.
 
-use crate::common::{
-    away, drive, force_n, let_go, read_u8, read_u8_beside_a_capture, read_u16, read_u32, register, running,
-    write_and_run_ms, write_param, write_u8, write_u32,
-};
+use crate::common::*;
+use fingertip::capture::CaptureState;
 use fingertip::contact::FitLevel;
 use fingertip::params::Params;
 use fingertip::shipped::{Record, address};
@@ -18,8 +16,6 @@ const CORRECTED: Params = Params {
     direction_confirmed: 1,
     ..Params::DEFAULT
 };
-const RECORDING: u8 = 2;
-const DONE: u8 = 3;
 
 #[test]
 fn the_fit_level_keeps_within_its_time() {
@@ -47,9 +43,9 @@ fn corrections_and_a_capture_leave_the_fit_level_its_time(rig: &mut Rig) {
     rig.run_ms(40).expect("it runs");
     let told = [address::PRESENT_MODE, address::FIT_LEVEL_IN_USE, address::CAPTURE_STATE]
         .map(|register| read_u8_beside_a_capture(rig, register));
-    assert_eq!(told, [Mode::Force as u8, FitLevel::default() as u8, RECORDING]);
+    assert_eq!(told, [Mode::Force as u8, FitLevel::default() as u8, CaptureState::Recording as u8]);
     rig.run_ms(400).expect("it runs");
-    assert_eq!(read_u8_beside_a_capture(rig, address::CAPTURE_STATE), DONE);
+    assert_eq!(read_u8_beside_a_capture(rig, address::CAPTURE_STATE), CaptureState::Done as u8);
     assert!(!Limits(read_u16(rig, address::LIMITS)).has(Limits::FIT_LEVEL));
     assert_eq!(read_u32(rig, address::MISSED_FRAMES), 0);
     let longest_us = read_u16(rig, address::LOOP_TIME_MAX_US);

@@ -72,9 +72,9 @@ pub fn scan(args: &Scan, reach: &Reach, json: bool) -> Result<(), Error> {
 
 /// Registers that `info` shows beside identity and state.
 const SHOWN: &str = "chip_id return_delay_time torque_enable bus_watchdog hardware_error_status supply_mv \
-                     loop_time_max_us missed_frames bad_taxels tare_state saved_state fit_level fit_level_in_use reset_cause \
-                     crash_cause crash_count good_packets result_errors instruction_errors crc_errors range_errors \
-                     length_errors limit_errors access_errors framing_errors";
+                     loop_time_max_us missed_frames bad_taxels tare_state saved_state fit_level fit_level_in_use \
+                     reset_cause crash_cause crash_count good_packets result_errors instruction_errors crc_errors \
+                     range_errors length_errors limit_errors access_errors framing_errors";
 
 /// Name of a register whose number has the register's scale in it.
 fn scaled_name(register: &Register) -> String {

@@ -25,9 +25,7 @@ pub struct Seen {
     /// Scene time at which its last conversion ended, s.
     pub time_s: f64,
     pub frame: Frame,
-    /// Encoder and supply.
     pub sense: Sense,
-    /// State of the world at this time.
     pub truth: Truth,
 }
 
@@ -64,7 +62,6 @@ impl Clock {
 }
 
 pub struct Finger {
-    /// The scene's time.
     pub clock: Clock,
     /// True if the next frames need their true pressures.
     pub wants_pressures: bool,
@@ -75,12 +72,13 @@ pub struct Finger {
     joint: Joint,
     sensor: sensor::Named,
     readout: Readout,
-    reference_v: f64,
+    pub reference_v: f64,
     /// Slots to come, and those sampled: the instants at which they begin.
     expected: VecDeque<(u64, u16)>,
     sampled: VecDeque<(u64, u16, [u16; COLUMNS])>,
     frame: Frame,
-    seen: Vec<Seen>,
+    /// Frames that nobody has taken yet.
+    pub seen: Vec<Seen>,
 }
 
 impl std::fmt::Debug for Finger {
@@ -150,22 +148,13 @@ impl Finger {
         self.sensor.chip_c(self.clock.time_s(at_ns)).unwrap_or(ROOM_C)
     }
 
-    /// Counts of the encoder at a board time.
     pub fn encoder_counts(&self, at_ns: u64) -> i32 {
         self.joint.encoder_counts(self.clock.time_s(at_ns))
     }
 
-    pub fn reference_v(&self) -> f64 {
-        self.reference_v
-    }
-
-    /// A column's code in the sequence that began at an instant. A sequence is sampled at once, at its beginning: both
+    /// The columns' codes in the sequence that began at an instant. A sequence is sampled at once, at its beginning: both
     /// converters see one and the same readout of the slot.
-    pub fn code(&mut self, column: usize, rows: u16, begun_ns: u64) -> u16 {
-        self.slot(rows, begun_ns)[column]
-    }
-
-    fn slot(&mut self, rows: u16, begun_ns: u64) -> [u16; COLUMNS] {
+    pub fn slot(&mut self, rows: u16, begun_ns: u64) -> [u16; COLUMNS] {
         if let Some((_, _, codes)) = self.sampled.iter().find(|(ns, driven, _)| (*ns, *driven) == (begun_ns, rows)) {
             return *codes;
         }
@@ -198,11 +187,6 @@ impl Finger {
         let (sense, truth) = self.joint.look(self.wants_pressures);
         self.frame.sequence = number as u32;
         self.seen.push(Seen { number, end_ns, time_s, frame: self.frame, sense, truth });
-    }
-
-    /// Takes the frames made since the last time.
-    pub fn take_seen(&mut self) -> Vec<Seen> {
-        std::mem::take(&mut self.seen)
     }
 
     /// Costs of the effects on sensor, contact and drive.
@@ -316,8 +300,7 @@ impl Joint {
         Ok((0..fingers).map(joint).collect())
     }
 
-    /// Goes on to an instant of the board with this finger's bridge held. Where fingers share the world it moves by
-    /// whole steps of the grid.
+    /// Goes on to an instant with this finger's bridge held. A shared world moves by whole steps of the grid.
     fn advance(&mut self, to_ns: u64, clock: &Clock, bridge: Bridge) {
         let to_s = clock.time_s(to_ns);
         if !self.shared {
@@ -355,12 +338,10 @@ impl Joint {
         }
     }
 
-    /// Present scene time of the world, s.
     fn now_s(&self) -> f64 {
         self.meeting.lock().now_s
     }
 
-    /// Counts of the encoder at a scene time.
     fn encoder_counts(&self, time_s: f64) -> i32 {
         let mut state = self.meeting.lock();
         let ahead_s = (time_s - state.now_s).max(0.0);

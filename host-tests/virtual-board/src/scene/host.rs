@@ -6,12 +6,12 @@
 
 use super::MS;
 use super::finger::{Clock, Seen};
+use crate::client::packet;
 use crate::wire::{TimedByte, Wire};
 use fingertip::command::Command;
 use fingertip::config::newtons;
 use fingertip::contact::Contact;
-use fingertip::link::Reply;
-use fingertip::link::packet::{Event, Receiver, Sender, instruction};
+use fingertip::link::packet::{Event, Receiver, instruction};
 use fingertip::pipeline::Status;
 use fingertip::shipped::address;
 use fingertip::state::{Fault, Limits, Mode};
@@ -50,13 +50,6 @@ struct Sent {
     write: Write,
 }
 
-/// A read that is not answered yet.
-#[derive(Clone, Copy, Debug)]
-struct Asked {
-    at_ns: u64,
-    for_grip: bool,
-}
-
 #[derive(Clone, Copy, Debug)]
 pub struct Shown {
     finger: usize,
@@ -93,7 +86,8 @@ pub struct Host {
     line_free_ns: u64,
     /// Times at which requests of the grip must arrive, ns.
     asks_ns: VecDeque<u64>,
-    asked: Option<Asked>,
+    /// A read that is not answered yet: its time, ns, and true if it is for the grip.
+    asked: Option<(u64, bool)>,
     /// Time of the next status read, and time between two, ns: whole milliseconds.
     look_ns: u64,
     look_every_ns: u64,
@@ -115,15 +109,8 @@ pub struct Host {
     every_frame: bool,
 }
 
-impl std::fmt::Debug for Host {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Host").field("finger", &self.finger).field("asked", &self.asked).finish_non_exhaustive()
-    }
-}
-
 impl Host {
-    /// Host before the start, with its link to the board, the frame time, and the offset from the converters' frame
-    /// numbers to the board's.
+    /// Host before the start; `offset` leads from the converters' frame numbers to the board's.
     pub fn new(scene: &Scene, finger: usize, link: Named, start_ns: u64, frame_ns: u64, offset: u32) -> Self {
         let watchdog_ms = scene.table("host").whole("watchdog_ms") as u64;
         let least_ns = (scene.duration_s * 1e9 / LOOKS) as u64;
@@ -172,8 +159,7 @@ impl Host {
         }
     }
 
-    /// Acts once: processes bytes of the board and frames since the last time, and sends the packets that are due
-    /// before the next time.
+    /// Acts once: processes bytes and frames since the last time, and sends the packets due before the next.
     pub fn turn(&mut self, now_ns: u64, next_ns: u64, received: Vec<TimedByte>, seen: Vec<Seen>, wire: &mut Wire) {
         self.frames.extend(seen);
         while self.frames.len() > FRAMES {
@@ -201,7 +187,7 @@ impl Host {
     fn answered(&mut self, status: Status, at_ns: u64) {
         self.status = status;
         self.ready |= !status.limits.has(Limits::NOT_TARED);
-        if self.asked.take().is_some_and(|asked| asked.for_grip) {
+        if self.asked.take().is_some_and(|(_, for_grip)| for_grip) {
             self.host.hear(self.clock.time_s(at_ns), Reading::of(&status));
         }
         let number = status.sequence.wrapping_sub(self.offset);
@@ -237,11 +223,11 @@ impl Host {
                 self.asks_ns.push_back(self.clock.at_ns(arrives_s));
             }
         }
-        if self.asked.is_none_or(|asked| now_ns > asked.at_ns + LOST_NS) {
+        if self.asked.is_none_or(|(at_ns, _)| now_ns > at_ns + LOST_NS) {
             self.asked = self.read(now_ns, next_ns);
-            if let Some(asked) = self.asked {
-                wire.send(asked.at_ns, &read());
-                self.line_free_ns = asked.at_ns + REQUEST_NS + GAP_NS;
+            if let Some((at_ns, _)) = self.asked {
+                wire.send(at_ns, &read());
+                self.line_free_ns = at_ns + REQUEST_NS + GAP_NS;
             }
         }
     }
@@ -255,7 +241,7 @@ impl Host {
     }
 
     /// A read that goes out before the next turn, if one is due and the line is free for it.
-    fn read(&mut self, now_ns: u64, next_ns: u64) -> Option<Asked> {
+    fn read(&mut self, now_ns: u64, next_ns: u64) -> Option<(u64, bool)> {
         let for_grip = self.asks_ns.front().is_some_and(|arrives_ns| *arrives_ns < next_ns + REQUEST_NS);
         let due_ns =
             if for_grip { self.asks_ns[0].saturating_sub(REQUEST_NS) } else { self.look_due_ns(now_ns, next_ns)? };
@@ -267,7 +253,7 @@ impl Host {
             self.asks_ns.pop_front();
         }
         self.look_ns = (at_ns + 1).next_multiple_of(self.look_every_ns);
-        Some(Asked { at_ns, for_grip })
+        Some((at_ns, for_grip))
     }
 
     /// Earliest time from which the line is free of goals for the duration of a read, ns.
@@ -302,7 +288,6 @@ impl Host {
     }
 }
 
-/// The board's address on the bus.
 pub const ID: u8 = 1;
 /// Time of a byte at 3 Mbaud, rounded up.
 pub const BYTE_NS: u64 = 3_334;
@@ -316,7 +301,6 @@ const BYTES: u16 = address::SUPPLY_MV - FROM;
 /// Value that a packet writes into the board.
 #[derive(Clone, Copy, Debug)]
 pub enum Write {
-    /// A goal, mN.
     Goal(i32),
     Request(Request),
 }
@@ -329,7 +313,7 @@ impl Write {
             Self::Request(Request::Tare) => (address::TARE, vec![1]),
             Self::Request(Request::Clear) => (address::CLEAR_FAULT, vec![1]),
         };
-        packet(instruction::WRITE, &[&register.to_le_bytes()[..], &value].concat())
+        packet(ID, instruction::WRITE, &[&register.to_le_bytes()[..], &value].concat())
     }
 
     /// Puts it into the command that the board then has.
@@ -344,15 +328,7 @@ impl Write {
 /// Packet that requests the status registers.
 pub fn read() -> Vec<u8> {
     let ([a, b], [c, d]) = (FROM.to_le_bytes(), BYTES.to_le_bytes());
-    packet(instruction::READ, &[a, b, c, d])
-}
-
-fn packet(instruction: u8, params: &[u8]) -> Vec<u8> {
-    let mut bytes = Reply::new();
-    let mut sender = Sender::new(&mut bytes, ID, instruction);
-    params.iter().for_each(|byte| sender.push(*byte));
-    sender.finish();
-    bytes.to_vec()
+    packet(ID, instruction::READ, &[a, b, c, d])
 }
 
 /// Takes a byte of the image; returns the status registers if the byte completes them.

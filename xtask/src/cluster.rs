@@ -2,12 +2,11 @@
 //! with the environment variables that it would get there.
 
 use crate::console::{self, Console};
-use crate::host;
-use crate::host::Program;
+use crate::host::{self, Program};
 use crate::install::{self, Environment};
 use anyhow::{Context, Result};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 /// Shares and runs of the sweep, and its scene: one that draws, and breaks bounds in none of these.
@@ -22,21 +21,14 @@ const CLIENTS: Environment = Environment {
     does: "the summary of a sweep is tried by it",
 };
 
-/// Installs GNU parallel, and a Python environment with DuckDB and PyYAML. Returns the environment's interpreter.
-fn ensure(console: &mut Console) -> Result<PathBuf> {
-    install::packages(&["parallel"], "the test of the examples for clusters", console)?;
-    install::environment(&CLIENTS, console)
-}
-
 /// Runs a sweep whole and by each example, and compares what they make byte by byte.
 pub fn run(console: &mut Console) -> Result<()> {
-    let python = ensure(console)?;
+    install::packages(&["parallel"], "the test of the examples for clusters", console)?;
+    let python = install::environment(&CLIENTS, console)?;
     Program::sim("sweep").build(console)?;
     let sweep = host::target().join(host::PROGRAMS).join("sweep");
     let folder = host::target().join("cluster");
-    if folder.is_dir() {
-        fs::remove_dir_all(&folder).with_context(|| format!("cannot empty {}", host::shown(&folder)))?;
-    }
+    host::emptied(&folder)?;
     let examples = host::root().join("examples/cluster");
     let scene = host::root().join(SCENE);
     let given = |command: &mut Command, out: &Path| {
@@ -64,19 +56,15 @@ pub fn run(console: &mut Console) -> Result<()> {
 
     // The job's folder has the program and the scene in it.
     let kubernetes = folder.join("kubernetes");
-    fs::create_dir_all(&kubernetes).with_context(|| format!("cannot make {}", host::shown(&kubernetes)))?;
+    host::emptied(&kubernetes)?;
     for file in [&sweep, &scene] {
         let to = kubernetes.join(file.file_name().unwrap_or_default());
         fs::copy(file, &to).with_context(|| format!("cannot write {}", host::shown(&to)))?;
     }
     let check = host::root().join("xtask/src/cluster/check.py");
     let mut command = Command::new(&python);
-    command
-        .arg(&check)
-        .arg("kubernetes")
-        .arg(examples.join("kubernetes.yaml"))
-        .arg(&kubernetes)
-        .args([SEEDS, &SHARES.to_string()]);
+    command.arg(&check).arg("kubernetes").arg(examples.join("kubernetes.yaml")).arg(&kubernetes);
+    command.args([SEEDS, &SHARES.to_string()]);
     tried("the shell of the Kubernetes job", &mut command, console)?;
     same(&sweep, &whole, &kubernetes)?;
 
@@ -87,7 +75,6 @@ pub fn run(console: &mut Console) -> Result<()> {
     Ok(())
 }
 
-/// Runs an example; its errors are shown.
 fn tried(what: &str, command: &mut Command, console: &Console) -> Result<()> {
     console::output(command)?;
     console.say(&format!("done     {what}"));
@@ -102,11 +89,8 @@ fn same(sweep: &Path, whole: &Path, folder: &Path) -> Result<()> {
     console::output(&mut merge)?;
     for file in ["runs.csv", "summary.csv"] {
         let read = |folder: &Path| fs::read(folder.join(file)).with_context(|| format!("cannot read {file}"));
-        anyhow::ensure!(
-            read(whole)? == read(folder)?,
-            "{file} of {} is not that of the whole sweep",
-            host::shown(folder)
-        );
+        let same = read(whole)? == read(folder)?;
+        anyhow::ensure!(same, "{file} of {} is not that of the whole sweep", host::shown(folder));
     }
     Ok(())
 }

@@ -11,22 +11,18 @@ use std::time::{Duration, Instant};
 use std::{env, fs, thread};
 
 /// Destination of the programs' output.
+#[derive(Default)]
 pub struct Console {
     /// Output of a stage's programs so far; `None` writes straight to the terminal.
     captured: Option<String>,
     /// CPU time that went into compiling.
-    built_s: f64,
+    pub built_s: f64,
 }
 
 impl Console {
-    /// Programs write to the terminal.
-    pub fn terminal() -> Self {
-        Self { captured: None, built_s: 0.0 }
-    }
-
     /// Programs are heard, and shown where something fails.
     pub fn captured() -> Self {
-        Self { captured: Some(String::new()), built_s: 0.0 }
+        Self { captured: Some(String::new()), ..Self::default() }
     }
 
     /// Reports progress on standard error: standard output is for results, which may go to a file.
@@ -34,7 +30,6 @@ impl Console {
         self.lines(io::stderr(), text);
     }
 
-    /// Writes a result to standard output.
     pub fn print(&self, text: &str) {
         self.lines(io::stdout(), text);
     }
@@ -52,7 +47,6 @@ impl Console {
         self.run(command.stdout(io::stderr()))
     }
 
-    /// Runs a program to its end.
     pub fn run(&mut self, command: &mut Command) -> Result<()> {
         command.current_dir(host::root());
         let shown = show(command);
@@ -115,14 +109,8 @@ impl Console {
         Ok(text.into_owned())
     }
 
-    /// Output of a stage's programs so far.
     pub fn text(&self) -> &str {
         self.captured.as_deref().unwrap_or_default()
-    }
-
-    /// CPU time that went into compiling.
-    pub fn built_s(&self) -> f64 {
-        self.built_s
     }
 }
 
@@ -145,14 +133,12 @@ fn lines(child: &mut Child) -> mpsc::Receiver<(String, bool)> {
             let mut line = Vec::new();
             while let Some(byte) = stream.by_ref().bytes().next().and_then(io::Result::ok) {
                 // Cargo ends its bar of progress with a carriage return.
-                match byte {
-                    b'\n' | b'\r' => {
-                        let text = String::from_utf8_lossy(&line).into_owned();
-                        line.clear();
-                        let _ = sender.send((text, error));
-                    }
-                    _ => line.push(byte),
+                if byte != b'\n' && byte != b'\r' {
+                    line.push(byte);
+                    continue;
                 }
+                let _ = sender.send((String::from_utf8_lossy(&line).into_owned(), error));
+                line.clear();
             }
         });
     }
@@ -187,9 +173,8 @@ pub fn cargo(subcommand: &str) -> Command {
 /// The command as one would type it.
 pub fn show(command: &Command) -> String {
     let name = |word: &OsStr| word.to_string_lossy().into_owned();
-    let program = host::shown(command.get_program().as_ref());
-    let program =
-        if command.get_program() == env::var_os("CARGO").unwrap_or_default() { "cargo".into() } else { program };
+    let is_cargo = command.get_program() == env::var_os("CARGO").unwrap_or_default();
+    let program = if is_cargo { "cargo".into() } else { host::shown(command.get_program().as_ref()) };
     let variables = command.get_envs().filter_map(|(key, value)| Some(format!("{}={}", name(key), name(value?))));
     variables.chain([program]).chain(command.get_args().map(name)).collect::<Vec<_>>().join(" ")
 }
@@ -197,11 +182,6 @@ pub fn show(command: &Command) -> String {
 fn missing(command: &Command) -> String {
     let path = env::var("PATH").unwrap_or_default();
     format!("cannot start {}; looked in PATH={path}", command.get_program().to_string_lossy())
-}
-
-/// Writes a line of progress. A reader that went away does not end the command.
-fn say_line(line: Arguments) {
-    let _ = writeln!(io::stderr(), "{line}");
 }
 
 /// Shows a line of progress that the next one replaces, in a terminal only.
@@ -221,22 +201,19 @@ pub fn clear_line() {
 /// Between two lines of a log.
 const LOG_EVERY: Duration = Duration::from_secs(60);
 
-/// Running build.
 pub struct Progress {
     what: String,
     begun: Instant,
     said: Instant,
-    done: usize,
     total: usize,
     /// True if a crate was compiled in this run.
     compiled: bool,
 }
 
 impl Progress {
-    /// Progress of a build.
     pub fn new(what: &str) -> Self {
         let now = Instant::now();
-        Self { what: what.into(), begun: now, said: now, done: 0, total: 0, compiled: false }
+        Self { what: what.into(), begun: now, said: now, total: 0, compiled: false }
     }
 
     /// Takes a line of cargo's standard error; true if it was only progress of the build.
@@ -245,23 +222,23 @@ impl Progress {
         let Some((done, total)) = line.strip_prefix("Building [").and_then(read_bar) else {
             return line.starts_with("Updating") || line.starts_with("Download") || line.starts_with("Compiling");
         };
-        (self.done, self.total) = (done, total);
+        self.total = total;
         let line = format!("building {}: {done} of {total} crates", self.what);
         if io::stderr().is_terminal() {
             show_short(format_args!("    {line:.100}"));
         } else if self.said.elapsed() >= LOG_EVERY {
             self.said = Instant::now();
-            say_line(format_args!("{line}"));
+            let _ = writeln!(io::stderr(), "{line}");
         }
         true
     }
 
-    /// The build ended.
     pub fn finish(&self) {
         if self.compiled && self.total > 0 {
             let seconds = self.begun.elapsed().as_secs();
             let (crates, minutes, seconds) = (self.total, seconds / 60, seconds % 60);
-            say_line(format_args!("built    {}: {crates} crates in {minutes} min {seconds:02} s", self.what));
+            let what = &self.what;
+            let _ = writeln!(io::stderr(), "built    {what}: {crates} crates in {minutes} min {seconds:02} s");
         }
     }
 }

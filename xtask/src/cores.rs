@@ -17,61 +17,30 @@ pub const LOOP: &str = "host-tests/cores";
 pub const EXAMPLE: &str = "examples/rp2040";
 pub const TARGET_OF_EXAMPLE: &str = "thumbv6m-none-eabi";
 const RISCV_PROGRAM: &str = "qemu-system-riscv32";
-const WHY: &str = "running the loop on emulated cores";
 
-/// A core, how the image is built for it, and what runs the image.
-struct Core {
-    name: &'static str,
-    /// Rows and columns of the array.
-    array: &'static str,
-    target: &'static str,
-    flags: &'static [&'static str],
-    /// QEMU's board.
-    board: &'static str,
-}
+/// Core, rows and columns of the array, the compiler's target and flags for it, and QEMU's board.
+type Core = (&'static str, &'static str, &'static str, &'static [&'static str], &'static str);
 
 const CORES: [Core; 11] = [
-    Core { name: "Cortex-M0", array: "6x4", target: "thumbv6m-none-eabi", flags: &[], board: "microbit" },
-    Core { name: "Cortex-M3", array: "6x4", target: "thumbv7m-none-eabi", flags: &[], board: "mps2-an385" },
-    Core { name: "Cortex-M4", array: "6x4", target: "thumbv7em-none-eabi", flags: &[], board: "mps2-an386" },
-    Core { name: "Cortex-M4F", array: "6x4", target: TARGET, flags: &[], board: "netduinoplus2" },
-    Core { name: "Cortex-M33", array: "6x4", target: "thumbv8m.main-none-eabi", flags: &[], board: "mps2-an505" },
-    Core { name: "Cortex-M33F", array: "6x4", target: "thumbv8m.main-none-eabihf", flags: &[], board: "mps2-an505" },
-    Core {
-        name: "Cortex-M33F",
-        array: "6x4",
-        target: "thumbv8m.main-none-eabihf",
-        flags: &["-Ctarget-cpu=cortex-m33"],
-        board: "mps2-an505",
-    },
-    Core {
-        name: "Cortex-M4F",
-        array: "10x10",
-        target: TARGET,
-        flags: &["--cfg=array=\"10x10\""],
-        board: "netduinoplus2",
-    },
-    Core {
-        name: "Cortex-M4F",
-        array: "16x16",
-        target: TARGET,
-        flags: &["--cfg=array=\"16x16\""],
-        board: "netduinoplus2",
-    },
-    Core { name: "RV32IMC", array: "6x4", target: "riscv32imc-unknown-none-elf", flags: &[], board: "virt" },
-    Core { name: "RV32IMAC", array: "6x4", target: "riscv32imac-unknown-none-elf", flags: &[], board: "virt" },
+    ("Cortex-M0", "6x4", "thumbv6m-none-eabi", &[], "microbit"),
+    ("Cortex-M3", "6x4", "thumbv7m-none-eabi", &[], "mps2-an385"),
+    ("Cortex-M4", "6x4", "thumbv7em-none-eabi", &[], "mps2-an386"),
+    ("Cortex-M4F", "6x4", TARGET, &[], "netduinoplus2"),
+    ("Cortex-M33", "6x4", "thumbv8m.main-none-eabi", &[], "mps2-an505"),
+    ("Cortex-M33F", "6x4", "thumbv8m.main-none-eabihf", &[], "mps2-an505"),
+    ("Cortex-M33F", "6x4", "thumbv8m.main-none-eabihf", &["-Ctarget-cpu=cortex-m33"], "mps2-an505"),
+    ("Cortex-M4F", "10x10", TARGET, &["--cfg=array=\"10x10\""], "netduinoplus2"),
+    ("Cortex-M4F", "16x16", TARGET, &["--cfg=array=\"16x16\""], "netduinoplus2"),
+    ("RV32IMC", "6x4", "riscv32imc-unknown-none-elf", &[], "virt"),
+    ("RV32IMAC", "6x4", "riscv32imac-unknown-none-elf", &[], "virt"),
 ];
 
-impl Core {
-    /// The emulator and its options. On Arm an instruction takes 64 ns of virtual time, a tick of SysTick on the slowest
-    /// of the boards.
-    fn emulator(&self) -> String {
-        let Self { target, board, .. } = self;
-        if target.starts_with("riscv") {
-            format!("{RISCV_PROGRAM} -M {board} -bios none -icount shift=0,align=off,sleep=off")
-        } else {
-            format!("qemu-system-arm -M {board} -icount shift=6,align=off,sleep=off")
-        }
+/// The emulator and its options. On Arm an instruction takes 64 ns, a tick of SysTick on the slowest board.
+fn emulator(target: &str, board: &str) -> String {
+    if target.starts_with("riscv") {
+        format!("{RISCV_PROGRAM} -M {board} -bios none -icount shift=0,align=off,sleep=off")
+    } else {
+        format!("qemu-system-arm -M {board} -icount shift=6,align=off,sleep=off")
     }
 }
 
@@ -82,29 +51,30 @@ pub fn run_all(choice: Choice, console: &mut Console) -> Result<()> {
     docs::renew(PAGE.0, &page, false, &mut Vec::new(), console)
 }
 
-/// Builds the image for every core, runs each, and compares its digest with this machine's. Returns the text of the page
-/// with their table.
+/// Runs the image of every core and compares its digest with this machine's. Returns the page with the table.
 pub fn page(choice: Choice, console: &mut Console) -> Result<String> {
-    ensure(console)?;
-    let targets = CORES.map(|core| core.target);
+    ensure_m4(console)?;
+    if host::find_program(RISCV_PROGRAM).is_none() {
+        // Of the same version as the emulator for Arm: both share files.
+        install::newest(&["qemu-system-riscv"], "running the loop on emulated cores", console)?;
+    }
+    let targets = CORES.map(|(_, _, target, ..)| target);
     let toolchain =
         toolchain::ensure_for(choice, &targets, "the loop is built for other cores than the board's", console)?;
     let folder = host::made("cores")?;
     let mut list = String::new();
-    for (number, core) in CORES.iter().enumerate() {
-        let mut command = image::apart(toolchain, "build", LOOP, core.target, core.flags);
-        console.build(command.arg("--release"), &format!("the loop for {}", core.target))?;
+    for (number, (name, array, target, flags, board)) in CORES.iter().enumerate() {
+        let mut command = image::apart(toolchain, "build", LOOP, target, flags);
+        console.build(command.arg("--release"), &format!("the loop for {target}"))?;
         // Two boards have the same target and name.
         let elf = folder.join(format!("{number}.elf"));
-        fs::copy(toolchain.images_for(core.target, core.flags).join("cores"), &elf)
-            .with_context(|| host::shown(&elf))?;
+        fs::copy(toolchain.images_for(target, flags).join("cores"), &elf).with_context(|| host::shown(&elf))?;
         let bytes = Image::read(&elf)?.bytes.len();
-        let Core { name, array, target, flags, .. } = core;
-        let (flags, emulator) = (flags.join(" "), core.emulator());
+        let (flags, emulator) = (flags.join(" "), emulator(target, board));
         list += &format!("{name}\t{array}\t{target}\t{flags}\t{bytes}\t{emulator}\t{}\n", elf.display());
     }
     let file = folder.join("list.tsv");
-    fs::write(&file, list).with_context(|| host::shown(&file))?;
+    host::write(&file, list)?;
     console::output(host::example(PAGE.1, console)?.arg(&file))
 }
 
@@ -127,20 +97,9 @@ pub fn example(choice: Choice, console: &mut Console) -> Result<()> {
     Ok(())
 }
 
-/// The lines of the page's table.
 fn table(page: &str) -> String {
     let lines = page.lines().skip_while(|line| !line.starts_with("<!-- cores"));
     lines.skip(1).take_while(|line| line.starts_with('|')).collect::<Vec<_>>().join("\n")
-}
-
-/// Makes sure of the emulators.
-fn ensure(console: &mut Console) -> Result<()> {
-    ensure_m4(console)?;
-    match host::find_program(RISCV_PROGRAM) {
-        Some(_) => Ok(()),
-        // Of the same version as the emulator for Arm: both share files.
-        None => install::newest(&["qemu-system-riscv"], WHY, console),
-    }
 }
 
 // The core on an emulated Cortex-M4F.
@@ -155,21 +114,18 @@ pub struct QemuArgs {
     inject: Option<String>,
 }
 
-/// Runs the recorded stimulus, and random inputs for functions with instructions of their own, on the emulator and on the
-/// host, and compares.
+/// Runs recorded stimulus, and random inputs of functions with own instructions, there and here, and compares.
 pub fn run_m4(args: &QemuArgs, choice: Choice, console: &mut Console) -> Result<()> {
     let image = prepare(choice, console)?;
     let mut replay = Program::tool("qemu-host").build(console)?;
     console.run(replay.arg(&image).arg(host::target().join("stimulus")).args(&args.inject))
 }
 
-/// Runs the tests that need the emulator.
 pub fn test_m4(choice: Choice, console: &mut Console) -> Result<()> {
     let image = prepare(choice, console)?;
     host::test(host::tests(&["--test", "qemu", "--", "--ignored"]).env("FINGERTIP_QEMU_IMAGE", image), console)
 }
 
-/// Makes sure of the emulator.
 pub fn ensure_m4(console: &mut Console) -> Result<()> {
     match host::find_program(M4_EMULATOR) {
         Some(_) => Ok(()),

@@ -9,23 +9,16 @@ use anyhow::{Context, Result, bail};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Generated files: path, and the example that prints the text for that path.
-const GENERATED: &[(&str, &str)] = &[
-    ("docs/control-table.md", "generated"),
-    ("docs/firmware.md", "generated"),
-    ("docs/scenes.md", "scenes-page"),
-    ("docs/board.md", "generated"),
-    ("examples/dynamixel/fingertip.model", "generated"),
-    ("examples/dynamixel/fingertip_direct.model", "generated"),
-    ("python/fingertip/registers.py", "generated"),
-];
+/// Files that the example `generated` prints by their paths, and one by another example.
+const GENERATED: &str = "docs/control-table.md docs/firmware.md docs/board.md examples/dynamixel/fingertip.model \
+                         examples/dynamixel/fingertip_direct.model python/fingertip/registers.py";
+const SCENES: (&str, &str) = ("docs/scenes.md", "scenes-page");
 /// Error budget of the force; enough fingers that the larger causes come in the same order with other draws.
 const BUDGET: (&str, &str) = ("docs/budget.md", "24");
 /// The demonstration's figures, as the README shows them.
 const FIGURES: &str = "docs/demo.json";
 /// Pictures of the demonstration and of the paper.
 const PICTURES: &str = "docs/pictures";
-/// The paper's figures among the pictures.
 const PAPER: [&str; 3] = ["docs/pictures/figure-7.svg", "docs/pictures/figure-10.svg", "docs/pictures/figure-11.svg"];
 const README: (&str, &str) = ("README.md", "readme");
 
@@ -40,14 +33,15 @@ pub struct Args {
 /// Writes or checks the generated files; the figures come from a run of the demonstration.
 pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     let mut stale = Vec::new();
-    for (path, example) in GENERATED {
+    for (path, example) in GENERATED.split(' ').map(|path| (path, "generated")).chain([SCENES]) {
         renew(path, &print(example, Some(Path::new(path)), console)?, args.check, &mut stale, console)?;
     }
     let mut budget = Program::sim("budget").build(console)?;
     renew(BUDGET.0, &console::output(budget.args(["--fingers", BUDGET.1]))?, args.check, &mut stale, console)?;
     renew(cores::PAGE.0, &cores::page(choice, console)?, args.check, &mut stale, console)?;
     let drawn = host::target().join("docs").join("figures");
-    draw(&drawn, console)?;
+    let mut figures = Program::tool("figures").build(console)?;
+    console.run(figures.arg(&drawn))?;
     for path in PAPER {
         let file = drawn.join(Path::new(path).file_name().unwrap_or_default());
         let text = fs::read_to_string(&file).with_context(|| format!("cannot read {}", host::shown(&file)))?;
@@ -74,7 +68,6 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     Ok(())
 }
 
-/// The text that a program prints.
 fn print(example: &str, argument: Option<&Path>, console: &mut Console) -> Result<String> {
     console::output(host::example(example, console)?.args(argument))
 }
@@ -88,16 +81,10 @@ pub fn renew(path: &str, text: &str, check: bool, stale: &mut Vec<String>, conso
         console.print(&format!("stale    {path}"));
         stale.push(path.into());
     } else {
-        fs::write(&file, text).with_context(|| format!("cannot write {path}"))?;
+        host::write(&file, text)?;
         console.print(&format!("written  {path}"));
     }
     Ok(())
-}
-
-/// Draws the paper's figures into a folder.
-fn draw(folder: &Path, console: &mut Console) -> Result<()> {
-    let mut command = Program::tool("figures").build(console)?;
-    console.run(command.arg(folder))
 }
 
 // The published packages: built, and tested from a project outside of this workspace.
@@ -107,8 +94,7 @@ pub const PACKAGES: [&str; 2] = ["fingertip-lanes", "fingertip"];
 /// Version of the packages, as in the workspace's manifest.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// Makes the packages and runs the tests of `host-tests/outside`, which depends on them; checks the Python package's types
-/// and wheel.
+/// Tests the packages from `host-tests/outside`; checks the Python package's types and wheel.
 pub fn package(console: &mut Console) -> Result<()> {
     let mut package = console::cargo("package");
     // The project outside compiles them.
@@ -116,10 +102,7 @@ pub fn package(console: &mut Console) -> Result<()> {
     console.run(&mut package)?;
     let made = host::target().join("package");
     let unpacked = host::target().join("outside").join("packages");
-    if unpacked.is_dir() {
-        fs::remove_dir_all(&unpacked).with_context(|| format!("cannot empty {}", host::shown(&unpacked)))?;
-    }
-    fs::create_dir_all(&unpacked).with_context(|| format!("cannot make {}", host::shown(&unpacked)))?;
+    host::emptied(&unpacked)?;
     let mut test = console::cargo("test");
     for name in PACKAGES {
         let folder = format!("{name}-{VERSION}");
@@ -158,7 +141,6 @@ const DENY_PACKAGE: Environment = Environment {
     does: "checks the licences",
 };
 
-/// Finds or installs the checker.
 pub fn deny(console: &mut Console) -> Result<PathBuf> {
     let (name, version) = DENY;
     let folder = host::target().join("tools");

@@ -14,7 +14,7 @@ use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
-use std::{fs, iter, thread};
+use std::{iter, thread};
 
 /// The part on the board, in probe-rs's words.
 const CHIP: &str = "STM32F446RETx";
@@ -92,7 +92,6 @@ impl Drop for Server {
     }
 }
 
-/// A connection, and the server behind it.
 pub struct Session {
     stream: BufReader<TcpStream>,
     _server: Option<Server>,
@@ -194,7 +193,6 @@ impl Probe for Session {
     }
 }
 
-/// Name of the image and its package.
 pub const BRINGUP: &str = "bringup";
 /// Folder in which Linux names the ST-LINK's port.
 const BY_ID: &str = "/dev/serial/by-id";
@@ -227,7 +225,6 @@ pub struct BringupArgs {
     without_estimates: bool,
 }
 
-/// Board that runs the image.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Board {
     /// The board on the desk
@@ -265,33 +262,27 @@ pub fn bringup(args: &BringupArgs, choice: Choice, console: &mut Console) -> Res
     if let Some(frames) = args.frames {
         command.arg("--frames").arg(frames.to_string());
     }
-    for (flag, path) in [("--json", &args.json), ("--estimates", &estimates)] {
-        if let Some(path) = path {
-            command.arg(flag).arg(std::path::absolute(path)?);
-        }
-    }
+    host::give_files(&mut command, [("--json", &args.json), ("--estimates", &estimates)])?;
     sim::start(&mut command)
 }
 
-/// The kernels' estimated cycles, with the flash's wait states, of the inputs that the image has: a file with a line
-/// each.
+/// The kernels' estimated cycles, with the flash's wait states, for the image's inputs: a file with a line each.
 fn estimates(toolchain: Toolchain, console: &mut Console) -> Result<PathBuf> {
     let folder = host::made("study")?;
     let [kept, full, file] = ["kept.bin", "few.bin", "few.txt"].map(|name| folder.join(name));
     let mut inputs = Program::tool("study").build(console)?;
     console.run(inputs.arg("few").arg(&kept).arg(&full))?;
     let study = image::build(toolchain, "study", "study", console)?;
-    let run = timing::measure(&study, Some(&full), console)?;
-    let call = run.regions.first().map_or(0, |region| region.flash.median);
+    let (_, regions) = timing::measure(&study, Some(&full), console)?;
+    let call = regions.first().map_or(0, |region| region.flash.median);
     let mut text = String::new();
-    for region in &run.regions {
+    for region in &regions {
         text += &format!("{} {}\n", region.flash.median.saturating_sub(call), region.name);
     }
-    fs::write(&file, text).with_context(|| format!("cannot write {}", host::shown(&file)))?;
+    host::write(&file, text)?;
     Ok(file)
 }
 
-/// The only ST-LINK's port.
 fn find_port() -> Result<PathBuf> {
     let folder = Path::new(BY_ID);
     let names = folder.read_dir().into_iter().flatten().flatten().map(|entry| entry.path());

@@ -2,6 +2,7 @@
 
 use crate::console::{self, Console};
 use anyhow::{Context, Result};
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
@@ -11,26 +12,18 @@ use std::{env, fs};
 pub const PROGRAMS: &str = "debug";
 
 /// Selects all tests, with the features that [`SHARED`] gives to programs: crates that both use are compiled once.
-pub const TESTS: [&str; 3] = ["--workspace", "--features=fingertip-cli/foxglove", "--ignore-rust-version"];
+pub const TESTS: &str = "--workspace --features=fingertip-cli/foxglove --ignore-rust-version";
 /// Selects the packages that bring most dependencies, next to a program's own: cargo unifies their features.
-pub const SHARED: &[&str] = &[
-    "--package=virtual-board",
-    "--package=serve",
-    "--package=browser",
-    "--package=fingertip-cli",
-    "--features=fingertip-cli/foxglove",
-];
+pub const SHARED: &str = "--package=virtual-board --package=serve --package=browser --package=fingertip-cli \
+                          --features=fingertip-cli/foxglove";
 /// Selects what the demonstration's two programs need, and no more.
-const LEAST: &[&str] = &["--package=sim", "--package=virtual-board", "--no-default-features"];
+const LEAST: &str = "--package=sim --package=virtual-board --no-default-features";
 
-/// A program of the workspace.
 pub struct Program {
-    /// Package of the program.
     pub package: &'static str,
-    /// Name of the program.
     pub name: &'static str,
     /// Packages and features that are selected with it.
-    pub with: &'static [&'static str],
+    pub with: &'static str,
 }
 
 /// The demonstration on the native board, with nothing that it does not need.
@@ -43,12 +36,10 @@ pub const BOARD: Program = Program { package: "virtual-board", name: "virtual-bo
 pub const SCENE_BOARD: Program = Program { with: SHARED, ..BOARD };
 
 impl Program {
-    /// One of the tools of `host-tests`.
     pub const fn tool(name: &'static str) -> Self {
         Self { package: "host-tests", name, with: SHARED }
     }
 
-    /// One of the programs of `sim`.
     pub const fn sim(name: &'static str) -> Self {
         Self { package: "sim", name, with: SHARED }
     }
@@ -56,14 +47,14 @@ impl Program {
     /// Builds it, and returns the command that starts it.
     pub fn build(&self, console: &mut Console) -> Result<Command> {
         let mut command = cargo("build", self.package);
-        command.args(["--bin", self.name]).args(self.with);
+        command.args(["--bin", self.name]).args(self.with.split(' '));
         console.build(&mut command, self.name)?;
         Ok(Command::new(target().join(PROGRAMS).join(self.name)))
     }
 }
 
 /// Builds one of the tools of `host-tests` and runs it.
-pub fn run_tool(name: &'static str, words: &[&str], console: &mut Console) -> Result<()> {
+pub fn run_tool(name: &'static str, words: &[impl AsRef<OsStr>], console: &mut Console) -> Result<()> {
     let mut command = Program::tool(name).build(console)?;
     console.run(command.args(words))
 }
@@ -78,7 +69,7 @@ pub fn cargo(subcommand: &str, package: &str) -> Command {
 /// Builds one of the examples, and returns the command that starts it.
 pub fn example(name: &str, console: &mut Console) -> Result<Command> {
     let mut build = cargo("build", "host-tests");
-    console.build(build.arg("--package=sim").args(SHARED).args(["--example", name]), name)?;
+    console.build(build.arg("--package=sim").args(SHARED.split(' ')).args(["--example", name]), name)?;
     Ok(Command::new(target().join(PROGRAMS).join("examples").join(name)))
 }
 
@@ -86,7 +77,7 @@ pub fn example(name: &str, console: &mut Console) -> Result<Command> {
 pub fn tests(words: &[&str]) -> Command {
     let mut command = console::cargo("test");
     // For a test that asks all programs for their help: built in another way, they would be compiled again.
-    command.args(TESTS).args(words).env("FINGERTIP_TESTS", TESTS.join(" "));
+    command.args(TESTS.split(' ')).args(words).env("FINGERTIP_TESTS", TESTS);
     command
 }
 
@@ -126,12 +117,33 @@ pub fn made(name: &str) -> Result<PathBuf> {
     fs::canonicalize(&folder).with_context(|| shown(&folder))
 }
 
+/// Empties a folder, or makes it.
+pub fn emptied(folder: &Path) -> Result<()> {
+    if folder.is_dir() {
+        fs::remove_dir_all(folder).with_context(|| format!("cannot empty {}", shown(folder)))?;
+    }
+    fs::create_dir_all(folder).with_context(|| format!("cannot make {}", shown(folder)))
+}
+
+pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<()> {
+    fs::write(path, bytes).with_context(|| format!("cannot write {}", shown(path)))
+}
+
+/// Gives a program the paths of files to write or read, by their flags. The user may be elsewhere than the program.
+pub fn give_files(command: &mut Command, files: [(&str, &Option<PathBuf>); 2]) -> Result<()> {
+    for (flag, path) in files {
+        if let Some(path) = path {
+            command.arg(flag).arg(std::path::absolute(path).with_context(|| shown(path))?);
+        }
+    }
+    Ok(())
+}
+
 /// A path as the user would type it: relative to the root where it lies below.
 pub fn shown(path: &Path) -> String {
     path.strip_prefix(root()).unwrap_or(path).display().to_string()
 }
 
-/// Looks a program up in `PATH`.
 pub fn find_program(name: &str) -> Option<PathBuf> {
     env::split_paths(&env::var_os("PATH")?).map(|folder| folder.join(name)).find(|path| path.is_file())
 }

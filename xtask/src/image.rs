@@ -1,5 +1,4 @@
-//! Images for the microcontroller: built, laid out as the bytes that the flash gets, and held against their limits of flash
-//! and static RAM.
+//! Images for the microcontroller: built, laid out as flashed, and checked against the limits of flash and RAM.
 
 use crate::console::Console;
 use crate::host;
@@ -13,20 +12,16 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Value of an erased byte of flash.
 const ERASED: u8 = 0xff;
 /// More than the largest part has: a larger span is a mistake in the linker script.
 const SPAN_MAX: usize = 2 << 20;
 
 /// An image, as linked and as flashed.
 pub struct Image {
-    /// The linked image, with symbols.
     pub elf: PathBuf,
     /// File of the flashable bytes, beside the linked image.
     pub bin: PathBuf,
-    /// The flashable bytes.
     pub bytes: Vec<u8>,
-    /// The address of the first byte.
     pub base: u32,
 }
 
@@ -94,7 +89,6 @@ fn lay_out(segments: &[(u32, &[u8])]) -> Result<(u32, Vec<u8>)> {
     Ok((base, bytes))
 }
 
-/// Builds the flash image.
 pub fn firmware(choice: Choice, console: &mut Console) -> Result<Image> {
     let toolchain = toolchain::ensure(choice, console)?;
     let mut command = toolchain.cargo("build");
@@ -112,7 +106,7 @@ pub fn checking(toolchain: Toolchain, name: &str, console: &mut Console) -> Resu
 /// Builds an image, with the flashable bytes beside it.
 fn with_bytes(command: &mut Command, toolchain: Toolchain, name: &str, console: &mut Console) -> Result<Image> {
     let image = Image::read(&built(command.arg("--release"), toolchain, name, console)?)?;
-    fs::write(&image.bin, &image.bytes).with_context(|| format!("cannot write {}", host::shown(&image.bin)))?;
+    host::write(&image.bin, &image.bytes)?;
     Ok(image)
 }
 
@@ -147,18 +141,15 @@ pub const RAM_MAX_BYTES: u64 = 76 << 10;
 /// First address of the microcontroller's RAM.
 const RAM_BASE: u64 = 0x2000_0000;
 
-/// Sizes of an image.
 pub struct Sizes {
     /// Bytes of flash, gaps and initial values included.
     pub flash: u64,
     /// Bytes of RAM with a fixed address.
     pub ram: u64,
-    /// Bytes reserved for the stack.
     pub stack: u64,
 }
 
 impl Sizes {
-    /// Measures a linked image.
     pub fn of(image: &Image) -> Result<Self> {
         let data = fs::read(&image.elf)?;
         let file = object::File::parse(&*data)?;
@@ -177,7 +168,6 @@ impl Sizes {
         })
     }
 
-    /// Fails beyond the limits.
     pub fn check(&self) -> Result<()> {
         for (what, bytes, limit) in [("flash", self.flash, FLASH_MAX_BYTES), ("static RAM", self.ram, RAM_MAX_BYTES)] {
             if bytes > limit {
@@ -205,7 +195,6 @@ impl Sizes {
 
 // The panic-free proof: an image of the control step alone, which a reachable panic keeps from linking.
 
-/// The image.
 const NAME: &str = "panic-free";
 /// Undefined symbol that the proof's panic handler calls.
 const UNDEFINED: &str = "fingertip_step_can_panic";
@@ -235,7 +224,6 @@ pub fn prove_panic_free(choice: Choice, console: &mut Console) -> Result<()> {
     Ok(())
 }
 
-/// The floating-point routines in an image.
 fn float_calls(elf: &Path) -> Result<Vec<String>> {
     let data = fs::read(elf)?;
     let file = object::File::parse(&*data)?;
@@ -281,10 +269,7 @@ mod tests {
     fn segments_lie_at_their_addresses_and_gaps_read_as_erased() {
         let (base, bytes) = lay_out(&[(0x0800_0006, &[3, 4]), (0x0800_0000, &[1, 2])]).unwrap();
         assert_eq!((base, bytes), (0x0800_0000, vec![1, 2, 0xff, 0xff, 0xff, 0xff, 3, 4]));
-    }
-
-    #[test]
-    fn an_image_without_bytes_and_one_in_two_memories_are_refused() {
+        // Without bytes, and in two memories.
         assert!(lay_out(&[]).is_err());
         assert!(lay_out(&[(0x0800_0000, &[1]), (0x2000_0000, &[1])]).is_err());
     }
@@ -293,10 +278,9 @@ mod tests {
     fn a_byte_beyond_a_limit_fails() {
         let sizes = |flash, ram| Sizes { flash, ram, stack: 0 };
         assert!(sizes(FLASH_MAX_BYTES, RAM_MAX_BYTES).check().is_ok());
-        assert!(
-            sizes(FLASH_MAX_BYTES + 1, 0).check().unwrap_err().to_string().contains("flash: 131073 bytes are 1 more")
-        );
-        assert!(sizes(0, RAM_MAX_BYTES + 1).check().unwrap_err().to_string().contains("static RAM"));
+        let why = |sizes: Sizes| sizes.check().unwrap_err().to_string();
+        assert!(why(sizes(FLASH_MAX_BYTES + 1, 0)).contains("flash: 131073 bytes are 1 more"));
+        assert!(why(sizes(0, RAM_MAX_BYTES + 1)).contains("static RAM"));
     }
 
     #[test]

@@ -40,11 +40,7 @@ fn add(names: &[&str], why: &str, console: &mut Console) -> Result<()> {
         bail!("{why} needs the Debian packages `{list}`: run `sudo apt-get install {list}` and try again");
     }
     console.say(&format!("Installing the Debian packages `{list}`: {why} needs them."));
-    let apt = Apt::new(None)?;
-    console.prepare(&mut apt.command("update"))?;
-    console
-        .prepare(apt.command("install").args(&missing))
-        .with_context(|| format!("apt-get cannot install `{list}`, which {why} needs: is a package mirror in reach?"))
+    Apt::new(None)?.install(&missing, why, console)
 }
 
 /// Installs the newest version of packages that Debian has for this release, its backports included. Backports are a
@@ -66,11 +62,7 @@ pub fn newest(packages: &[&str], why: &str, console: &mut Console) -> Result<()>
         "Installing the newest `{list}`, from {suite} where {codename} has an older one: {why} needs it. \
          Apt's sources stay as they are."
     ));
-    let apt = Apt::new(Some(&suite))?;
-    console.prepare(&mut apt.command("update"))?;
-    console
-        .prepare(apt.command("install").args(["-t", &suite]).args(packages))
-        .with_context(|| format!("apt-get cannot install `{list}` from {suite}, which {why} needs"))
+    Apt::new(Some(&suite))?.install(&[&["-t", &suite], packages].concat(), why, console)
 }
 
 /// apt-get with lists, downloads and, where a suite is added, sources of its own.
@@ -82,18 +74,23 @@ struct Apt {
 impl Apt {
     fn new(suite: Option<&str>) -> Result<Self> {
         let folder = host::target().join("apt");
-        for part in ["lists/partial", "cache/archives/partial"] {
-            fs::create_dir_all(folder.join(part)).with_context(|| format!("cannot make {}", host::shown(&folder)))?;
-        }
+        host::made("apt/lists/partial").and_then(|_| host::made("apt/cache/archives/partial"))?;
         let sources = suite.map(|suite| {
             let file = folder.join(format!("{suite}.list"));
             // It replaces the system's own list, which it repeats.
             let own = fs::read_to_string("/etc/apt/sources.list").unwrap_or_default();
             let line = format!("deb [signed-by={KEYRING}] {} {suite} main\n", mirror());
-            fs::write(&file, own + "\n" + &line).with_context(|| format!("cannot write {}", host::shown(&file)))?;
+            host::write(&file, own + "\n" + &line)?;
             anyhow::Ok(file)
         });
         Ok(Self { folder, sources: sources.transpose()? })
+    }
+
+    fn install(&self, words: &[&str], why: &str, console: &mut Console) -> Result<()> {
+        console.prepare(&mut self.command("update"))?;
+        let installed = console.prepare(self.command("install").args(words));
+        let list = words.join(" ");
+        installed.with_context(|| format!("apt-get cannot install `{list}`, which {why} needs: is a mirror in reach?"))
     }
 
     fn command(&self, subcommand: &str) -> Command {
@@ -132,7 +129,6 @@ fn is_main(release: &str, uri: &str) -> bool {
     uri.trim_end_matches('/').ends_with("/debian") && !release.contains("security")
 }
 
-/// True if a Debian package is there.
 pub fn installed(package: &str) -> bool {
     let query = Command::new("dpkg-query").args(["-W", "-f", "${Status}", package]).output();
     query.is_ok_and(|output| output.stdout.ends_with(b" installed"))
@@ -159,13 +155,10 @@ pub fn browser(console: &mut Console) -> Result<PathBuf> {
 
 /// A virtual environment in the build folder.
 pub struct Environment {
-    /// Folder of the environment.
     pub folder: &'static str,
-    /// Installed packages, with their versions.
     pub packages: &'static [&'static str],
     /// The names by which a program imports that, with commas between.
     pub imports: &'static str,
-    /// Purpose.
     pub does: &'static str,
 }
 
@@ -201,9 +194,8 @@ pub fn environment(environment: &Environment, console: &mut Console) -> Result<P
     }
     let mut install = Command::new(&python);
     install.args(["-m", "pip", "install", "--quiet", "--no-cache-dir", "--disable-pip-version-check"]).args(*packages);
-    console
-        .prepare(&mut install)
-        .with_context(|| format!("pip cannot install {list}: is a package index in reach?"))?;
+    let installed = console.prepare(&mut install);
+    installed.with_context(|| format!("pip cannot install {list}: is a package index in reach?"))?;
     ensure!(has(&python, imports), "{list} is installed in {}, but does not import", host::shown(&folder));
     Ok(python)
 }
@@ -229,7 +221,6 @@ pub fn script(name: &str, console: &mut Console) -> Result<Command> {
     Ok(command)
 }
 
-/// Fits a sensor to recordings.
 pub fn sensor(args: &sim::Args, console: &mut Console) -> Result<()> {
     sim::start(script("fit.py", console)?.args(&args.arguments))
 }

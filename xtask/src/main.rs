@@ -39,28 +39,16 @@ enum Command {
     /// Watch the flash image touch an object, hold the force and release, on the virtual board
     Demo(sim::DemoArgs),
     /// Run a scene: a text file that names what is simulated around the fingertip
-    #[command(
-        disable_help_flag = true,
-        after_help = "Examples:\n  cargo xtask sim wall --out target/wall\n  cargo xtask sim --list\n  cargo xtask sim --help    (all that it takes)"
-    )]
+    #[command(disable_help_flag = true, after_help = examples("sim wall --out target/wall|sim --list"))]
     Sim(sim::Args),
     /// Run a scene many times: over values of its keys, over seeds, on all cores and machines
-    #[command(
-        disable_help_flag = true,
-        after_help = "Examples:\n  cargo xtask sweep raspberry --seeds 1000\n  cargo xtask sweep --help    (all that it takes)"
-    )]
+    #[command(disable_help_flag = true, after_help = examples("sweep raspberry --seeds 1000"))]
     Sweep(sim::Args),
     /// Run fingers that are drawn as a usual build brings them about, and judge each by what it must never do
-    #[command(
-        disable_help_flag = true,
-        after_help = "Examples:\n  cargo xtask population ordinary --fingers 100\n  cargo xtask population --help    (all that it takes)"
-    )]
+    #[command(disable_help_flag = true, after_help = examples("population ordinary --fingers 100"))]
     Population(sim::Args),
     /// Say how much of the force's error each weakness of a usual finger makes
-    #[command(
-        disable_help_flag = true,
-        after_help = "Examples:\n  cargo xtask budget --fingers 300\n  cargo xtask budget --help    (all that it takes)"
-    )]
+    #[command(disable_help_flag = true, after_help = examples("budget --fingers 300"))]
     Budget(sim::Args),
     /// Fit a real sensor's characteristic, creep or gains to recordings, and judge the fit on others
     #[command(
@@ -92,16 +80,10 @@ enum Command {
     /// Measure what accuracy costs in time: every variant of every kernel, with tables and plots
     Study(timing::StudyArgs),
     /// Prove the contact model's error bounds over whole input ranges: some minutes on two cores
-    #[command(
-        disable_help_flag = true,
-        after_help = "Examples:\n  cargo xtask prove --quick\n  cargo xtask prove --check\n  cargo xtask prove --help    (all that it takes)"
-    )]
+    #[command(disable_help_flag = true, after_help = examples("prove --quick|prove --check"))]
     Prove(sim::Args),
     /// Judge the contact's fit on thousands of pictures, and renew the tables of docs/contact.md
-    #[command(
-        disable_help_flag = true,
-        after_help = "Examples:\n  cargo xtask fit --quick\n  cargo xtask fit --check\n  cargo xtask fit --help    (all that it takes)"
-    )]
+    #[command(disable_help_flag = true, after_help = examples("fit --quick|fit --check"))]
     Fit(sim::Args),
     /// Prove the control step free of panics and of floating-point calls
     #[command(after_help = "Examples:\n  cargo xtask panic-free")]
@@ -119,6 +101,12 @@ enum Command {
     Cluster,
 }
 
+/// Examples of a command whose program has a help of its own.
+fn examples(list: &str) -> String {
+    let help = list.split(' ').next().unwrap_or_default().to_owned() + " --help    (all that it takes)";
+    list.split('|').chain([&*help]).fold("Examples:".into(), |text, example| text + "\n  cargo xtask " + example)
+}
+
 fn main() -> ExitCode {
     match run(&Cli::parse()) {
         Ok(()) => ExitCode::SUCCESS,
@@ -130,7 +118,7 @@ fn main() -> ExitCode {
 }
 
 fn run(cli: &Cli) -> anyhow::Result<()> {
-    let console = &mut Console::terminal();
+    let console = &mut Console::default();
     let toolchain = cli.toolchain;
     match &cli.command {
         Command::Demo(args) => sim::demo(args, toolchain, console),
@@ -148,8 +136,8 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Cores => cores::run_all(toolchain, console),
         Command::Timing(args) => timing::run(args, toolchain, console),
         Command::Study(args) => timing::study(args, toolchain, console),
-        Command::Prove(args) => host::run_tool("prove", &args.words(), console),
-        Command::Fit(args) => host::run_tool("fit", &args.words(), console),
+        Command::Prove(args) => host::run_tool("prove", &args.arguments, console),
+        Command::Fit(args) => host::run_tool("fit", &args.arguments, console),
         Command::PanicFree => image::prove_panic_free(toolchain, console),
         Command::Lint => test::lint(toolchain),
         Command::Docs(args) => docs::run(args, toolchain, console),

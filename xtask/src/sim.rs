@@ -15,13 +15,6 @@ pub struct Args {
     pub arguments: Vec<String>,
 }
 
-impl Args {
-    /// The same, borrowed.
-    pub fn words(&self) -> Vec<&str> {
-        self.arguments.iter().map(String::as_str).collect()
-    }
-}
-
 /// Runs a program on the native board.
 pub fn native(program: &'static str, args: &Args, console: &mut Console) -> Result<()> {
     start(host::Program::sim(program).build(console)?.args(&args.arguments))
@@ -82,11 +75,7 @@ pub fn demo(args: &DemoArgs, choice: Choice, console: &mut Console) -> Result<()
     console.say(&image.summary());
     let mut command = host::BOARD.build(console)?;
     command.args(["demo", "--image"]).arg(&image.elf);
-    for (flag, value) in [("--json", &args.json), ("--out", &args.out)] {
-        if let Some(path) = value {
-            command.arg(flag).arg(std::path::absolute(path)?);
-        }
-    }
+    host::give_files(&mut command, [("--json", &args.json), ("--out", &args.out)])?;
     command.args(args.quick.then_some("--quick"));
     console.run(&mut command)
 }

@@ -63,8 +63,7 @@ pub fn run(args: &Args, choice: Choice) -> Result<()> {
     stages.finish("test")
 }
 
-/// Runs the larger sizes or remaining cases of the tests with two sizes (their names begin with `long_`), and checks the tables of proofs
-/// and fits.
+/// Runs the larger sizes (tests whose names begin with `long_`), and checks the tables of proofs and fits.
 fn long(mut stages: Stages, choice: Choice) -> Result<()> {
     stages.stage("long core and host tests", |console| {
         let python = install::bus_python(console)?;
@@ -89,30 +88,15 @@ fn long(mut stages: Stages, choice: Choice) -> Result<()> {
 const ALL: [&str; 2] = ["--workspace", "--features=m4-timing/plugin,fingertip-cli/foxglove"];
 /// Programs whose default features somebody leaves out: those of `cargo xtask demo` and the host's. Each is named, because
 /// `--bins` passes over one that lacks a feature.
-const LEAST: [&str; 8] = [
-    "--package=sim",
-    "--package=virtual-board",
-    "--package=fingertip-cli",
-    "--no-default-features",
-    "--lib",
-    "--bin=demo",
-    "--bin=virtual-board",
-    "--bin=fingertip",
-];
+const LEAST: &str = "--package=sim --package=virtual-board --package=fingertip-cli --no-default-features --lib --bin=demo \
+                     --bin=virtual-board --bin=fingertip";
 /// Every image for the microcontroller: flashed, emulated, or linked as a proof. In one view, what they share is checked once.
-const IMAGES: [&str; 6] = [
-    "--package=fingertip",
-    "--package=images",
-    "--package=bringup",
-    "--bins",
-    "--no-default-features",
-    "--features=fingertip/firmware,fingertip/measure,images/qemu,images/proof,images/study,bringup/image",
-];
+const IMAGES: &str = "--package=fingertip --package=images --package=bringup --bins --no-default-features \
+    --features=fingertip/firmware,fingertip/measure,images/qemu,images/proof,images/study,bringup/image";
 
 /// Programs of other boards, each a workspace of its own.
 const APART: [&str; 2] = [cores::EXAMPLE, cores::LOOP];
 
-/// Runs all checks that are no tests.
 pub fn lint(choice: Choice) -> Result<()> {
     let mut stages = Stages::default();
     stages.stage("format", |console| {
@@ -128,12 +112,13 @@ pub fn lint(choice: Choice) -> Result<()> {
         // `--all-targets` passes over tests that plain `cargo test` does not run.
         console.run(clippy(console::cargo("clippy").args(ALL).args(["--test=board", "--test=report"])))
     });
-    stages.stage("lints, least features", |console| console.run(clippy(console::cargo("clippy").args(LEAST))));
+    stages
+        .stage("lints, least features", |console| console.run(clippy(console::cargo("clippy").args(LEAST.split(' ')))));
     stages.stage("lints, microcontroller", |console| {
         let toolchain = toolchain::ensure(choice, console)?;
         ensure!(toolchain == Toolchain::Native, "Debian's Rust has no clippy for {TARGET}: rustup's target is needed");
         // In the profile of the images, whose proc macros are compiled already.
-        console.run(clippy(toolchain.cargo("clippy").arg("--release").args(IMAGES)))?;
+        console.run(clippy(toolchain.cargo("clippy").arg("--release").args(IMAGES.split(' '))))?;
         let target = cores::TARGET_OF_EXAMPLE;
         let toolchain =
             toolchain::ensure_for(choice, &[target], "programs of other boards are checked for it", console)?;
@@ -154,7 +139,6 @@ pub fn lint(choice: Choice) -> Result<()> {
     stages.finish("lint")
 }
 
-/// Ends a command of clippy's.
 fn clippy(command: &mut Command) -> &mut Command {
     command.args(["--ignore-rust-version", "--", "-D", "warnings"])
 }
@@ -162,19 +146,9 @@ fn clippy(command: &mut Command) -> &mut Command {
 /// A sequence of checks, each a line with its cost; what failed is shown in full.
 #[derive(Default)]
 pub struct Stages {
-    done: Vec<Stage>,
+    /// Names, with CPU time of compiling, CPU time of all else, and time by the clock, s.
+    done: Vec<(String, [f64; 3])>,
     failed: Vec<String>,
-}
-
-/// Cost of a stage.
-struct Stage {
-    name: String,
-    /// CPU time of compiling, s.
-    built_s: f64,
-    /// CPU time of all else, s.
-    ran_s: f64,
-    /// By the clock, s.
-    clock_s: f64,
 }
 
 impl Stages {
@@ -186,9 +160,8 @@ impl Stages {
         let mut console = Console::captured();
         let (start, before_s) = (Instant::now(), cpu_s());
         let result = work(&mut console);
-        let (clock_s, built_s) = (start.elapsed().as_secs_f64(), console.built_s());
-        let ran_s = cpu_s() - before_s - built_s;
-        self.done.push(Stage { name: name.into(), built_s, ran_s, clock_s });
+        let (clock_s, built_s) = (start.elapsed().as_secs_f64(), console.built_s);
+        self.done.push((name.into(), [built_s, cpu_s() - before_s - built_s, clock_s]));
         clear_line();
         match result {
             Ok(value) => {
@@ -212,17 +185,12 @@ impl Stages {
         }
     }
 
-    /// The verdict.
     pub fn finish(self, what: &str) -> Result<()> {
         println!("\n{:>10} {:>8} {:>8}  seconds of CPU time", "compiling", "running", "clock");
-        let line = |built_s: f64, ran_s: f64, clock_s: f64, name: &str| {
+        let all = [0, 1, 2].map(|place| self.done.iter().map(|(_, costs)| costs[place]).sum());
+        for (name, [built_s, ran_s, clock_s]) in self.done.iter().chain([&("all\n".into(), all)]) {
             println!("{built_s:10.1} {ran_s:8.1} {clock_s:8.1}  {name}");
-        };
-        for Stage { name, built_s, ran_s, clock_s } in &self.done {
-            line(*built_s, *ran_s, *clock_s, name);
         }
-        let sum = |of: fn(&Stage) -> f64| self.done.iter().map(of).sum::<f64>();
-        line(sum(|stage| stage.built_s), sum(|stage| stage.ran_s), sum(|stage| stage.clock_s), "all\n");
         if !self.failed.is_empty() {
             bail!("{} failed: {}", what, self.failed.join("; "));
         }

@@ -1,5 +1,4 @@
-//! Estimated cycles on a Cortex-M4F: an image under QEMU with the timing plugin. `docs/timing.md` says what they are
-//! worth.
+//! Estimated cycles on a Cortex-M4F, by QEMU with the timing plugin. Their worth: `docs/timing.md`.
 
 use crate::console::{self, Console};
 use crate::host::{self, Program};
@@ -34,26 +33,13 @@ pub struct Args {
     check: bool,
 }
 
-/// Result of an image's run under the plugin.
-pub struct Run {
-    /// Standard output of the image.
-    pub output: String,
-    /// The regions, in order of their numbers, with the names of the lines `region NUMBER NAME` of the output.
-    pub regions: Vec<Measured>,
-}
-
 /// Measures an image, or checks the model.
 pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     let Some(image) = &args.image else { return check(choice, console) };
     let image = fs::canonicalize(image).with_context(|| host::shown(image))?;
-    let run = measure(&image, None, console)?;
-    console.print(&table(&run.regions));
-    match &args.json {
-        Some(path) => {
-            fs::write(path, json_lines(&run.regions)).with_context(|| format!("cannot write {}", host::shown(path)))
-        }
-        None => Ok(()),
-    }
+    let (_, regions) = measure(&image, None, console)?;
+    console.print(&table(&regions));
+    args.json.iter().try_for_each(|path| host::write(path, json_lines(&regions)))
 }
 
 /// Runs the tests that compare the model with published measurements.
@@ -65,15 +51,13 @@ pub fn check(choice: Choice, console: &mut Console) -> Result<()> {
     host::test(command.env("M4_TIMING_PLUGIN", plugin).env("M4_TIMING_IMAGE", image), console)
 }
 
-/// Runs an image to its end under the plugin; `argument` is its command line.
-pub fn measure(image: &Path, argument: Option<&Path>, console: &mut Console) -> Result<Run> {
+/// Runs an image to its end under the plugin; `argument` is its command line. Returns its standard output, and the regions in
+/// order of their numbers, with the names of the output's lines `region NUMBER NAME`.
+pub fn measure(image: &Path, argument: Option<&Path>, console: &mut Console) -> Result<(String, Vec<Measured>)> {
     ensure(console)?;
     let plugin = plugin(console)?;
-    let file = host::made("timing")?.join(format!(
-        "{}.{}.json",
-        image.file_stem().unwrap_or_default().display(),
-        std::process::id()
-    ));
+    let name = image.file_stem().unwrap_or_default().display();
+    let file = host::made("timing")?.join(format!("{name}.{}.json", std::process::id()));
     let argument = argument.map_or_else(String::new, |argument| format!(",arg={}", argument.display()));
     let mut command = Command::new(PROGRAM);
     command.args(["-M", "netduinoplus2", "-display", "none", "-monitor", "none", "-serial", "none"]);
@@ -95,7 +79,7 @@ pub fn measure(image: &Path, argument: Option<&Path>, console: &mut Console) -> 
         let name = output.lines().find_map(|line| line.strip_prefix(&start));
         measured.name = name.map_or(format!("region {}", measured.region), Into::into);
     }
-    Ok(Run { output, regions })
+    Ok((output, regions))
 }
 
 /// Makes sure of an emulator with the plugin interface.
@@ -113,7 +97,6 @@ fn ensure(console: &mut Console) -> Result<()> {
     }
 }
 
-/// The emulator's major version.
 fn version() -> Option<u32> {
     let output = Command::new(PROGRAM).arg("--version").output().ok()?;
     let text = String::from_utf8(output.stdout).ok()?;
@@ -127,7 +110,6 @@ fn plugin(console: &mut Console) -> Result<PathBuf> {
     fs::canonicalize(&file).with_context(|| host::shown(&file))
 }
 
-/// A line for each region: cycles of a pass.
 fn table(regions: &[Measured]) -> String {
     let mut text = format!(
         "{:<34}{:>8}{:>8}{:>8}{:>9}{:>8}{:>8}{:>10}\n",
@@ -149,7 +131,6 @@ fn table(regions: &[Measured]) -> String {
 const STUDY: &str = "study";
 /// The profile of everything but the firmware's own code.
 const STUDY_PROFILE: &str = "study";
-/// Number of fingers of the whole loop.
 const FINGERS: &str = "12";
 
 #[derive(clap::Args)]
@@ -181,14 +162,10 @@ pub fn study(args: &StudyArgs, choice: Choice, console: &mut Console) -> Result<
     let mut fingers = Program::sim("budget").build(console)?;
     let held = console::output(fingers.args(["--whole-loop", "--fingers", FINGERS]))?;
     let whole_loop = folder.join("whole-loop.txt");
-    fs::write(&whole_loop, held).with_context(|| format!("cannot write {}", host::shown(&whole_loop)))?;
+    host::write(&whole_loop, held)?;
     let mut command = judge.build(console)?;
     command.arg("report").arg(&shipped).arg(&quick).arg(&whole_loop).args(args.check.then_some("--check"));
-    for (flag, path) in [("--json", &args.json), ("--out", &args.out)] {
-        if let Some(path) = path {
-            command.arg(flag).arg(std::path::absolute(path).with_context(|| host::shown(path))?);
-        }
-    }
+    host::give_files(&mut command, [("--json", &args.json), ("--out", &args.out)])?;
     console.run(&mut command)
 }
 
@@ -206,15 +183,14 @@ fn build_quick(toolchain: Toolchain, console: &mut Console) -> Result<PathBuf> {
 
 /// Runs an image; what it said and what it cost, in a file.
 fn measured(image: &Path, inputs: &Path, file: &Path, console: &mut Console) -> Result<PathBuf> {
-    let run = measure(image, Some(inputs), console)?;
-    let mut text = run.output;
-    for measured in &run.regions {
+    let (mut text, regions) = measure(image, Some(inputs), console)?;
+    for measured in &regions {
         text += &format!("cost {}", measured.region);
         for figure in [&measured.instructions, &measured.low, &measured.estimate, &measured.high, &measured.flash] {
             text += &format!(" {} {}", figure.median, figure.max);
         }
         text.push('\n');
     }
-    fs::write(file, text).with_context(|| format!("cannot write {}", host::shown(file)))?;
+    host::write(file, text)?;
     Ok(file.into())
 }

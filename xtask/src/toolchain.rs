@@ -28,7 +28,6 @@ pub enum Choice {
 pub enum Toolchain {
     /// The compiler that cargo would take anyway has the target.
     Native,
-    /// Debian's compiler.
     Debian,
 }
 

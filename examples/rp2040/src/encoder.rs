@@ -1,5 +1,4 @@
-//! The encoder: both channels' edges counted by an interrupt. Above 50,000 counts a second use a
-//! program of the PIO instead.
+//! The encoder: an interrupt counts both channels' edges. Above 50,000 counts a second use a program of the PIO.
 
 use crate::pins;
 use core::cell::Cell;

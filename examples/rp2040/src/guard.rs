@@ -1,5 +1,4 @@
-//! The guard: shorts the motor where no frame was answered for one and three quarters of a frame, and resets a processor
-//! that hangs.
+//! The guard: shorts the motor after 1.75 frames without an answer, and resets a processor that hangs.
 
 use crate::bridge;
 use core::cell::Cell;

@@ -1,5 +1,4 @@
-//! A headless Chromium, driven over the DevTools protocol: opens a page as on a screen or a phone, light or dark, and
-//! reports its errors.
+//! A headless Chromium, driven over the DevTools protocol: opens a page in various looks and reports its errors.
 
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use serde_json::{Value, json};
@@ -21,17 +20,8 @@ pub type BrowserError = Box<dyn Error + Send + Sync>;
 /// Silence after which a browser counts as hung; the slowest machine needs a small part of it.
 const HUNG: Duration = Duration::from_secs(7200);
 /// No window, no sandbox (it needs rights that a container lacks), nothing that it does by itself.
-const FLAGS: [&str; 9] = [
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--hide-scrollbars",
-    "--remote-debugging-port=0",
-];
+const FLAGS: &str = "--headless --no-sandbox --disable-gpu --no-first-run --disable-background-networking \
+                     --disable-component-update --disable-sync --hide-scrollbars --remote-debugging-port=0";
 
 /// A browser with one page open.
 pub struct Browser {
@@ -39,6 +29,7 @@ pub struct Browser {
     socket: WebSocket<MaybeTlsStream<TcpStream>>,
     sent: u64,
     session: Option<String>,
+    /// Events since the page was opened.
     events: Vec<Value>,
 }
 
@@ -49,7 +40,7 @@ impl Browser {
     /// The program does not start or does not answer; the text includes its output.
     pub fn start(program: &Path, profile: &Path) -> Result<Self, BrowserError> {
         let mut command = Command::new(program);
-        command.args(FLAGS).arg(format!("--user-data-dir={}", profile.display())).arg("about:blank");
+        command.args(FLAGS.split(' ')).arg(format!("--user-data-dir={}", profile.display())).arg("about:blank");
         // What it would leave in the user's home goes to the profile.
         command.env("HOME", profile).env_remove("XDG_CONFIG_HOME").env_remove("XDG_CACHE_HOME");
         let mut process = command
@@ -102,19 +93,12 @@ impl Browser {
 
     /// Works an expression out on the page; a promise, once it is kept.
     pub fn evaluate(&mut self, expression: &str) -> Result<Value, BrowserError> {
-        let answer = self.call(
-            "Runtime.evaluate",
-            json!({ "expression": expression, "returnByValue": true, "awaitPromise": true }),
-        )?;
+        let params = json!({ "expression": expression, "returnByValue": true, "awaitPromise": true });
+        let answer = self.call("Runtime.evaluate", params)?;
         match answer.get("exceptionDetails") {
             Some(details) => Err(format!("{expression}: {details}").into()),
             None => Ok(answer["result"]["value"].clone()),
         }
-    }
-
-    /// Events since the page was opened.
-    pub fn events(&self) -> &[Value] {
-        &self.events
     }
 
     /// Calls a method of the protocol.
@@ -176,8 +160,7 @@ fn way((x, y): Place, (to_x, to_y): Place) -> impl Iterator<Item = Place> {
 }
 
 impl Browser {
-    /// Scrolls the first element of a selector into view, and returns a position in it by shares of its width and
-    /// height.
+    /// Scrolls the first element of a selector into view. Returns a position in it, by shares of width and height.
     pub fn place(&mut self, selector: &str, (right, down): (f64, f64)) -> Result<Place, BrowserError> {
         let place = self.evaluate(&format!(
             "(() => {{
@@ -276,7 +259,6 @@ const LETTER_PX: f64 = 9.0;
 /// Least share of the whole text that a page has which is not empty.
 const LETTERS: f64 = 500.0;
 
-/// Asks the page about itself.
 const QUESTIONS: &str = include_str!("questions.js");
 
 /// Has the browser show pages so from here on.
@@ -293,18 +275,12 @@ pub fn look(browser: &mut Browser, look: Look) -> Result<(), BrowserError> {
 }
 
 /// Takes a screenshot of the whole page.
-///
-/// # Errors
-/// The browser fails, or the screenshot cannot be written.
 pub fn shoot(browser: &mut Browser, picture: &Path) -> Result<(), BrowserError> {
     let shot = browser.call("Page.captureScreenshot", json!({ "format": "png", "captureBeyondViewport": true }))?;
     Ok(fs::write(picture, BASE64_STANDARD.decode(shot["data"].as_str().unwrap_or_default())?)?)
 }
 
 /// Opens a page with the given look, takes a screenshot, and returns all that is wrong with the page.
-///
-/// # Errors
-/// The browser fails, or the screenshot cannot be written.
 pub fn complaints(browser: &mut Browser, address: &str, so: Look, picture: &Path) -> Result<Vec<String>, BrowserError> {
     look(browser, so)?;
     browser.open(address)?;
@@ -334,7 +310,7 @@ pub fn events(browser: &Browser, address: &str) -> Vec<String> {
             _ => None,
         }
     };
-    browser.events().iter().filter_map(complaint).collect()
+    browser.events.iter().filter_map(complaint).collect()
 }
 
 fn of_page(page: &Value, look: Look) -> Vec<String> {
@@ -379,7 +355,7 @@ fn of_page(page: &Value, look: Look) -> Vec<String> {
 /// Brightness of `rgb(r, g, b)`, 0 to 1; NaN of anything else.
 fn brightness(colour: &str) -> f64 {
     let parts = colour.strip_prefix("rgb(").and_then(|rest| rest.strip_suffix(')'));
-    let parts: Option<Vec<f64>> =
-        parts.and_then(|parts| parts.split(',').map(|part| part.trim().parse().ok()).collect());
+    let parts =
+        parts.and_then(|parts| parts.split(',').map(|part| part.trim().parse().ok()).collect::<Option<Vec<_>>>());
     parts.filter(|parts| parts.len() == 3).map_or(f64::NAN, |parts| parts.iter().sum::<f64>() / 765.0)
 }

@@ -19,9 +19,7 @@ use std::time::{Duration, Instant};
 /// Interval at which an idle finger is advanced: the time that it must catch up at most when a request arrives.
 pub const TICK: Duration = Duration::from_millis(1);
 
-/// A simulated finger.
 pub trait Finger {
-    /// Reason of a failure.
     type Error;
 
     /// Time of the finger, s.
@@ -57,7 +55,7 @@ pub fn serve<F: Finger>(finger: &mut F, port: &mut Port, late: Duration, always:
     let mut due = Instant::now() + TICK;
     loop {
         let now_s = pace.clock_s(finger.now_s());
-        let wait = pace.until(finger.due_s()).map_or(due, |answer| answer.min(due));
+        let wait = finger.due_s().map_or(due, |due_s| pace.until(due_s).min(due));
         // A finger that is behind continues at once.
         let behind = now_s - finger.now_s() > TICK.as_secs_f64();
         let wait = if behind { Duration::ZERO } else { wait.saturating_duration_since(Instant::now()) };
@@ -109,11 +107,8 @@ const LOOKS_BETWEEN: u32 = 5;
 pub struct Served {
     /// Time of the finger, s.
     pub virtual_s: f64,
-    /// Real time.
     pub wall_s: f64,
-    /// Bytes from clients.
     pub received: u64,
-    /// Bytes to them.
     pub sent: u64,
     /// Answers, and how many of them were late.
     pub answers: u64,
@@ -123,7 +118,6 @@ pub struct Served {
 }
 
 /// A finger's time against the clock.
-#[derive(Debug)]
 pub struct Pace {
     begun: Instant,
     begun_s: f64,
@@ -138,8 +132,6 @@ pub struct Pace {
     silent: u32,
 }
 
-/// Statistics since the last report.
-#[derive(Debug)]
 struct Look {
     at: Instant,
     virtual_s: f64,
@@ -173,8 +165,8 @@ impl Pace {
     }
 
     /// Instant at which the clock reaches a time of the finger.
-    pub fn until(&self, time_s: Option<f64>) -> Option<Instant> {
-        time_s.map(|time_s| self.begun + Duration::from_secs_f64((time_s - self.begun_s + self.lost_s).max(0.0)))
+    pub fn until(&self, time_s: f64) -> Instant {
+        self.begun + Duration::from_secs_f64((time_s - self.begun_s + self.lost_s).max(0.0))
     }
 
     pub fn asked(&mut self, bytes: usize) {

@@ -10,10 +10,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
-/// After which time an answer is late, the delay that the host has set left out.
-const LATE: Duration = Duration::from_millis(2);
-/// The delay at power-on.
-const DELAY: Duration = Duration::from_micros(500);
+/// Time after which an answer is late: 2 ms, and the delay at power-on.
+const LATE: Duration = Duration::from_micros(2_500);
 
 /// Serves a simulated finger in real time: the native core and link, for any client of the bus.
 ///
@@ -47,14 +45,8 @@ struct Args {
 }
 
 fn main() -> ExitCode {
-    match run(&Args::parse()) {
-        Ok(()) if say::end() => ExitCode::SUCCESS,
-        Ok(()) => ExitCode::from(2),
-        Err(why) => {
-            say::aside(why);
-            ExitCode::from(2)
-        }
-    }
+    let ended = run(&Args::parse()).map_err(say::aside);
+    if ended.is_ok() && say::end() { ExitCode::SUCCESS } else { ExitCode::from(2) }
 }
 
 fn run(args: &Args) -> Result<(), String> {
@@ -66,17 +58,12 @@ fn run(args: &Args) -> Result<(), String> {
     let stop = port.stopper();
     ctrlc::set_handler(move || stop.stop()).map_err(|why| format!("cannot wait for Ctrl-C: {why}"))?;
     let ids = if fingers > 1 { format!("IDs 1 to {fingers}") } else { "ID 1".into() };
-    say::line(format_args!(
-        "serving  {} (DYNAMIXEL Protocol 2.0, {} baud, {ids}; Ctrl-C ends)",
-        port.name(),
-        bus.baud()
-    ));
-    say::line(format_args!(
-        "scene    {}: {} (simulated on the native core; `help` lists commands)",
-        scene.name, scene.about
-    ));
+    let (name, baud) = (port.name(), bus.baud());
+    say::line(format_args!("serving  {name} (DYNAMIXEL Protocol 2.0, {baud} baud, {ids}; Ctrl-C ends)"));
+    let (name, about) = (&scene.name, &scene.about);
+    say::line(format_args!("scene    {name}: {about} (simulated on the native core; `help` lists commands)"));
     io::stdout().flush().map_err(|why| format!("cannot say where it serves: {why}"))?;
-    let Ok(served) = serve::serve(&mut Native(bus), &mut port, LATE + DELAY, false);
+    let Ok(served) = serve::serve(&mut Native(bus), &mut port, LATE, false);
     say::line(served.text());
     Ok(())
 }

@@ -4,7 +4,6 @@ use crate::Finger;
 use sim::native::served::Bus;
 use std::convert::Infallible;
 
-/// The fingers of a scene.
 pub struct Native(pub Bus);
 
 impl Finger for Native {
@@ -30,11 +29,7 @@ impl Finger for Native {
     fn answer(&mut self) -> Result<Vec<u8>, Infallible> {
         // An answer leaves with the frame in which it is due, not with the one behind it.
         let by_s = self.0.now_s() + self.0.frame_s();
-        let mut bytes = Vec::new();
-        while let Some(answer) = self.0.answer(by_s) {
-            bytes.extend(answer.bytes);
-        }
-        Ok(bytes)
+        Ok(std::iter::from_fn(|| self.0.answer(by_s)).flat_map(|answer| answer.bytes).collect())
     }
 
     fn due_s(&self) -> Option<f64> {

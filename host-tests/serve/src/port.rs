@@ -18,7 +18,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// More than any packet.
 const BUFFER: usize = 4096;
 /// Bytes of the longest command line; longer ones are ignored.
 const LINE_MAX: usize = 1000;
@@ -32,16 +31,12 @@ pub enum Place {
     Tcp(u16),
 }
 
-/// Input of a served finger.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Event {
-    /// Bytes from the client.
     Bytes(Vec<u8>),
     /// Command from the standard input.
     Command(String),
-    /// Request to end.
     Stop,
-    /// No input within the time.
     Nothing,
 }
 
@@ -57,7 +52,6 @@ impl Stop {
 }
 
 /// The place where clients come in; gone, with its link, when dropped.
-#[derive(Debug)]
 pub struct Port {
     name: String,
     place: Opened,
@@ -66,23 +60,20 @@ pub struct Port {
     side: Option<Side>,
 }
 
-#[derive(Debug)]
 enum Opened {
     Pty(Pty),
     Tcp(Tcp),
 }
 
 /// Commands, a line each.
-#[derive(Debug, Default)]
+#[derive(Default)]
 struct Side {
     begun: Vec<u8>,
     lines: VecDeque<String>,
-    /// True after the end of the input.
     ended: bool,
 }
 
 impl Port {
-    /// Opens it.
     pub fn open(place: &Place) -> io::Result<Self> {
         let (name, place) = match place {
             Place::Pty(link) => Pty::open(link.as_deref()).map(|(name, pty)| (name, Opened::Pty(pty)))?,
@@ -195,7 +186,6 @@ fn read(from: impl AsFd) -> io::Result<Vec<u8>> {
 
 // A pseudo-terminal, and a link to it that one process holds.
 
-#[derive(Debug)]
 struct Pty {
     /// The finger's end, and the client's end held open so that clients may come and go.
     near: SerialPort,
@@ -206,7 +196,6 @@ struct Pty {
 }
 
 /// A link to the terminal; gone when dropped.
-#[derive(Debug)]
 struct Link {
     path: PathBuf,
     device: PathBuf,
@@ -243,7 +232,6 @@ impl Pty {
         let _ = rustix::io::write(&self.near, bytes);
     }
 
-    /// Baud rate that the client has set.
     fn baud(&self) -> Option<u32> {
         tcgetattr(&self.far).ok().map(|settings| settings.output_speed())
     }
@@ -251,20 +239,17 @@ impl Pty {
 
 impl Link {
     fn make(path: &Path, device: PathBuf) -> io::Result<Self> {
-        let lock = Lock::take_or(path, |who, lock| {
-            format!(
-                "{who} serves a finger at {} and holds {}: end it, or name another link",
-                path.display(),
-                lock.display()
-            )
-        })
-        .map_err(|why| cannot_make(path, &why))?;
+        let taken = |who: &str, lock: &Path| {
+            let (path, lock) = (path.display(), lock.display());
+            format!("{who} serves a finger at {path} and holds {lock}: end it, or name another link")
+        };
+        let lock = Lock::take_or(path, taken).map_err(|why| cannot_make(path, &why))?;
         // A link that an earlier run left behind is replaced; a file is not.
         if path.is_symlink() {
             std::fs::remove_file(path)?;
         } else if path.exists() {
-            let why = "a file of this name is there: name another link, or remove the file";
-            return Err(cannot_make(path, &io::Error::new(io::ErrorKind::AlreadyExists, why)));
+            let why = io::Error::other("a file of this name is there: name another link, or remove the file");
+            return Err(cannot_make(path, &why));
         }
         std::os::unix::fs::symlink(&device, path).map_err(|why| cannot_make(path, &why))?;
         Ok(Self { path: path.into(), device, _lock: lock })
@@ -286,7 +271,6 @@ fn cannot_make(path: &Path, why: &io::Error) -> io::Error {
 
 // A TCP port with one client at a time.
 
-#[derive(Debug)]
 struct Tcp {
     listener: TcpListener,
     client: Option<(TcpStream, SocketAddr)>,

@@ -78,13 +78,8 @@ fn another_speed_is_not_heard() {
     let port = terminal(&served, 57_600);
     port.write_all(&PING).expect("a terminal takes it");
     // The first client notices the loss later: the answer goes only to the second.
-    let mut line = String::new();
-    let mut complaints = BufReader::new(served.child.0.stderr.take().expect("it was asked for"));
-    complaints.read_line(&mut line).expect("a line");
-    while !line.contains("unheard") {
-        line.clear();
-        complaints.read_line(&mut line).expect("a line");
-    }
+    let mut complaints = BufReader::new(served.child.0.stderr.take().expect("it was asked for")).lines();
+    let line = complaints.find_map(|line| line.ok().filter(|line| line.contains("unheard"))).expect("a line");
     assert!(line.contains("a client sends at 57600 baud, the finger listens at 1000000"), "{line}");
     drop(port);
     pings(&mut terminal(&served, 1_000_000));
@@ -188,19 +183,13 @@ fn a_last_line_needs_no_end_and_a_line_too_long_is_none() {
 #[test]
 fn behind_a_terminal_it_serves_on_while_somebody_types() {
     let [path, number] = ["behind", "number"].map(link);
-    let job = format!(
-        "set -m; {} --pty {} > /dev/null 2>&1 & echo $! > {}; sleep 3600",
-        env!("CARGO_BIN_EXE_serve"),
-        path.display(),
-        number.display()
-    );
+    let (program, shown) = (env!("CARGO_BIN_EXE_serve"), [&path, &number].map(|path| path.display()));
+    let job = format!("set -m; {program} --pty {} > /dev/null 2>&1 & echo $! > {}; sleep 3600", shown[0], shown[1]);
     let mut script = Command::new("script");
     script.args(["-qc", &job, "/dev/null"]).env("SHELL", "/bin/sh").stdin(Stdio::piped()).stdout(Stdio::piped());
     let mut script = Killed(script.spawn().expect("Debian has it (bsdutils)"));
     let mut typed = script.0.stdin.take().expect("it was asked for");
-    while !path.exists() {
-        std::thread::sleep(std::time::Duration::from_millis(1));
-    }
+    wait_for(|| path.exists());
     typed.write_all(b"typed\n").expect("it takes it");
     // The terminal shows what it has.
     let (mut shown, mut byte) = (Vec::new(), [0]);
@@ -209,14 +198,10 @@ fn behind_a_terminal_it_serves_on_while_somebody_types() {
         shown.push(byte[0]);
     }
     // The shell may not have come as far as the finger.
-    let written = loop {
-        match std::fs::read_to_string(&number) {
-            Ok(line) if line.ends_with('\n') => break line,
-            _ => std::thread::sleep(std::time::Duration::from_millis(1)),
-        }
-    };
+    let written = || std::fs::read_to_string(&number).unwrap_or_default();
+    wait_for(|| written().ends_with('\n'));
+    let pid: i32 = written().trim().parse().expect("a number");
     std::fs::remove_file(&number).expect("it is there");
-    let number: i32 = written.trim().parse().expect("a number");
     let mut port = SerialPort::open(&path, 1_000_000).expect("it is there");
     port.set_read_timeout(std::time::Duration::from_secs(1)).expect("a time-out");
     for _ in 0..200 {
@@ -224,14 +209,18 @@ fn behind_a_terminal_it_serves_on_while_somebody_types() {
         let mut reply = [0; 14];
         while let Err(why) = port.read_exact(&mut reply) {
             assert_eq!(why.kind(), std::io::ErrorKind::TimedOut);
-            let state = std::fs::read_to_string(format!("/proc/{number}/stat")).expect("it runs");
+            let state = std::fs::read_to_string(format!("/proc/{pid}/stat")).expect("it runs");
             assert!(!state.contains(") T "), "it was stopped: {state}");
         }
         assert_eq!(reply[..12], PONG);
     }
-    let pid = rustix::process::Pid::from_raw(number).expect("a process number");
+    let pid = rustix::process::Pid::from_raw(pid).expect("a process number");
     rustix::process::kill_process(pid, rustix::process::Signal::INT).expect("it runs");
-    while path.is_symlink() {
+    wait_for(|| !path.is_symlink());
+}
+
+fn wait_for(mut happened: impl FnMut() -> bool) {
+    while !happened() {
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
 }
@@ -244,7 +233,6 @@ Bus.watch = lambda bus, ids, silence_s: watch(bus, ids, 2.54)
 del sys.argv[0]
 runpy.run_path(sys.argv[0], run_name='__main__')";
 
-/// Output of an example.
 fn example(served: &Served, name: &str, arguments: &[&str]) -> String {
     let example = Path::new(env!("FINGERTIP_ROOT")).join("python/examples").join(name);
     let mut command = python();
@@ -252,7 +240,6 @@ fn example(served: &Served, name: &str, arguments: &[&str]) -> String {
     said(command.args(arguments))
 }
 
-/// A Python that finds the package.
 fn python() -> Command {
     let python = std::env::var_os("FINGERTIP_PYTHON").expect("`cargo xtask test` sets FINGERTIP_PYTHON");
     let mut command = Command::new(PathBuf::from(python));
@@ -322,7 +309,6 @@ fn long_every_end_of_a_python_program_leaves_no_force() {
     said(tests_of("test_interrupted.py").env("INSTANTS", "1"));
 }
 
-/// The tests of one file.
 fn tests_of(name: &str) -> Command {
     let mut command = python();
     command.env("FINGERTIP_SERVE", env!("CARGO_BIN_EXE_serve")).args(["-m", "unittest", "discover", "--pattern", name]);

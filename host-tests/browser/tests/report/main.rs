@@ -1,5 +1,4 @@
-//! Reports in a real browser, light and dark, on a screen and on a phone. `cargo xtask test` installs the browser and
-//! runs this.
+//! Reports in a real browser, in various looks. `cargo xtask test` installs the browser and runs this.
 //!
 //! The pictures that it takes lie in `target/tmp`.
 
@@ -71,10 +70,9 @@ fn nothing_is_wrong(name: &str) {
     let path = folder.join("report.html");
     fs::write(&path, page(&report).unwrap()).unwrap();
     for look in LOOKS {
-        let [scheme, device] =
-            [["light", "dark"][usize::from(look.dark)], ["screen", "phone"][usize::from(look.phone)]];
-        let still = if look.scripts { "" } else { "-still" };
-        let picture = folder.join(format!("{device}-{scheme}{still}.png"));
+        let [phone, dark, still] = [look.phone, look.dark, !look.scripts].map(usize::from);
+        let name = [["screen", "phone"][phone], ["light", "dark"][dark], ["", "still"][still]].join("-");
+        let picture = folder.join(format!("{}.png", name.trim_end_matches('-')));
         let found = complaints(&mut browser, &address(&path), look, &picture).unwrap();
         assert!(found.is_empty(), "{look:?}:\n{}", found.join("\n"));
         assert!(fs::metadata(&picture).unwrap().len() > 20_000, "{} shows next to nothing", picture.display());

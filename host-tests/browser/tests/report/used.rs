@@ -18,7 +18,6 @@ fn write(path: &Path, name: &str, over: Option<&Over>) -> String {
     page
 }
 
-/// The wall's report, opened.
 fn opened(name: &str, so: browser::Look) -> (PathBuf, Browser, PathBuf) {
     let (folder, mut browser) = browser(name);
     let path = folder.join("report.html");
@@ -29,7 +28,6 @@ fn opened(name: &str, so: browser::Look) -> (PathBuf, Browser, PathBuf) {
     (folder, browser, path)
 }
 
-/// State that the page reports.
 fn said(browser: &mut Browser) -> Value {
     browser.evaluate(include_str!("said.js")).unwrap()
 }

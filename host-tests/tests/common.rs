@@ -4,27 +4,33 @@ pub use fastrand::Rng;
 pub use fingertip::capture::{Capture, CaptureState};
 pub use fingertip::command::Command;
 pub use fingertip::config::newtons;
-pub use fingertip::contact::{Contact, FitLevel};
+pub use fingertip::contact::{Contact, FitLevel, from_sums};
 pub use fingertip::control::SpeedLoop;
 pub use fingertip::frame::Sense;
-pub use fingertip::measure::{Ended, MeasureState, Task};
+pub use fingertip::measure::{Ended, MeasureState, MeasureStatus, Task};
 pub use fingertip::params::Params;
-pub use fingertip::pipeline::{Status, Taring};
-pub use fingertip::pressure::GAIN_ONE;
+pub use fingertip::pipeline::{Bridge, Status, Taring};
+pub use fingertip::pressure::{GAIN_MAX, GAIN_ONE, TARE_BITS};
 pub use fingertip::scan::Clocks;
 pub use fingertip::shipped::{
-    CAPTURE_BYTES, CLOCKS, COLUMNS, Calibration, Config, Fit, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES, TAXELS,
-    TactileImage,
+    Array, CAPTURE_BYTES, CLOCKS, COLUMNS, Calibration, Config, Fit, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES, TAXELS,
+    TactileImage, address,
 };
 pub use fingertip::state::{Fault, Limits, Mode};
-pub use fingertip::units::{Celsius, CoreCycles, Duty, Millimetres, MillimetresPerSecond, Newtons};
+pub use fingertip::units::{
+    Celsius, CoreCycles, Duty, Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons,
+};
 pub use host_tests::fit_cases::{Noise, Object, Reading, Scene, Steps};
-pub use host_tests::stimulus::config;
+pub use host_tests::stimulus::{config, tared};
 pub use images::record::Record;
 pub use proptest::prelude::*;
+pub use proptest::test_runner::TestRunner;
+pub use sim::mechanics::pressures::Cell;
 pub use sim::native::bench::Bench;
 pub use sim::plant::{Plant, Taxel};
 pub use sim::setup::Setup;
+pub use std::collections::BTreeSet;
+pub use std::ops::Range;
 
 use proptest::test_runner::RngSeed;
 use sim::scene::read;

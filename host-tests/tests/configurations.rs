@@ -7,7 +7,6 @@ use fingertip::params::ParamError;
 use fingertip::scan::{ScanError, ScanTiming};
 use paper::units::Ratio;
 use paper::{Relaxation, RelaxationError, RelaxationTerm};
-use sim::mechanics::pressures::Cell;
 
 fn warned(config: &Config) -> Vec<String> {
     let mut warned = Vec::new();
@@ -123,6 +122,12 @@ fn two_parameters_that_contradict_each_other() {
         let ([low, high], [is, below]) = (names, values.map(|place| params.to_array()[place]));
         assert_eq!(refused(&params).to_string(), format!("{low} of {is}: below {high}, which is {below}, is allowed"));
     }
+    let weak = refused(&Params { supply_min_mv: 5_000, voltage_max_mv: 48_000, ..default }).to_string();
+    assert!(weak.contains("supply_min_mv") && weak.contains("voltage_max_mv"), "{weak}");
+    // A curve leaves too few codes at the full range.
+    let curved = Params { codes_per_kpa_milli: 4_000, curve_permille: 3_500, ..default };
+    assert_eq!(refused(&curved).to_string(), "codes_per_kpa_milli of 4000: 4500 to 200000 are allowed");
+    allowed(Params { codes_per_kpa_milli: 4_500, ..curved });
     let least = Params { contact_on_mn: 16, force_fault_mn: 7_001, supply_min_mv: 8_499, ..default };
     assert!(Config::shipped(&least).is_ok());
     let nearest = Params { contact_on_mn: 499, force_max_mn: 500, speed_max_um_per_s: 30_000, ..default };

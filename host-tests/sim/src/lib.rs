@@ -52,9 +52,12 @@ pub fn encode<const ROWS: usize, const COLUMNS: usize>(
 
 /// Defines the test `name` of the usual size, and `name::long_` of a larger size or of the other cases.
 ///
-/// `cargo xtask test --long` runs the latter.
+/// `cargo xtask test --long` runs the latter. `cases: a, b` is short for `cases(a), cases(b)`.
 #[macro_export]
 macro_rules! sizes {
+    ($name:ident, $cases:ident: $usual:expr, $long:expr) => {
+        $crate::sizes!($name, $cases($usual), $cases($long));
+    };
     ($name:ident, $usual:expr, $long:expr) => {
         #[test]
         fn $name() {

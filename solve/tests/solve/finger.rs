@@ -169,8 +169,7 @@ impl Finger {
         self.time_s += FRAME_S;
         let place = self.contact.place(now);
         core::array::from_fn(|row| {
-            let kpa = self.contact.row_kpa(&place, row);
-            let codes = self.readout.codes(&mut self.sensor, row, self.time_s, &kpa);
+            let codes = self.readout.codes(&mut self.sensor, row, self.time_s, &self.contact.row_kpa(&place, row));
             core::array::from_fn(|column| f64::from(codes[column]) - self.tare[row][column])
         })
     }
@@ -218,8 +217,7 @@ impl Finger {
                         }
                         deepest = deepest.max(depth_mm);
                         let highest = codes.iter().flatten().copied().fold(0.0, f64::max);
-                        let force_n = self.contact.law().force_n(depth_mm);
-                        if way > 0.0 && (highest > 3_300.0 || force_n > force_max_n) {
+                        if way > 0.0 && (highest > 3_300.0 || self.contact.law().force_n(depth_mm) > force_max_n) {
                             most_mm = depth_mm;
                             break;
                         }

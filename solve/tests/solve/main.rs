@@ -5,15 +5,17 @@ mod modulus;
 mod record;
 mod strokes;
 
-use crate::finger::{Draw, Finger, Part, Place, plan, presses};
-use fingertip::measure::series::{Head, check};
-use solve::gains::Condition;
+use crate::finger::{Draw, Finger, Part, Place, cycle, plan, presses};
+use fingertip::measure::series::{HEAD, Head, check, step_bytes};
+use fingertip::params::Params;
+use solve::gains::{Condition, NoGains, Verdict};
+use solve::press::{Branch, Press};
 use solve::record::{Ended, Reason};
-use solve::scale::Held;
-use solve::scale::{HeldSeries, NoDrift};
+use solve::scale::{Held, HeldSeries, NoDrift};
 use solve::strokes::NoDrive;
 use solve::{Value, creep, gains, scale, temperature};
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 // Scale, creep and temperature on simulated holds and presses.
 
@@ -37,8 +39,7 @@ fn a_scale_gives_the_factor() {
 #[test]
 fn a_hold_shows_the_creep() {
     for percent in [1.0, 4.0] {
-        let draw = Draw { creep_percent: percent, ..Draw::plain(250.0) };
-        let mut finger = Finger::new(&draw);
+        let mut finger = Finger::new(&Draw { creep_percent: percent, ..Draw::plain(250.0) });
         finger.go(&Place::default());
         finger.tare();
         let ends_s = (1..=120).map(|n| 0.25 * f64::from(n)).collect();
@@ -80,7 +81,7 @@ fn two_presses_show_the_temperature() {
 
 sim::sizes!(three_presses_give_the_gains, drawn_arrays(100..102), drawn_arrays(102..130));
 
-fn drawn_arrays(seeds: std::ops::Range<u64>) {
+fn drawn_arrays(seeds: Range<u64>) {
     let mut all = Vec::new();
     for seed in seeds {
         let draw = Draw::any(seed, [15.0, 25.0], [1, 3]);
@@ -97,7 +98,6 @@ fn drawn_arrays(seeds: std::ops::Range<u64>) {
             let taxels = found.taxels.iter().enumerate().filter(|(_, gain)| gain.condition == condition);
             taxels.map(|(taxel, _)| [taxel / 10, taxel % 10]).collect::<Vec<_>>()
         };
-        println!("{seed} {:.0} kPa: {count} known, rms {rms:.2} %, {sigmas:.2} sigmas", draw.modulus_kpa);
         // What is found dead reads nothing or less than half, and what is dead is never taken for sound.
         assert!(listed(Condition::Dead).iter().all(|[row, column]| truth[row * 10 + column] < 0.5));
         assert!(known().all(|(_, truth)| *truth > 0.0));

@@ -1,14 +1,11 @@
 //! The bytes of a series: read to the last bit, and never a panic.
 
-use crate::sealed;
+use crate::*;
 use fingertip::measure::Task;
-use fingertip::measure::series::{HEAD, Head, check, step_bytes};
-use fingertip::params::Params;
 use proptest::prelude::*;
 use sim::native::bench::Bench;
-use solve::press::{Branch, Press};
-use solve::record::{Ended, Kind, NoRecord, Reason, press, strokes};
-use solve::{gains, modulus};
+use solve::modulus;
+use solve::record::{Kind, NoRecord, press, strokes};
 
 const PARAMS: &Params = &Params::DEFAULT;
 
@@ -109,6 +106,7 @@ fn every_fault_of_a_series_is_named() {
         body[at] = byte;
         press(&sealed(&press_head([3, 3], 1), &body), PARAMS).expect_err("a fault")
     };
+    let no_time = Head { frame_ns: 0, ..press_head([3, 3], 1) };
     let faults = [
         (press(&good[..31], PARAMS).unwrap_err(), NoRecord::Short(31)),
         (changed(0, b'X'), NoRecord::Magic(*b"XTS")),
@@ -120,10 +118,7 @@ fn every_fault_of_a_series_is_named() {
         (press(&good[..87], PARAMS).unwrap_err(), NoRecord::Length(88, 87)),
         (changed(11, 255), NoRecord::Length(32 + 56 * 0xff00_0001, 88)),
         (changed(40, 1), NoRecord::Check(check(body), check(&[&body[..8], &[1], &body[9..]].concat()))),
-        (
-            press(&sealed(&Head { frame_ns: 0, ..press_head([3, 3], 1) }, body), PARAMS).unwrap_err(),
-            NoRecord::FrameTime,
-        ),
+        (press(&sealed(&no_time, body), PARAMS).unwrap_err(), NoRecord::FrameTime),
         (wrong(2, 1), NoRecord::Order(0)),
         (press(&sealed(&press_head([3, 3], 2), &[body, body].concat()), PARAMS).unwrap_err(), NoRecord::Order(1)),
         (wrong(18, 2), NoRecord::Branch(0, 2)),
@@ -131,7 +126,6 @@ fn every_fault_of_a_series_is_named() {
         (strokes(&sealed(&strokes_head(2), &[0, 128, 0, 0, 0, 128, 1, 0]), PARAMS).unwrap_err(), NoRecord::Stroke(1)),
     ];
     for (found, expected) in faults {
-        println!("{found}");
         assert_eq!(found, expected);
     }
     let mut still = body.to_vec();
@@ -141,8 +135,7 @@ fn every_fault_of_a_series_is_named() {
     assert!(matches!(press(&good, &params), Err(NoRecord::Params(_))));
     // A press that the chip ended early gives the chip's reason.
     let head = Head { ended: Reason::NoContact, value: 3000, ..press_head([3, 3], 1) };
-    let read = press(&sealed(&head, body), PARAMS).expect("a press");
-    let refused = modulus(&[read]).expect_err("no modulus");
+    let refused = modulus(&[press(&sealed(&head, body), PARAMS).expect("a press")]).expect_err("no modulus");
     assert_eq!(
         refused.to_string(),
         "the press was ended early: the tip touched nothing within 3.00 mm: bring the plate nearer"

@@ -1,15 +1,13 @@
 //! The drive solved from recorded strokes, on simulated drives: what is found, how true it is, and what never happens.
 
-use core::f64::consts::TAU;
-use core::ops::Range;
-use fingertip::measure::series::{CHECK, HEAD, Head, Out};
+use crate::*;
+use fingertip::measure::series::{CHECK, Out};
 use fingertip::measure::strokes::{Kept, StrokeInputs, Strokes};
 use fingertip::measure::{Ended, MeasureState, MeasureStatus, Row, Task};
-use fingertip::params::Params;
 use fingertip::shipped::Config;
 use fingertip::units::Newtons;
-use solve::record::{self, Reason};
-use solve::strokes::{NoDrive, Record, solve};
+use solve::record;
+use solve::strokes::{Record, solve};
 
 /// Recorded strokes: all, and the slow ones alone.
 const ALL: usize = 32;
@@ -71,11 +69,7 @@ fn judge(
                 silent.push(number);
             }
         }
-        let precise = pairs[0].0.relative() < MEASURED[0] && pairs[1].0.relative() < MEASURED[1];
-        measured += usize::from(precise);
-        if !precise {
-            println!("drive {number} is not measured: {found:?} {d:?}");
-        }
+        measured += usize::from(pairs.iter().zip(MEASURED).all(|((found, _), most)| found.relative() < most));
     }
     println!("{name}: {measured} of {count} measured, refused {refused:?}, silently wrong {silent:?}");
     let [worst, ..] =
@@ -138,11 +132,7 @@ fn other_motors_are_measured_too() {
 fn a_refusal_states_its_reason_and_the_number_behind_it() {
     let mut rng = fastrand::Rng::with_seed(7);
     let drive = SimulatedDrive::ordinary(&mut rng);
-    let refused = |record: &Record| {
-        let refusal = solve(record).expect_err("nothing to solve");
-        println!("{refusal}");
-        refusal
-    };
+    let refused = |record: &Record| solve(record).expect_err("nothing to solve");
     // The controller's own: the motor's leads swapped, and an encoder without supply.
     for (counts, reason) in [(-1, Reason::Reversed), (0, Reason::Still)] {
         let mut rig = Rig::new(SimulatedDrive { counts, ..drive.clone() }, 1);
@@ -323,8 +313,7 @@ impl SimulatedDrive {
 
     /// The drive with this torque constant (N m/A), resistance (Ohm) and inertia (kg m^2), which its data sheet states correctly.
     fn of_sheet(self, k: f64, winding_ohm: f64, inertia: f64) -> Self {
-        let ohmmeter_ohm = winding_ohm + 0.7;
-        Self { k, sheet_k: k, winding_ohm, ohmmeter_ohm, inertia, sheet_inertia: inertia, ..self }
+        Self { k, sheet_k: k, winding_ohm, ohmmeter_ohm: winding_ohm + 0.7, inertia, sheet_inertia: inertia, ..self }
     }
 
     pub fn ohm(&self) -> f64 {
@@ -414,6 +403,5 @@ impl Rig {
 fn a_fit_with_nothing_left_to_gain_is_solved() {
     let strokes = record::strokes(include_bytes!("flat-valley.strokes"), &Params::DEFAULT).expect("strokes");
     let k = solve(&strokes).expect("a drive").torque_constant;
-    let off = k.value * 1e6 / f64::from(Params::DEFAULT.torque_constant_unm_per_a) - 1.0;
-    assert!(off.abs() < 0.02, "{k:?}");
+    assert!((k.value * 1e6 / f64::from(Params::DEFAULT.torque_constant_unm_per_a) - 1.0).abs() < 0.02, "{k:?}");
 }

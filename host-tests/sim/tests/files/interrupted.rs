@@ -1,18 +1,14 @@
 //! Runs, sweeps and populations that are interrupted, each at a number of bytes, never after a time. No complete file is
 //! lost or changed, and a continued run ends with the same result as an undisturbed one.
 
-use crate::{WALL, folder};
+use crate::*;
 use fastrand::Rng;
 use rustix::process::{Pid, Signal, kill_process};
-use serde_json::Value;
-use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::Read;
 use std::os::unix::process::ExitStatusExt;
-use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::thread;
 use std::time::Duration;
-use std::{fs, thread};
 
 pub const SIM: &str = env!("CARGO_BIN_EXE_sim");
 pub const SWEEP: &str = env!("CARGO_BIN_EXE_sweep");

@@ -1,15 +1,10 @@
 //! The library of scenes: each holds its bounds, and each bound can break. The demonstration on the native board.
 
-use crate::{folder, scene};
+use crate::*;
 use output::plot;
 use sim::demo::{self, Forces, Run, Taxels, Trace, draw, missed, table};
-use sim::metrics::Verdict;
 use sim::run::run;
-use sim::scene;
-use sim::watch::{Step, Watch};
-use sim::{cores, effects, native, simulate};
-use std::collections::BTreeSet;
-use std::ops::Range;
+use sim::{cores, effects, scene, simulate};
 
 /// Runs a scene, and says which bounds it breaks.
 fn broken(name: &str, seed: Option<u64>) -> Vec<String> {
@@ -18,8 +13,7 @@ fn broken(name: &str, seed: Option<u64>) -> Vec<String> {
     let outcome = run(&scene, &native::board, &mut []).expect("it runs");
     let verdicts = outcome.verdicts.iter().filter(|verdict| !verdict.held);
     let unbounded = (!two_sided).then(|| format!("{name}: nothing is bounded on both sides"));
-    let broken = verdicts.map(|verdict| format!("{name}: {verdict:?}"));
-    broken.chain(unbounded).collect()
+    verdicts.map(|verdict| format!("{name}: {verdict:?}")).chain(unbounded).collect()
 }
 
 #[test]

@@ -9,14 +9,21 @@ mod report;
 mod swept;
 
 use fingertip::command::Command;
+use fingertip::config::newtons;
 use fingertip::frame::Sense;
+use fingertip::params::Params;
 use fingertip::pipeline::Status;
 use fingertip::shipped::Frame;
-use sim::metrics::Meter;
+use fingertip::state::Fault;
+use serde_json::Value;
+use sim::metrics::{Meter, Verdict};
+use sim::native;
 use sim::scene::Scene;
 use sim::watch::{Step, Truth, Watch};
-use std::fs;
-use std::path::PathBuf;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{self, File};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
 
 /// A wall with one effect.
 const WALL: &str = concat!(env!("FINGERTIP_ROOT"), "/host-tests/sim/tests/files/wall.toml");

@@ -1,18 +1,11 @@
 //! Metrics on constructed fingers: each promise of the envelope just kept and just broken, and step responses whose
 //! figures are known.
 
-use crate::observe;
-use fingertip::command::Command;
-use fingertip::config::newtons;
-use fingertip::params::Params;
-use fingertip::pipeline::Status;
-use fingertip::state::Fault;
+use crate::*;
 use fingertip::units::Duty;
-use sim::metrics::{Measured, Meter};
+use sim::metrics::Measured;
 use sim::population::load;
-use sim::watch::Truth;
-use std::collections::BTreeSet;
-use std::ops::{Range, RangeBounds};
+use std::ops::RangeBounds;
 
 /// Travel at the touch, mm, and indentation per force.
 const TOUCH_MM: f64 = 5.0;

@@ -1,14 +1,10 @@
 //! Populations: shards must equal the whole, and the scenes of the worst fingers repeat their results; range and
 //! distribution of draws, and populations that extend another one.
 
-use crate::{CRC, folder, scene};
-use sim::metrics::Verdict;
-use sim::native;
+use crate::*;
 use sim::population::budget::{Budget, CAUSES, GOALS_N};
 use sim::population::{self, Drawn, Population, Report, fingers, load, write_worst};
 use sim::sweep::Shard;
-use std::fs;
-use std::path::PathBuf;
 
 /// Population of this text, preceded by the keys that every scene needs.
 fn population(lines: &str) -> Population {
@@ -73,10 +69,8 @@ fn the_worst_run_again_as_they_did() {
     let worst = report.worst();
     assert!(worst.is_sorted_by_key(|ran| ran.inside));
     let nearest: Vec<f64> = worst.iter().filter_map(|ran| ran.nearest()).map(Verdict::excess).collect();
-    assert!(
-        nearest.len() == FINGERS && nearest.is_sorted_by(|a, b| a >= b) && nearest[FINGERS - 1] < 0.0,
-        "{nearest:?}"
-    );
+    let sorted = nearest.is_sorted_by(|a, b| a >= b);
+    assert!(nearest.len() == FINGERS && sorted && nearest[FINGERS - 1] < 0.0, "{nearest:?}");
     for (path, ran) in paths.iter().zip(worst) {
         let text = fs::read_to_string(path).unwrap();
         assert!(ran.broken().all(|promise| text.contains(&promise.metric)), "{text}");
@@ -189,11 +183,11 @@ fn the_magnitude_scales_what_follows_it_and_nothing_else() {
     let [one, half] = ["1", "0.5"].map(at);
     for number in 0..50 {
         let [one, half] = [&one, &half].map(|population| population.finger(1, number).unwrap().scene);
-        let noise = |scene: &sim::scene::Scene| scene.effects[0].values.number("rms_codes");
+        let noise = |scene: &Scene| scene.effects[0].values.number("rms_codes");
         assert!((noise(&half) - 0.5 * noise(&one)).abs() < 1e-5);
-        let counts = |scene: &sim::scene::Scene| scene.table("motor").number("encoder_counts_per_turn");
+        let counts = |scene: &Scene| scene.table("motor").number("encoder_counts_per_turn");
         assert!((counts(&half) - 2.0 * counts(&one)).abs() <= 2.0);
-        let distance = |scene: &sim::scene::Scene| scene.table("object").number("distance_mm");
+        let distance = |scene: &Scene| scene.table("object").number("distance_mm");
         assert_eq!(distance(&half), distance(&one));
     }
 }
@@ -232,8 +226,7 @@ fn draws_are_the_same_for_ever() {
         digest.update(format!("{:?} {}\n", finger.drawn, finger.scene.seed).as_bytes());
     }
     assert_eq!(format!("{:016x}", digest.finalize()), "79a0cef24d1e5169");
-    let others = population.finger(2, 0).unwrap().drawn;
-    assert_ne!(others, population.finger(1, 0).unwrap().drawn);
+    assert_ne!(population.finger(2, 0).unwrap().drawn, population.finger(1, 0).unwrap().drawn);
 }
 
 #[test]
@@ -263,7 +256,7 @@ fn what_extends_another_says_only_what_is_other() {
     // What is counted is added to what the other counts.
     let path = folder("counting").join("counting.toml");
     let count = "[[count]]\nmetric = \"rest_duty_percent\"\nabove = 5.0\n";
-    std::fs::write(&path, format!("extends = \"ordinary\"\n{count}")).unwrap();
+    fs::write(&path, format!("extends = \"ordinary\"\n{count}")).unwrap();
     let above = |name: &str| {
         let of_duty = load(name).unwrap().counted.into_iter().filter(|counted| counted.metric == "rest_duty_percent");
         of_duty.map(|counted| counted.above).collect::<Vec<f64>>()
@@ -330,16 +323,14 @@ fn extending_what_is_not_there_or_extends_itself() {
     let folder = folder("extending");
     let load = |name: &str, text: &str| {
         let path = folder.join(name);
-        std::fs::write(&path, text).unwrap();
+        fs::write(&path, text).unwrap();
         load(path.to_str().unwrap()).map(drop)
     };
     assert_eq!(load("fine.toml", "extends = \"ordinary\"\nmagnitude = 0.1"), Ok(()));
     let error = population::load("ordinry").unwrap_err();
-    assert!(
-        error.contains("did you mean `ordinary`?") && error.contains("careful, handled, ordinary, rough"),
-        "{error}"
-    );
-    std::fs::write(folder.join("broken.toml"), "about =").unwrap();
+    let all = "careful, handled, ordinary, rough";
+    assert!(error.contains("did you mean `ordinary`?") && error.contains(all), "{error}");
+    fs::write(folder.join("broken.toml"), "about =").unwrap();
     for (name, text, expected) in [
         ("none.toml", "extends = \"ordinry\"", "did you mean `ordinary`?"),
         ("itself.toml", "extends = \"itself\"\nabout = \"\"\nduration_s = 1", "itself extends another itself"),

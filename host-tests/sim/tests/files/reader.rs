@@ -1,14 +1,13 @@
 //! Reader of scenes: any text gives a scene, or errors with places inside the text; none causes a panic. Also the rules
 //! for the keys of the tables and of the effects.
 
+use crate::*;
 use fastrand::Rng;
-use fingertip::params::Params;
 use sim::cli::load;
 use sim::events::{EVENT, KINDS};
 use sim::scene::tables::{EXPECT, Key, Kind, ROOT, SCRIPT, TABLES};
-use sim::scene::{self, Scene, SceneErrors, read, set};
+use sim::scene::{self, SceneErrors, read, set};
 use sim::{effects, population};
-use std::collections::BTreeSet;
 
 /// Names and texts of the library.
 fn library() -> Vec<(String, String)> {
@@ -36,10 +35,8 @@ fn a_goal_may_come_as_an_inline_table_and_at_the_same_time_as_another() {
 fn the_controller_knows_the_finger_unless_told_otherwise() {
     let params = |tables: &str| scene(tables).params();
     // The reference finger without effects, and with its direction confirmed.
-    assert_eq!(
-        params(""),
-        Params { row_sag_ppb_per_code: 0, friction_unm: 0, direction_confirmed: 1, ..Params::DEFAULT }
-    );
+    let plain = Params { row_sag_ppb_per_code: 0, friction_unm: 0, direction_confirmed: 1, ..Params::DEFAULT };
+    assert_eq!(params(""), plain);
     assert_eq!(params("[effects.row_sag]").row_sag_ppb_per_code, Params::DEFAULT.row_sag_ppb_per_code);
     assert_eq!(params("[tip]\nmodulus_kpa = 400.5").modulus_pa, 400_500);
     assert_eq!(params("[tip]\nmodulus_kpa = 400\n[controller]\nmodulus_pa = 250000").modulus_pa, 250_000);

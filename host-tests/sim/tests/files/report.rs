@@ -1,24 +1,14 @@
 //! Results of a run: metrics, bounds, ablation, report, recording and its replay. `cargo xtask test` shows the report in a browser; here it is text.
 
-use crate::{WALL, folder, observe, scene, wall};
+use crate::*;
 use base64::prelude::{BASE64_STANDARD, Engine as _};
-use fingertip::command::Command;
-use fingertip::config::newtons;
-use fingertip::pipeline::Status;
-use fingertip::state::Fault;
 use mcap::{MessageStream, Writer};
-use serde_json::Value;
-use sim::metrics::{self, METRICS, Meter, Verdict, shown};
-use sim::native;
+use sim::metrics::{self, METRICS, shown};
 use sim::recording::{Recorder, check, replay};
 use sim::report::{Instant, Over, Report, Trace, page};
 use sim::run::{self, Outcome, Without, run};
-use sim::scene::{Bound, Scene};
-use sim::watch::Truth;
-use std::collections::BTreeSet;
-use std::fs;
+use sim::scene::Bound;
 use std::io::Cursor;
-use std::path::PathBuf;
 
 #[test]
 fn every_metric_has_a_name_with_a_unit_and_stands_once() {
@@ -78,8 +68,7 @@ fn of_two_fingers_faults_the_first_in_time_is_the_scenes() {
             let status = Status { fault, ..Status::default() };
             observe(&mut meter, finger, time_s, &Command::default(), &status, &Truth::default());
         }
-        let measured = meter.measured();
-        ["fault_number", "fault_ms", "faults_count"].map(|name| measured.get(name))
+        ["fault_number", "fault_ms", "faults_count"].map(|name| meter.measured().get(name))
     };
     let (low, high) = (Fault::ArrayBroken, Fault::SupplyLow);
     let number = |fault: Fault| Some(f64::from(fault as u8));
@@ -132,7 +121,7 @@ fn a_bound_breaks_on_either_side_and_without_a_value() {
     assert!(text.contains("BROKEN peak_force_n") && text.contains("1.2 or more asked"), "{text}");
     let json = outcome.json(&scene, "native", &[]);
     assert_eq!(json["passed"], false);
-    assert_eq!(json["bounds"][3]["value"], serde_json::Value::Null);
+    assert_eq!(json["bounds"][3]["value"], Value::Null);
     assert_eq!(json["ledger"][0]["effect"], "row_sag");
     assert_eq!(json["seed"], 1);
 }

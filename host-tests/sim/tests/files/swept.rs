@@ -1,12 +1,8 @@
 //! Sweeps, shards and merging; messages about files that block a run or cannot be resumed.
 
 use crate::interrupted::{SIM, SWEEP};
-use crate::{CRC, WALL, folder, scene};
-use sim::native;
+use crate::*;
 use sim::sweep::{Plan, Shard, Table, merge, sweep};
-use std::collections::BTreeMap;
-use std::fs::{self, File};
-use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// Short, near, and with noise.
@@ -37,10 +33,8 @@ fn shards_merged_are_the_whole_byte_for_byte() {
     runs_are_numbered_point_by_point_and_seed_by_seed(&table);
     let expected = files(&whole);
     assert_eq!(expected.keys().collect::<Vec<_>>(), ["peak_force_n.svg", "runs.csv", "summary.csv"]);
-    assert!(
-        table.text().contains("tip.modulus_kpa = 240.0, tip.radius_mm = 9.5")
-            || table.text().contains("tip.modulus_kpa = 240, ")
-    );
+    let has = |text: &str| table.text().contains(text);
+    assert!(has("tip.modulus_kpa = 240.0, tip.radius_mm = 9.5") || has("tip.modulus_kpa = 240, "));
 
     let shards = folder("swept/shards");
     // The last first: the order of the files does not count.

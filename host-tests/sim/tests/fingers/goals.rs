@@ -1,17 +1,7 @@
 //! A goal of 0 must release the object after any other request, also with torque off and on while the tip moves. Earlier
 //! presses do not change later ones: residual readings, pushes, tares under load.
 
-use crate::{
-    APPROACH_MM_PER_S, CONTACT_ON_N, Case, Finger, LOSSES, finger, interrupt_torque, judge, log_uniform, most_n,
-    object, press, scene, set_goal, touch, uniform,
-};
-use fastrand::Rng;
-use fingertip::measure::Task;
-use fingertip::params::Params;
-use fingertip::state::{Fault, Mode};
-use sim::cores;
-use sim::native::bench::Bench;
-use std::ops::Range;
+use crate::*;
 
 /// Time within which a goal of 0 releases an object of this compliance. In a very soft object the tip must
 /// travel several times as far.
@@ -45,11 +35,7 @@ fn interrupted((yield_mm_per_n, goal_n, losses): Held, happens: &str, interrupt:
     case(&mut finger, yield_mm_per_n, format!("{yield_mm_per_n:.3} mm/N, {goal_n:.2} N, {happens}, {losses:?}"))
 }
 
-sim::sizes!(
-    goal_zero_releases_soft_objects_after_a_torque_interruption,
-    torque_interrupted(0..6),
-    torque_interrupted(6..56)
-);
+sim::sizes!(goal_zero_releases_soft_objects_after_a_torque_interruption, torque_interrupted: 0..6, 6..56);
 
 fn torque_interrupted(seeds: Range<u64>) {
     let objects = with_and_without_losses([(0.7, 5.0), (2.0, 7.0)]);
@@ -68,11 +54,7 @@ fn torque_interrupted(seeds: Range<u64>) {
 }
 
 // Goal 0 for the first time, another goal for the second one, and 0 for good.
-sim::sizes!(
-    goal_zero_releases_soft_objects_after_a_goal_interruption,
-    goal_interrupted(100..106),
-    goal_interrupted(106..135)
-);
+sim::sizes!(goal_zero_releases_soft_objects_after_a_goal_interruption, goal_interrupted: 100..106, 106..135);
 
 fn goal_interrupted(seeds: Range<u64>) {
     let fixed = with_and_without_losses([(0.7, 5.0), (1.0, 7.0)]).map(|held| (held, 0.5, [0.003; 2]));

@@ -13,11 +13,16 @@ mod signal;
 
 use fastrand::Rng;
 use fingertip::config::newtons;
+use fingertip::measure::Task;
 use fingertip::params::Params;
-use fingertip::shipped::Frame;
+use fingertip::shipped::{Config, Frame};
+use fingertip::state::{Fault, Mode};
 use images::record::Record;
-use sim::native::bench::Bench;
+use sim::native::{self, bench::Bench};
+use sim::run::{Outcome, run};
 use sim::scene::{Scene, read};
+use sim::{cores, population};
+use std::ops::Range;
 
 /// A finger with the effects that its scene names.
 type Finger = Bench;

@@ -1,14 +1,9 @@
 //! Measuring motions on drawn fingers: completion, early ends, and bounds of travel, force and time.
 
-use crate::replaced;
+use crate::*;
 use fingertip::measure::press::ROWS_MAX;
 use fingertip::measure::series::HEAD;
-use fingertip::measure::{Ended, MeasureState, MeasureStatus, Task};
-use fingertip::params::Params;
-use fingertip::shipped::Config;
-use fingertip::state::Fault;
-use sim::cores;
-use sim::native::bench::Bench;
+use fingertip::measure::{Ended, MeasureState, MeasureStatus};
 use sim::plant::Faults;
 use sim::population::{Finger, read};
 use sim::setup::Setup;
@@ -56,18 +51,6 @@ fn largest(made: &[Made], of: fn(&Made) -> f64) -> f64 {
     made.iter().map(of).fold(0.0, f64::max)
 }
 
-/// Prints how the motions ended, and their largest values.
-fn print(name: &str, made: &[Made]) {
-    println!("{name}:");
-    for (number, Made { status: MeasureStatus { ended, value, .. }, fault, rows, took_s, .. }) in
-        made.iter().enumerate()
-    {
-        println!("  finger {number}: {ended:?} {value} {fault:?}, {rows} rows in {took_s:.2} s");
-    }
-    let [force_n, travel_mm] = [largest(made, |made| made.force_n), largest(made, |made| made.travel_mm)];
-    println!("  {force_n:.3} N and {travel_mm:.2} mm at most");
-}
-
 fn fingers(text: &str, seed: u64, numbers: impl Iterator<Item = usize>) -> Vec<Finger> {
     let population = read("drawn.toml", text).unwrap_or_else(|errors| panic!("{errors}"));
     numbers.map(|number| population.finger(seed, number).unwrap_or_else(|errors| panic!("{errors}"))).collect()
@@ -89,7 +72,7 @@ fn tips(count: usize, changes: &[(&str, &str)]) -> Vec<Finger> {
 }
 
 /// Makes a motion with each finger. The object is put where `place_mm` has it, by its distance and the time, s.
-fn make_all(fingers: &[Finger], task: Task, place_mm: Option<fn(f64, f64) -> f64>) -> Vec<Made> {
+fn make_all(fingers: &[Finger], task: Task, place_mm: Option<Place>) -> Vec<Made> {
     cores::map(fingers, |finger| {
         let distance_mm = drawn(finger, "object.distance_mm");
         make(Bench::new(&finger.scene).expect("a world"), task, |bench, time_s| {
@@ -107,7 +90,6 @@ sim::sizes!(valid_presses_complete, presses_complete(10), presses_complete(60));
 fn presses_complete(count: usize) {
     let fingers = tips(count, &[]);
     let made = make_all(&fingers, Task::Press, None);
-    print("presses", &made);
     let most_n = 1e-3 * f64::from(Params::DEFAULT.force_max_mn) * 1.05;
     assert!(largest(&made, |made| made.force_n) < most_n);
     let (mut errors_percent, mut sigmas_percent, mut within) = (Vec::new(), Vec::new(), 0);
@@ -125,82 +107,60 @@ fn presses_complete(count: usize) {
     }
     errors_percent.sort_by(f64::total_cmp);
     let (median, worst) = (errors_percent[count / 2], errors_percent[count - 1]);
-    println!("error of the modulus: median {median:.2} %, worst {worst:.2} %; {within} of {count} within two sigmas");
-    assert!((0.1..4.0).contains(&median) && worst < 10.0);
+    assert!((0.1..4.0).contains(&median) && worst < 10.0, "errors of {median:.2} %, {worst:.2} % at most");
     // A share of ten presses says little: 95 of 100 are expected.
-    assert!(count < 60 || 10 * within >= 9 * count);
+    assert!(count < 60 || 10 * within >= 9 * count, "{within} of {count} within two sigmas");
     let rms = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>().sqrt();
     let honest = rms(&sigmas_percent) / rms(&errors_percent);
     assert!((0.5..3.0).contains(&honest), "the uncertainty is {honest:.2} times the error");
 }
 
+/// Where an object is, mm, by its distance and the time, s.
+type Place = fn(f64, f64) -> f64;
+
+const VANISHES: Place = |distance_mm, time_s| if time_s > 1.0 + 0.2 * distance_mm { 1e3 } else { distance_mm };
+/// At 20 mm/s from 1.2 s on: 1 mm nearer, or 2 mm away.
+const NEARER: Place = |distance_mm, time_s| distance_mm - (20.0 * (time_s - 1.2)).clamp(0.0, 1.0);
+const AWAY: Place = |distance_mm, time_s| distance_mm + (20.0 * (time_s - 1.2)).clamp(0.0, 2.0);
+/// At 20 mm/s past the tip's rest, while the tip seeks it.
+const PAST: Place = |distance_mm, time_s| (distance_mm - 20.0 * time_s).max(-0.5);
+
+const SOFT: &str = "[effects.object_stiffness]\nyield_mm_per_n = { log_uniform = [0.2, 2] }\n[effects.noise]";
+const BREAKS: &str = "[effects.breakable_object]\nforce_n = { log_uniform = [0.1, 3] }\n[effects.noise]";
+
 /// Disturbance of a press: its name, changes of the tips, the place of the object, and the ends that are valid with it.
-type Trouble = (&'static str, &'static [(&'static str, &'static str)], Option<fn(f64, f64) -> f64>, &'static [Ended]);
+type Trouble = (&'static str, &'static [(&'static str, &'static str)], Option<Place>, &'static [Ended]);
 
 /// Ends of a press whose object moves.
 const MOVED: &[Ended] = &[Ended::Complete, Ended::Touched, Ended::Stalled];
 
 const TROUBLES: [Trouble; 7] = [
     ("no object", &[("distance_mm = { uniform = [1, 8] }", "distance_mm = 50")], None, &[Ended::NoContact]),
-    (
-        "a soft object",
-        &[(
-            "[effects.noise]",
-            "[effects.object_stiffness]\nyield_mm_per_n = { log_uniform = [0.2, 2] }\n[effects.noise]",
-        )],
-        None,
-        &[Ended::Complete, Ended::Stalled],
-    ),
-    (
-        "an object that breaks",
-        &[("[effects.noise]", "[effects.breakable_object]\nforce_n = { log_uniform = [0.1, 3] }\n[effects.noise]")],
-        None,
-        &[Ended::Complete, Ended::Stalled],
-    ),
-    (
-        "an object that vanishes",
-        &[],
-        Some(|distance_mm, time_s| if time_s > 1.0 + 0.2 * distance_mm { 1e3 } else { distance_mm }),
-        MOVED,
-    ),
-    (
-        "an object that comes 1 mm nearer at 20 mm/s",
-        &[],
-        Some(|distance_mm, time_s| distance_mm - (20.0 * (time_s - 1.2)).clamp(0.0, 1.0)),
-        MOVED,
-    ),
-    (
-        "an object that goes 2 mm away at 20 mm/s",
-        &[],
-        Some(|distance_mm, time_s| distance_mm + (20.0 * (time_s - 1.2)).clamp(0.0, 2.0)),
-        MOVED,
-    ),
-    (
-        "an object that comes past the tip's rest at 20 mm/s while the tip seeks it",
-        &[],
-        Some(|distance_mm, time_s| (distance_mm - 20.0 * time_s).max(-0.5)),
-        MOVED,
-    ),
+    ("a soft object", &[("[effects.noise]", SOFT)], None, &[Ended::Complete, Ended::Stalled]),
+    ("an object that breaks", &[("[effects.noise]", BREAKS)], None, &[Ended::Complete, Ended::Stalled]),
+    ("an object that vanishes", &[], Some(VANISHES), MOVED),
+    ("an object that comes nearer", &[], Some(NEARER), MOVED),
+    ("an object that goes away", &[], Some(AWAY), MOVED),
+    ("an object that comes past the tip's rest", &[], Some(PAST), MOVED),
 ];
 
-sim::sizes!(
-    what_moves_yields_or_vanishes_ends_a_press_within_its_limits,
-    presses_end_within_limits(1),
-    presses_end_within_limits(12)
-);
+sim::sizes!(what_moves_yields_or_vanishes_ends_a_press_within_its_limits, presses_end_within_limits: 1, 12);
 
 fn presses_end_within_limits(count: usize) {
     let mut broken = Vec::new();
     for (name, changes, place_mm, ends) in TROUBLES {
         let made = make_all(&tips(count, changes), Task::Press, place_mm);
-        print(name, &made);
         let valid = |made: &Made| {
             let ended = ends.contains(&made.status.ended) || made.fault.is_some();
             ended && made.force_n < 9.0 && made.rows <= ROWS_MAX as u32
         };
-        broken.extend((!made.iter().all(valid)).then_some(name));
+        let told = |made: &Made| {
+            let Made { status, fault, rows, force_n, .. } = made;
+            format!("{name}: {status:?} {fault:?}, {force_n:.3} N, {rows} rows")
+        };
+        broken.extend(made.iter().filter(|made| !valid(made)).map(told));
     }
-    assert!(broken.is_empty(), "{broken:?}");
+    assert!(broken.is_empty(), "{broken:#?}");
 }
 
 /// The reference finger with a defect.
@@ -229,7 +189,6 @@ const STROKES_MM: f64 = 1.6;
 fn driven(name: &str, count: usize, task: Task, changes: &[(&str, &str)]) -> usize {
     let fingers = fingers(&replaced(include_str!("drives.toml"), changes), 1, 0..count);
     let made = make_all(&fingers, task, None);
-    print(name, &made);
     let mut solved = 0;
     for (finger, made) in fingers.iter().zip(&made).filter(|_| task == Task::Strokes) {
         let strokes = record::strokes(&made.record, &finger.scene.params()).expect("strokes");
@@ -260,11 +219,7 @@ fn complete_jogs(count: usize) {
     assert!(10 * done >= 9 * count, "{done}");
 }
 
-sim::sizes!(
-    an_object_in_the_way_is_pressed_with_no_more_than_300_mn,
-    strokes_stop_at_an_object(1),
-    strokes_stop_at_an_object(20)
-);
+sim::sizes!(an_object_in_the_way_is_pressed_with_no_more_than_300_mn, strokes_stop_at_an_object: 1, 20);
 
 /// An object from 0.1 to 1.2 mm ahead, on the array or off it.
 fn strokes_stop_at_an_object(count: usize) {

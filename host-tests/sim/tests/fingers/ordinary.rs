@@ -2,13 +2,11 @@
 //! past defect and cases near it, and judges by the true state. Every run must keep the envelope of the population
 //! `ordinary`. After a release the tip stays at its clearance, for any reading in the air, and finds the next touch.
 
+use crate::*;
 use fingertip::contact::CONFIDENCE_LEAST;
 use sim::metrics::Hold;
-use sim::run::{Outcome, run};
-use sim::scene::{Bound, read};
+use sim::scene::Bound;
 use sim::watch::{Step, Truth, Watch};
-use sim::{native, population};
-use std::ops::Range;
 use std::sync::OnceLock;
 
 #[derive(Debug)]
@@ -417,10 +415,10 @@ fn a_step_beside_the_middle_stays_in_the_envelope() {
 /// goal.
 #[test]
 fn a_doubtful_fit_never_says_less_than_the_taxels() {
-    let population = sim::population::load("ordinary").unwrap_or_else(|error| panic!("{error}"));
+    let population = population::load("ordinary").unwrap_or_else(|error| panic!("{error}"));
     for number in [233, 911] {
         let finger = population.finger(1, number).unwrap_or_else(|errors| panic!("{errors}"));
-        let outcome = sim::run::run(&finger.scene, &sim::native::board, &mut []).expect("it runs");
+        let outcome = run(&finger.scene, &native::board, &mut []).expect("it runs");
         assert!(outcome.passed(), "finger {number}: {:#?}", outcome.verdicts);
     }
 }

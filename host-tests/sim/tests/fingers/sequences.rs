@@ -4,19 +4,8 @@
 //! `--ignored`. The core checks its arithmetic for overflow:
 //! `SEQUENCES=2000 cargo test -p sim --test fingers sequences -- --ignored --nocapture`
 
-use crate::{
-    CONTACT_ON_N, Case, Finger, LOSSES, begun, finger, judge, log_uniform, most_n, number, object, run_with, scene,
-    set_goal, show, touch_s, uniform,
-};
-use core::ops::Range;
-use fastrand::Rng;
+use crate::*;
 use fingertip::command::Command;
-use fingertip::measure::Task;
-use fingertip::params::Params;
-use fingertip::shipped::Frame;
-use fingertip::state::Mode;
-use sim::cores;
-use sim::scene::Scene;
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -101,8 +90,7 @@ impl Run<'_> {
         while self.finger.status().mode == Mode::Press && self.finger.time_s() < until_s {
             self.wait(0.1);
         }
-        let driven = drives(self.finger.status().mode);
-        let (stop_s, held_n) = self.sequence.stops(driven);
+        let (stop_s, held_n) = self.sequence.stops(drives(self.finger.status().mode));
         self.wait(stop_s);
         let left_n = self.finger.truth().force_n;
         if left_n > CONTACT_ON_N + held_n && self.forces.pushed_n == 0.0 {
@@ -391,7 +379,7 @@ impl Disturbance {
             Self::TorqueOff | Self::GoalZero => {}
         });
         if self == Self::SilentBus {
-            assert_eq!(finger.status().fault, Some(fingertip::state::Fault::BusSilent));
+            assert_eq!(finger.status().fault, Some(Fault::BusSilent));
         }
         (peak_n, finger.truth().force_n)
     }

@@ -37,8 +37,7 @@ impl Host {
     }
 
     fn write(&mut self, address: u16, data: &[u8]) -> u8 {
-        let heard = self.ask(1, WRITE, &[&address.to_le_bytes(), data].concat());
-        heard[0].1
+        self.ask(1, WRITE, &[&address.to_le_bytes(), data].concat())[0].1
     }
 
     fn read(&mut self, address: u16, length: u16) -> Vec<u8> {

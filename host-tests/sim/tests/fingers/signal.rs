@@ -1,21 +1,13 @@
 //! The array measures wrongly. Its signal is lost, freezes or fades while the motor is driven: the force stays bounded.
 //! Errors of worn sensors, of fingers far from their parameters, and in the heat.
 
-use crate::{
-    Case, LOSSES, finger, judge, log_uniform, most_n, number, object, press, replaced, run_with, scene, set_goal, show,
-    touch, touch_s, uniform,
-};
-use fastrand::Rng;
-use fingertip::params::Params;
-use fingertip::shipped::{COLUMNS, Config, ROWS};
-use images::record::Record;
-use sim::native::calibrated::{Calibrated, errors_text, fingers, percentiles};
-use sim::native::{self, simulate_calibrated};
-use sim::run::{Run, run};
-use sim::scene::{self, Goal, Scene, read};
+use crate::*;
+use fingertip::shipped::{COLUMNS, ROWS};
+use sim::native::calibrated::{Calibrated, fingers, percentiles};
+use sim::native::simulate_calibrated;
+use sim::run::Run;
+use sim::scene::{self, Goal};
 use sim::watch::Watch;
-use sim::{cores, population};
-use std::ops::Range;
 
 /// Largest true force of a run in which all codes keep their last values, or go back to those of the tare as when the
 /// connector is unplugged: during a hold, or some time before the touch.
@@ -141,14 +133,6 @@ fn tilted_contacts(seeds: Range<u64>) {
     judge("tilted contacts near the edge", "N", &cases);
 }
 
-/// A supply that is allowed to be this low cannot give this voltage.
-#[test]
-fn a_supply_below_the_largest_voltage_is_refused() {
-    let params = Params { supply_min_mv: 5_000, voltage_max_mv: 48_000, ..Params::DEFAULT };
-    let reason = Config::shipped(&params).err().map(|error| error.to_string()).unwrap_or_default();
-    assert!(reason.contains("supply_min_mv") && reason.contains("voltage_max_mv"), "refused with: {reason:?}");
-}
-
 /// Permille and ms.
 const CREEP: (i32, i32) = (100, 200);
 const OFF: (i32, i32) = (0, 500);
@@ -207,19 +191,15 @@ fn long_the_creep_term_is_the_best_of_those_tried_on_other_arrays() {
     assert_eq!(*best, CREEP, "{tried:?} leave {medians_mn:?}");
 }
 
-sim::sizes!(
-    calibration_and_the_creep_term_leave_a_third_of_a_worn_sensors_error,
-    leave_a_third(1..2),
-    leave_a_third(2..7)
-);
+sim::sizes!(calibration_and_the_creep_term_leave_a_third_of_a_worn_sensors_error, leave_a_third: 1..2, 2..7);
 
 fn leave_a_third(seeds: Range<u64>) {
     for seed in seeds {
         let raw = raw_mn(&worn(seed, OFF));
         let [plain, crept] = [OFF, CREEP].map(|creep| calibrated_mn(&worn(seed, creep)));
-        println!("seed {seed}: {raw:.0} mN, calibrated {plain:.0}, with the creep term too {crept:.0}");
         // The rest is mostly hysteresis, whose error changes sign after a step down.
-        assert!((150.0..400.0).contains(&raw) && plain < 0.65 * raw && (20.0..90.0).contains(&crept), "seed {seed}");
+        let told = format!("seed {seed}: {raw:.0} mN, calibrated {plain:.0}, with the creep term too {crept:.0}");
+        assert!((150.0..400.0).contains(&raw) && plain < 0.65 * raw && (20.0..90.0).contains(&crept), "{told}");
     }
 }
 
@@ -253,7 +233,6 @@ fn long_dead_taxels_under_the_contact_do_not_keep_the_scale_from_being_found() {
 #[ignore = "long: cargo xtask test --long"]
 fn long_calibration_leaves_a_few_percent_of_the_force() {
     let fingers = fingers(1, 4).unwrap_or_else(|error| panic!("{error}"));
-    println!("{}", errors_text(&fingers));
     let [before, after] = percentiles(&fingers);
     for (test, most) in [9.0, 8.0, 12.0].into_iter().enumerate() {
         assert!(after[test][1] < most && after[test][0] < before[test][0], "{before:?} {after:?}");
@@ -284,7 +263,6 @@ fn long_ordinary_fingers_hold_closer_once_they_are_calibrated() {
         [usual[usual.len() / 2], most[(most.len() - 1) * 19 / 20], most[most.len() - 1]]
     };
     let [before, after] = [shares(&native::board), shares(&native::calibrated::board)];
-    println!("median, 95 % and worst: {before:.2?} as they come, {after:.2?} calibrated");
     assert!(after[0] < 0.4 && after[1] < 0.47 && after[2] < 0.9 && after[0] < before[0], "{before:?} {after:?}");
 }
 
@@ -312,7 +290,6 @@ fn hot_hours(numbers: Range<usize>) {
         ];
         let scene = sim::cli::load("hot_hour", &keys, None).unwrap_or_else(|error| panic!("{error}"));
         let found_mn = error_mn(&scene, &native::board, "steady_error_max_mn");
-        println!("coefficients {share}, proxy {chip}, {time_s} s: {found_mn:.1} mN");
         assert!(bounds.contains(&found_mn), "coefficients {share}, proxy {chip}, {time_s} s: {found_mn} mN");
     }
 }

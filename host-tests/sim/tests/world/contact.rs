@@ -2,20 +2,14 @@
 //!
 //! Objects that can move, one finger and two.
 
-use crate::{Last, close, run, scene, world};
-use core::f64::consts::PI;
-use fingertip::shipped::{COLUMNS, ROWS};
-use fingertip::state::Mode;
+use crate::*;
 use sim::effects::contact::Named;
-use sim::mechanics::Bridge;
 use sim::mechanics::pressures::{Cell, Pressures};
-use sim::setup::Tip;
-use sim::watch::{Step, Watch};
 
 /// Friction that stops all motion, so that the tip stays where it is placed.
 const HELD: &str = "[effects.dry_friction]\ntorque_mnm = 20.0\n";
 
-fn pressed(text: &str, d_mm: f64) -> sim::world::World {
+fn pressed(text: &str, d_mm: f64) -> World {
     let mut world = world(&format!("{HELD}{text}"));
     world.fingers[0].place(5.0 + d_mm);
     world
@@ -89,8 +83,7 @@ fn the_patch_sticks_up_to_mu_n_and_then_slips() {
 fn shapes_that_are_planes_have_the_planes_force() {
     for text in ["[effects.sphere]\ncurvature_per_mm = 0.0\n", "[effects.edge]\noffset_mm = 20.0\n"] {
         for d in [0.05, 0.3, 1.0, 3.0, 6.0] {
-            let world = pressed(text, d);
-            close(world.force_n(0), PI * 0.25 * d * d, 2e-3);
+            close(pressed(text, d).force_n(0), PI * 0.25 * d * d, 2e-3);
         }
     }
 }
@@ -122,10 +115,7 @@ fn shapes_have_the_force_of_their_pressures() {
     ];
     for (text, height) in cases {
         for d in [0.5, 2.0] {
-            let expected = integral(d, height);
-            let world = pressed(text, d);
-            println!("{text} {d} mm: {} for {expected}", world.force_n(0));
-            close(world.force_n(0), expected, 5e-3);
+            close(pressed(text, d).force_n(0), integral(d, height), 5e-3);
         }
     }
 }
@@ -143,8 +133,7 @@ fn a_tilted_planes_centre_moves_to_where_it_touches_first() {
 #[test]
 fn a_yielding_object_is_a_spring_in_series() {
     for text in ["", "[effects.sphere]\ncurvature_per_mm = 0.05\n"] {
-        let rigid = pressed(text, 1.0);
-        let force_n = rigid.force_n(0);
+        let force_n = pressed(text, 1.0).force_n(0);
         let mut world =
             pressed(&format!("{text}[effects.object_stiffness]\nyield_mm_per_n = 0.8\n"), 1.0 + 0.8 * force_n);
         close(world.force_n(0), force_n, 1e-9);
@@ -182,8 +171,7 @@ fn means_are_within_a_thousandth_of_the_peak_and_add_up() {
         let peak_kpa = 250.0 * d_mm / 10.0;
         let mut sum = 0.0;
         for row in 0..ROWS {
-            let between = table.between(d_mm, shift_mm);
-            let means = table.row_kpa(&Named::default(), &between, row);
+            let means = table.row_kpa(&Named::default(), &table.between(d_mm, shift_mm), row);
             sum += means.iter().sum::<f64>();
             for (column, mean) in means.into_iter().enumerate() {
                 // Its own error is 1e-5 of the peak.
@@ -192,12 +180,9 @@ fn means_are_within_a_thousandth_of_the_peak_and_add_up() {
             }
         }
         let force_n = Tip::default().force_n(d_mm);
-        let error = sum * PITCH_MM * PITCH_MM * 1e-3 / force_n - 1.0;
-        worst_sum = worst_sum.max(error.abs());
+        worst_sum = worst_sum.max((sum * PITCH_MM * PITCH_MM * 1e-3 / force_n - 1.0).abs());
     }
-    println!("a taxel: {worst:.1e} of the peak; the sum: {worst_sum:.1e}");
-    assert!(worst < 1e-3, "{worst:e} of the peak");
-    assert!(worst_sum < 1e-3, "the sum is off by {worst_sum:e}");
+    assert!(worst < 1e-3 && worst_sum < 1e-3, "{worst:e} of the peak; the sum is off by {worst_sum:e}");
 }
 
 fn row_kpa(table: &mut Pressures, d_mm: f64) -> [f64; COLUMNS] {
@@ -276,8 +261,7 @@ fn two_fingers_lift_an_object_and_hold_it_when_it_is_shaken() {
     let mut grasp = Grasp::default();
     sim::simulate(&scene(&format!("duration_s = 1.5\n{GRASP}")), &mut grasp).unwrap();
     for last in &grasp.last {
-        println!("{:?} {:?}", last.mode, last.truth);
-        assert_eq!(last.mode, Some(Mode::Force));
+        assert_eq!(last.mode, Some(Mode::Force), "{:?}", last.truth);
         close(last.truth.force_n, 2.0, 0.05);
         // Each carries half of the weight.
         close(last.truth.tangential_n, 0.5 * 0.05 * 9.80665, 0.05);

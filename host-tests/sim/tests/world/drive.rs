@@ -1,11 +1,7 @@
 //! Effects of motor and gear; no passive effect creates energy.
 
-use crate::{close, parts, run, world};
-use core::f64::consts::TAU;
-use sim::cores;
+use crate::*;
 use sim::effects::drive::{Circuit, Friction};
-use sim::mechanics::Bridge;
-use sim::world::World;
 
 const FAR: &str = "[object]\ndistance_mm = 100.0\n";
 const FULL: Bridge = Bridge::Driven { duty: 1.0 };
@@ -147,7 +143,7 @@ fn the_winding_warms_up_like_its_closed_form() {
         let k = current_a * current_a * 2.83 * 46.0;
         let rate = (1.0 - 0.0039 * k) / 10.0;
         let end = (k * (1.0 - 0.0039 * 25.0) + 30.0) / (1.0 - 0.0039 * k);
-        let mut truth = sim::watch::Truth::default();
+        let mut truth = Truth::default();
         drive.tell(&mut truth);
         close(truth.winding_c, end + (30.0 - end) * (-rate * time_s).exp(), 1e-8);
         let mut circuit = cold;
@@ -238,10 +234,8 @@ fn never_rises(text: &str, steps: u32) {
         touched += u32::from(moving.force_n(0) > 0.0);
         let now = energy(&moving);
         let fed_mj = fed.at_most_mj(dt_s, &moving);
-        assert!(
-            now <= before + fed_mj + 2e-11 * scale_mj,
-            "{text}: {now} after {before} and {fed_mj} mJ in step {step}"
-        );
+        let most = before + fed_mj + 2e-11 * scale_mj;
+        assert!(now <= most, "{text}: {now} of {most} mJ in step {step}, {fed_mj} of them fed");
         given_mj += fed_mj.max(0.0);
         taken_mj += (-fed_mj).max(0.0);
         before = now;

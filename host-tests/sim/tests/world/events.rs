@@ -1,15 +1,13 @@
 //! Events: each kind has its described effect, repeatably, and one without magnitude changes no bit.
 
-use crate::scene;
+use crate::*;
 use fingertip::command::Command;
 use fingertip::frame::Sense;
 use fingertip::pipeline::Status;
-use fingertip::shipped::{COLUMNS, ROWS};
-use fingertip::state::{Fault, Mode};
+use fingertip::state::Fault;
 use sim::metrics::Measured;
-use sim::native;
 use sim::run::{Outcome, run};
-use sim::watch::{Agreement, Path, Step, Truth, Watch};
+use sim::watch::{Agreement, Path};
 
 struct Kept {
     time_s: f64,
@@ -60,14 +58,11 @@ fn with(kind: &str, keys: &str) -> All {
 #[test]
 fn each_event_without_magnitude_changes_no_bit_and_each_event_repeats() {
     let plain = run_with("").0.summary.digest;
+    let swing = "rate_hz = 5, for_s = 0.4, amplitude_mm = ";
     let taxel = "row = 4, column = 4, to_codes = 9, for_s = ";
     for (kind, zero, some) in [
         ("object_move", "by_mm = 0, speed_mm_per_s = 1", "by_mm = -0.3, speed_mm_per_s = 10"),
-        (
-            "object_oscillate",
-            "rate_hz = 5, for_s = 0.4, amplitude_mm = 0",
-            "rate_hz = 5, for_s = 0.4, amplitude_mm = 0.1",
-        ),
+        ("object_oscillate", &format!("{swing}0"), &format!("{swing}0.1")),
         ("object_removed", "for_s = 0", "for_s = 0.1"),
         ("encoder_slip", "by_counts = 0", "by_counts = 9"),
         ("brown_out", "to_v = 6, for_s = 0.1", "to_v = 5, for_s = 0.1"),
@@ -119,8 +114,7 @@ fn requests_reach_the_controller() {
     // The later recovery clears the fault.
     let recover = event("recover", "").replace("0.4", "0.7");
     let (_, all) = run_with(&format!("{}{recover}", event("row_stuck", "row = 2, to_codes = 3000, for_s = 0.2")));
-    let faulty = with("brown_out", "to_v = 2, for_s = 0.05");
-    assert_eq!(faulty.at(0.99).status.fault, Some(Fault::SupplyLow));
+    assert_eq!(with("brown_out", "to_v = 2, for_s = 0.05").at(0.99).status.fault, Some(Fault::SupplyLow));
     assert_eq!((all.at(0.5).status.fault, all.at(0.99).status.fault), (all.at(0.69).status.fault, None));
 }
 

@@ -1,16 +1,12 @@
 //! Each effect of clock, bus and host against its closed form, the host that repeats its command, and virtual time.
 
-use crate::{parts, run, scene, world};
-use fingertip::shipped::{COLUMNS, SLOTS};
+use crate::*;
 use sim::effects::{sensor::Stages as _, stream};
 use sim::host::Host;
-use sim::mechanics::Bridge;
 use sim::native::Clock;
-use sim::scene::Scene;
-use sim::world::World;
 
 fn long_scene(tables: &str) -> Scene {
-    crate::scene(&format!("duration_s = 1000\n{tables}"))
+    scene(&format!("duration_s = 1000\n{tables}"))
 }
 
 #[test]
@@ -49,9 +45,7 @@ fn packets_are_lost_and_corrupted_as_often_as_asked() {
 
 #[test]
 fn hosts_are_late_by_their_distribution() {
-    for (distribution, mean, square) in
-        [("uniform", 0.5, 1.0 / 3.0), ("normal", (2.0 / core::f64::consts::PI).sqrt(), 1.0)]
-    {
+    for (distribution, mean, square) in [("uniform", 0.5, 1.0 / 3.0), ("normal", (2.0 / PI).sqrt(), 1.0)] {
         let tables = format!("[effects.host_jitter]\ndelay_ms = 4\ndistribution = \"{distribution}\"");
         let mut stages = parts(&tables, 3).link;
         let late: Vec<f64> = (0..40_000).map(|_| (stages.pass(7.0).unwrap() - 7.0) / 4e-3).collect();

@@ -1,17 +1,15 @@
 //! The plant against the paper, the data sheet and closed forms. It equals the finger of a scene with its parameters.
 
-use crate::scene;
+use crate::*;
 use fingertip::config::newtons;
-use fingertip::shipped::{self, COLUMNS, Frame, ROWS, SLOTS};
-use fingertip::state::Mode;
+use fingertip::shipped::{self, Frame};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
+use sim::mechanics::decay;
 use sim::mechanics::pressures::Cell;
 use sim::mechanics::rotor::{Unreachable, profile};
-use sim::mechanics::{Bridge, decay};
 use sim::native::bench::Bench;
 use sim::plant::{Plant, Row, Setup, Taxel};
-use sim::setup::Tip;
 
 /// The step that the tests vouch for.
 const STEP_S: f64 = 10e-6;
@@ -172,8 +170,7 @@ fn relative_error_of_sum(d: f64, x: f64, y: f64) -> f64 {
     for row in 0..ROWS {
         sum_kpa += (0..COLUMNS).map(|column| Cell::of(&setup, row, column).mean_kpa(&tip)).sum::<f64>();
     }
-    let felt_n = sum_kpa * 1e-3 * setup.array.pitch_mm * setup.array.pitch_mm;
-    felt_n / setup.tip.force_n(d) - 1.0
+    sum_kpa * 1e-3 * setup.array.pitch_mm * setup.array.pitch_mm / setup.tip.force_n(d) - 1.0
 }
 
 #[test]
@@ -258,7 +255,7 @@ fn defects_show_where_they_are() {
 // against the plant.
 
 const FULL: Bridge = Bridge::Driven { duty: 1.0 };
-const RPM: f64 = 60.0 / std::f64::consts::TAU;
+const RPM: f64 = 60.0 / TAU;
 
 #[test]
 fn the_motor_has_the_figures_of_its_data_sheet() {
@@ -314,7 +311,7 @@ fn friction_holds_inside_its_band_and_not_outside() {
 #[test]
 fn the_encoder_counts_down_to_the_lower_edge() {
     let mut world = Plant::new(&free());
-    let counts_per_mm = 1600.0 * 43.0 / (std::f64::consts::TAU * 12.0);
+    let counts_per_mm = 1600.0 * 43.0 / (TAU * 12.0);
     for travel in [0.0, 0.4 / counts_per_mm, 1.6 / counts_per_mm, 3.0, -0.4 / counts_per_mm, -2.0] {
         world.place(travel);
         assert_eq!(world.encoder_counts(), (travel * counts_per_mm).floor() as i32, "at {travel} mm");

@@ -1,9 +1,7 @@
 //! Every sensor effect, alone and together, over any input; hysteresis, creep, spread and temperature against their
 //! closed forms.
 
-use crate::parts;
-use fingertip::shipped::{COLUMNS, ROWS, SLOTS};
-use sim::effects;
+use crate::*;
 use sim::effects::sensor::{self, Readout, Row, Stages as _};
 use sim::setup::Array;
 
@@ -116,8 +114,7 @@ fn hysteresis_gives_no_energy_on_any_closed_way() {
     let mut rng = fastrand::Rng::with_seed(5);
     let mut effect = effect("hysteresis", "width_percent = 20", 1);
     let mut cycle = |way: &[f64]| {
-        let first = reads(&mut effect, 0.0, way[0]);
-        let mut before = (way[0], first);
+        let mut before = (way[0], reads(&mut effect, 0.0, way[0]));
         let mut area = 0.0;
         for kpa in way.iter().skip(1) {
             let now = (*kpa, reads(&mut effect, 0.0, *kpa));
@@ -139,8 +136,7 @@ fn hysteresis_gives_no_energy_on_any_closed_way() {
 fn creep_grows_by_its_rate_in_each_decade() {
     for steps_a_decade in [3, 50] {
         let mut effect = effect("creep", "rate_percent_per_decade = 5", 1);
-        let first = reads(&mut effect, 0.0, 20.0);
-        assert_eq!(first, 20.0);
+        assert_eq!(reads(&mut effect, 0.0, 20.0), 20.0);
         let mut readings = Vec::new();
         for step in 0..=(7 * steps_a_decade) {
             let time_s = 1e-3 * libm::exp10(f64::from(step) / f64::from(steps_a_decade));
@@ -379,10 +375,7 @@ fn a_coarse_converter_rounds_down_to_its_steps() {
             assert_eq!(row[0], f64::from(code / step * step));
         }
     }
-}
-
-#[test]
-fn a_bent_converter_errs_most_in_its_middle() {
+    // A bent one errs most in its middle.
     let mut effect = effect("converter", "bits = 12\ninl_codes = 3", 1);
     for (code, more) in [(0.0, 0.0), (1024.0, 2.25), (2048.0, 3.0), (3072.0, 2.25)] {
         let mut row = all(code);

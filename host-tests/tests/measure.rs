@@ -2,13 +2,13 @@
 
 mod series;
 
-use self::series::decode;
+use self::series::head;
 use crate::common::*;
 use fingertip::capture::Ended as CaptureEnded;
+use fingertip::measure::BuiltIn;
 use fingertip::measure::press::{HOLDS_MS, PARTS, Press, PressInputs, ROWS_MAX, Step};
-use fingertip::measure::{BuiltIn, MeasureStatus};
-use fingertip::pipeline::Bridge;
-use std::ops::Range;
+use solve::press::{Branch, Press as Pressed};
+use solve::record::{NoRecord, press, strokes};
 
 impl<const BYTES: usize> Recorded<BYTES> {
     /// 5 mm from the wall, not tared.
@@ -45,10 +45,14 @@ impl<const BYTES: usize> Recorded<BYTES> {
         status.expect("an end")
     }
 
-    /// The record, which must be closed.
-    fn record(&self) -> series::Record {
+    /// The record of a press, which must be closed.
+    fn recorded_press(&self) -> Pressed {
+        press(self.closed(), &images::CONFIRMED).expect("a press")
+    }
+
+    fn closed(&self) -> &[u8] {
         assert_eq!(self.capture.standing().state, CaptureState::Done);
-        decode(self.capture.data())
+        self.capture.data()
     }
 
     /// The motion and its record have the same end.
@@ -56,10 +60,8 @@ impl<const BYTES: usize> Recorded<BYTES> {
         let measure = self.bench.status().measure;
         assert_eq!((measure.task, measure.ended), (task, ended), "{measure:?}");
         if task != Task::Jog {
-            let record = self.record();
-            assert_eq!((record.ended, record.value), (ended as u8, measure.value));
             let kind = if task == Task::Press { 1 } else { 2 };
-            assert_eq!((record.kind, record.rows), (kind, self.capture.standing().frames));
+            assert_eq!(head(self.closed()), (kind, ended as u8, self.capture.standing().frames, measure.value));
         }
     }
 }
@@ -71,23 +73,24 @@ fn a_press_is_recorded_whole() {
     let mut finger = Recorded::<CAPTURE_BYTES>::begun(Task::Press);
     finger.ends();
     finger.assert_ended(Task::Press, Ended::Complete);
-    let record = finger.record();
-    assert!(record.steps.len() <= ROWS_MAX && record.steps.len() > 80, "{} rows", record.steps.len());
+    let steps = finger.recorded_press().steps;
+    assert!(steps.len() <= ROWS_MAX && steps.len() > 80, "{} rows", steps.len());
     // In and back twice, and a hold without motion.
-    let turns = record.steps.windows(2).filter(|pair| pair[0].back != pair[1].back).count();
-    assert_eq!(turns, 3);
-    let rests = |a: i32, b: i32| a.abs_diff(b) < 20;
-    let held = record.steps.windows(2).filter(|pair| {
-        let [begin, end] = pair[1].counts;
-        !pair[1].back && rests(begin, pair[0].counts[1]) && rests(begin, end)
+    assert_eq!(steps.windows(2).filter(|pair| pair[0].branch != pair[1].branch).count(), 3);
+    let config = config();
+    let rests = |a: f64, b: f64| (a - b).abs() < 20.0 * config.count.0.to_num::<f64>();
+    let held = steps.windows(2).filter(|pair| {
+        let [begin, end] = pair[1].travel_mm;
+        pair[1].branch == Branch::Loading && rests(begin, pair[0].travel_mm[1]) && rests(begin, end)
     });
     let held = held.count();
     assert!(held + 1 >= HOLDS_MS.len(), "{held} rows of a hold");
-    for pair in record.steps.windows(2) {
+    for pair in steps.windows(2) {
         // Those in which the step before is handed over are left out.
-        assert_eq!(pair[0].frames[1].wrapping_add(PARTS.into()), pair[1].frames[0]);
+        let frames = (pair[1].time_s[0] - pair[0].time_s[1]) / frame_s(&config);
+        assert!((frames - f64::from(PARTS)).abs() < 1e-3, "{frames} frames");
     }
-    let deepest = record.steps.iter().map(|step| step.means.iter().sum::<f64>()).fold(0.0, f64::max);
+    let deepest = steps.iter().map(|step| step.taxels.iter().map(|taxel| taxel.mean).sum()).fold(0.0, f64::max);
     assert!(deepest > 1_000.0, "{deepest} codes");
 }
 
@@ -96,9 +99,8 @@ fn strokes_are_recorded_whole() {
     let mut finger = Recorded::<CAPTURE_BYTES>::begun(Task::Strokes);
     finger.ends();
     finger.assert_ended(Task::Strokes, Ended::Complete);
-    let record = finger.record();
-    let strokes = record.samples.iter().filter(|[count, _]| *count == i16::MIN).count();
-    assert_eq!((strokes, record.delay_ns), (32, 33_000));
+    let record = strokes(finger.closed(), &images::CONFIRMED).expect("strokes");
+    assert!(record.strokes.len() == 32 && (record.delay_s - 33e-6).abs() < 1e-12, "{record:?}");
     assert!(finger.capture.standing().bytes < 40 << 10, "{} bytes", finger.capture.standing().bytes);
 }
 
@@ -107,8 +109,9 @@ fn strokes_are_recorded_whole() {
 fn a_memory_that_is_full_keeps_what_it_has() {
     let mut finger = Recorded::<{ 2 << 10 }>::begun(Task::Press);
     assert_eq!(finger.ends().measure.state, MeasureState::Done);
-    let (record, standing) = (finger.record(), finger.capture.standing());
-    assert_eq!((record.ended, record.value, record.rows), (Ended::Full as u8, 5, 5));
+    let standing = finger.capture.standing();
+    assert_eq!(head(finger.closed()), (1, Ended::Full as u8, 5, 5));
+    assert_eq!(finger.recorded_press().steps.len(), 5);
     assert_eq!((standing.ended, standing.frames), (CaptureEnded::Full, 5));
 }
 
@@ -206,8 +209,14 @@ fn take_anything(seeds: Range<u64>) {
         finger.bench.request(Task::Stop);
         finger.frame();
         if finger.ends().measure.state != MeasureState::None && task != Task::Jog {
-            let record = decode(finger.capture.data());
-            assert!(task != Task::Press || record.steps.len() <= ROWS_MAX);
+            match task {
+                Task::Press => assert!(finger.recorded_press().steps.len() <= ROWS_MAX),
+                // Whose counts may be beyond those of a sample.
+                _ => assert!(matches!(
+                    strokes(finger.closed(), &images::CONFIRMED),
+                    Ok(_) | Err(NoRecord::Clipped(..) | NoRecord::Stroke(_))
+                )),
+            }
         }
         assert_ne!(finger.capture.standing().state, CaptureState::Recording);
     }
@@ -237,11 +246,7 @@ fn frames(task: Task) -> u32 {
     frames
 }
 
-sim::sizes!(
-    a_motion_ends_at_any_moment_and_the_next_one_works,
-    end_and_go_on(&[4]),
-    end_and_go_on(&[0, 1, 2, 3, 5, 6])
-);
+sim::sizes!(a_motion_ends_at_any_moment_and_the_next_one_works, end_and_go_on: &[4], &[0, 1, 2, 3, 5, 6]);
 
 fn end_and_go_on(parts: &[u32]) {
     for task in [Task::Jog, Task::Strokes, Task::Press] {
@@ -348,26 +353,24 @@ fn a_jog_keeps_to_its_share_of_the_supply() {
 /// Fast, and as slowly as torque could be enabled.
 #[test]
 fn a_jog_waits_while_a_hand_moves_the_tip() {
-    [4, 1].into_iter().for_each(jog_on_a_tip_that_moves);
-}
-
-fn jog_on_a_tip_that_moves(counts: i32) {
-    let mut finger = Made::tared();
-    let mut moved = 0;
-    let mut modes = |frames: usize, counts: i32| -> Vec<Mode> {
-        let mode = |_| {
-            moved += counts;
-            finger.bench.step_with(|record| record.sense.encoder += moved).mode
+    for counts in [4, 1] {
+        let mut finger = Made::tared();
+        let mut moved = 0;
+        let mut modes = |frames: usize, counts: i32| -> Vec<Mode> {
+            let mode = |_| {
+                moved += counts;
+                finger.bench.step_with(|record| record.sense.encoder += moved).mode
+            };
+            let modes = (0..frames).map(mode).collect();
+            if finger.bench.command().measure_request == 0 {
+                finger.bench.request(Task::Jog);
+            }
+            modes
         };
-        let modes = (0..frames).map(mode).collect();
-        if finger.bench.command().measure_request == 0 {
-            finger.bench.request(Task::Jog);
-        }
-        modes
-    };
-    modes(100, counts);
-    assert!(modes(300, counts).iter().all(|mode| *mode == Mode::Off));
-    assert_eq!(modes(1_000, 0).last(), Some(&Mode::Strokes));
+        modes(100, counts);
+        assert!(modes(300, counts).iter().all(|mode| *mode == Mode::Off));
+        assert_eq!(modes(1_000, 0).last(), Some(&Mode::Strokes));
+    }
 }
 
 /// The host ends the record in the middle: the motion continues without a record, the next motion has one again.
@@ -379,8 +382,9 @@ fn a_record_ended_by_the_host_is_whole() {
     }
     finger.capture.end(CaptureEnded::Asked);
     let bytes = finger.capture.data().to_vec();
-    let record = finger.record();
-    assert_eq!((record.ended, record.rows), (Ended::Interrupted as u8, 3));
+    let (_, ended, rows, _) = head(&bytes);
+    assert_eq!((ended, rows), (Ended::Interrupted as u8, 3));
+    assert_eq!(finger.recorded_press().steps.len(), 3);
     assert_eq!(finger.ends().measure.state, MeasureState::Done);
     assert!(finger.capture.data() == bytes && finger.capture.standing().count == 1, "it changes no more");
     finger.bench.place(0.0);

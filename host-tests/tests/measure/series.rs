@@ -1,87 +1,21 @@
-//! The layout of a record, read by a decoder from the documentation of `fingertip::measure::series` alone.
+//! The layout of a record: what the core writes is what the host's solver reads. Tests of the solver hold it against bytes
+//! that are written by hand after the documentation of `fingertip::measure::series`.
 
 use crate::common::*;
 use fingertip::measure::Row;
 use fingertip::measure::press::{PARTS, Step};
-use fingertip::measure::series::{CHECK, Head, Out, step_bytes};
+use fingertip::measure::series::{CHECK, HEAD, Head, Out, step_bytes};
+use solve::press::Branch;
+use solve::record::press;
+use std::f64::consts::TAU;
 
-pub struct Read {
-    pub frames: [u32; 2],
-    pub counts: [i32; 2],
-    pub taken: u16,
-    pub back: bool,
-    pub voltage_mv: i16,
-    pub tenths_k: u16,
-    /// Mean of each taxel, codes above tare.
-    pub means: Vec<f64>,
-    /// Variance of each taxel, codes squared.
-    pub variances: Vec<f64>,
-    pub bad: Vec<bool>,
+fn number<const BYTES: usize>(bytes: &[u8], at: usize) -> [u8; BYTES] {
+    *bytes[at..].first_chunk().expect("more bytes")
 }
 
-/// A record: its head without the check sum, and its rows.
-pub struct Record {
-    pub kind: u8,
-    pub shape: [usize; 2],
-    pub ended: u8,
-    pub frame_ns: u32,
-    pub origin: i32,
-    pub delay_ns: u32,
-    pub value: i32,
-    pub rows: u32,
-    pub steps: Vec<Read>,
-    pub samples: Vec<[i16; 2]>,
-}
-
-fn number<const BYTES: usize>(bytes: &mut &[u8]) -> [u8; BYTES] {
-    let (first, rest) = bytes.split_first_chunk().expect("more bytes");
-    *bytes = rest;
-    *first
-}
-
-pub fn decode(mut bytes: &[u8]) -> Record {
-    let from = &mut bytes;
-    assert_eq!(number(from), *b"FTS\x01");
-    let [kind, rows, columns, ended] = number(from);
-    let shape = [rows.into(), columns.into()];
-    let rows = u32::from_le_bytes(number(from));
-    let check = u32::from_le_bytes(number(from));
-    let frame_ns = u32::from_le_bytes(number(from));
-    let [origin, delay_ns, value] = [(); 3].map(|()| i32::from_le_bytes(number(from)));
-    let sum = from.iter().fold(0x811C_9DC5_u32, |sum, byte| (sum ^ u32::from(*byte)).wrapping_mul(0x0100_0193));
-    assert_eq!(check, sum, "the check sum");
-    let (mut steps, mut samples) = (Vec::new(), Vec::new());
-    for _ in 0..rows {
-        if kind == 1 {
-            steps.push(step(from, shape[0] * shape[1]));
-        } else {
-            samples.push([(); 2].map(|()| i16::from_le_bytes(number(from))));
-        }
-    }
-    assert!(from.is_empty(), "{} bytes more", from.len());
-    Record { kind, shape, ended, frame_ns, origin, delay_ns: delay_ns as u32, value, rows, steps, samples }
-}
-
-fn step(from: &mut &[u8], taxels: usize) -> Read {
-    let before = from.len();
-    let frames = [(); 2].map(|()| u32::from_le_bytes(number(from)));
-    let counts = [(); 2].map(|()| i32::from_le_bytes(number(from)));
-    let taken = u16::from_le_bytes(number(from));
-    let [back, 0] = number(from) else { panic!("a byte that is 0") };
-    let voltage_mv = i16::from_le_bytes(number(from));
-    let tenths_k = u16::from_le_bytes(number(from));
-    let means = (0..taxels).map(|_| (f64::from(u16::from_le_bytes(number(from))) - 1_024.0) / 8.0).collect();
-    let variance = |from: &mut &[u8]| {
-        let [byte] = number(from);
-        if byte == 0 { 0.0 } else { f64::from(8 + (byte & 7)) * f64::from(byte >> 3).exp2() / 8.0 / 16.0 }
-    };
-    let variances = (0..taxels).map(|_| variance(from)).collect();
-    let bits: Vec<u8> = (0..taxels.div_ceil(8)).map(|_| number::<1>(from)[0]).collect();
-    let bad = (0..taxels).map(|place| bits[place / 8] >> (place % 8) & 1 == 1).collect();
-    while !(before - from.len()).is_multiple_of(4) {
-        assert_eq!(number(from), [0]);
-    }
-    Read { frames, counts, taken, back: back == 1, voltage_mv, tenths_k, means, variances, bad }
+/// Kind, number of the end, number of rows, and the number behind the end.
+pub fn head(bytes: &[u8]) -> (u8, u8, u32, i32) {
+    (bytes[4], bytes[7], u32::from_le_bytes(number(bytes, 8)), i32::from_le_bytes(number(bytes, 28)))
 }
 
 /// The bytes of these rows behind a head.
@@ -143,7 +77,9 @@ fn comes_back<const ROWS: usize, const COLUMNS: usize>() {
             let frames: Vec<_> =
                 (0..count).map(|_| level.map(|row| row.map(|taxel| taxel + random.i32(-noise..=noise)))).collect();
             let mut step = sums(&frames);
-            (step.frames, step.counts) = ([random.u32(..), random.u32(..)], [random.i32(..), random.i32(..)]);
+            let first = 1_000 * number as u32;
+            step.frames = [first, first + random.u32(..1_000)];
+            step.counts = [random.i32(..), random.i32(..)];
             (step.back, step.voltage_mv) = (number % 2 == 1, random.i32(-6_000..6_000) * count as i32);
             step.chip = (number % 3 != 0).then(|| Celsius::from_bits(random.i32(-40 << 16..125 << 16)));
             step.bad = core::array::from_fn(|_| random.u32(..) & ((1_u64 << COLUMNS) - 1) as u32);
@@ -151,24 +87,36 @@ fn comes_back<const ROWS: usize, const COLUMNS: usize>() {
         })
         .collect();
     let rows: Vec<_> = steps.iter().map(|(step, _)| Row::Step(step, 0)).collect();
-    let record = decode(&written(&rows, 1));
-    assert_eq!((record.kind, record.shape, record.ended), (1, [ROWS, COLUMNS], 12));
-    assert_eq!((record.frame_ns, record.origin, record.delay_ns, record.value), (99_762, -77_000, 33_000, -5));
-    for ((step, frames), read) in steps.iter().zip(&record.steps) {
-        assert_eq!((read.frames, read.counts), (step.frames, step.counts));
-        assert_eq!((read.taken, read.back), (step.taken, step.back));
-        assert_eq!(i32::from(read.voltage_mv), step.voltage_mv / i32::from(step.taken));
-        let kelvin = step.chip.map_or(0.0, |chip| chip.0.to_num::<f64>() + 273.15);
-        assert!((f64::from(read.tenths_k) / 10.0 - kelvin).abs() <= 0.15, "{} {kelvin}", read.tenths_k);
+    let bytes = written(&rows, 1);
+    assert_eq!(head(&bytes), (1, Ended::Stalled as u8, 20, -5));
+    let record = press(&bytes, &Params::DEFAULT).expect("a press");
+    assert_eq!((record.array.rows, record.array.columns), (ROWS, COLUMNS));
+    let ended = record.ended.expect("an early end");
+    assert_eq!((ended.reason, ended.value), (Ended::Stalled, -5));
+    let mm_per_count = TAU / 1_600.0 / 3.583;
+    for (place, ((step, frames), read)) in steps.iter().zip(&record.steps).enumerate() {
+        let back = if step.back { Branch::Unloading } else { Branch::Loading };
+        assert_eq!((read.frames, read.branch), (step.taken.into(), back));
+        for end in 0..2 {
+            let travel_mm = (f64::from(step.counts[end]) + 77_000.0) * mm_per_count;
+            assert!((read.time_s[end] - 99_762e-9 * f64::from(step.frames[end])).abs() < 1e-9);
+            assert!((read.travel_mm[end] - travel_mm).abs() < 1e-6, "{:?}", step.counts);
+        }
+        // The host does not read the voltage.
+        let voltage_mv = i16::from_le_bytes(number(&bytes, HEAD + place * step_bytes(ROWS * COLUMNS) + 20));
+        assert_eq!(i32::from(voltage_mv), step.voltage_mv / i32::from(step.taken));
+        let [read_c, chip_c] = [read.chip_c, step.chip.map(|chip| chip.0.to_num())].map(|chip| chip.unwrap_or(-273.15));
+        assert!((read_c - chip_c).abs() <= 0.15, "{read_c} {chip_c}");
         for place in 0..ROWS * COLUMNS {
             let (row, column) = (place / COLUMNS, place % COLUMNS);
             let codes: Vec<f64> = frames.iter().map(|frame| f64::from(frame[row][column]) / 16.0).collect();
             let mean = codes.iter().sum::<f64>() / codes.len() as f64;
-            assert!((read.means[place] - mean).abs() <= 0.126, "{} codes, not {mean}", read.means[place]);
+            let taxel = read.taxels[place];
+            assert!((taxel.mean - mean).abs() <= 0.126, "{} codes, not {mean}", taxel.mean);
             let variance = codes.iter().map(|code| (code - mean).powi(2)).sum::<f64>() / codes.len() as f64;
-            let (sigma, read_sigma) = (variance.sqrt(), read.variances[place].sqrt());
+            let (sigma, read_sigma) = (variance.sqrt(), taxel.deviation);
             assert!((sigma - read_sigma).abs() <= 0.1 * sigma + 0.6, "{read_sigma} codes, not {sigma}");
-            assert_eq!(read.bad[place], step.bad[row] >> column & 1 == 1, "taxel {place}");
+            assert_eq!(taxel.bad, step.bad[row] >> column & 1 == 1, "taxel {place}");
         }
     }
 }
@@ -184,8 +132,8 @@ fn a_press_comes_back_from_its_bytes() {
 fn strokes_come_back_from_their_bytes() {
     let sample = |count, voltage| Row::Sample { count, voltage };
     let rows = [Row::Stroke, sample(-1, i16::MAX), sample(i16::MAX, -2), Row::<10, 10>::Stroke];
-    let record = decode(&written(&rows, 2));
-    assert_eq!(record.samples, [[i16::MIN, 0], [-1, i16::MAX], [i16::MAX, -2], [i16::MIN, 0]]);
+    let bytes = [[i16::MIN, 0], [-1, i16::MAX], [i16::MAX, -2], [i16::MIN, 0]].as_flattened().iter().copied();
+    assert!(written(&rows, 2)[HEAD..].iter().copied().eq(bytes.flat_map(i16::to_le_bytes)));
 }
 
 /// Sums at the limits of their range, and zeros: no overflow, and the means keep their sign.
@@ -205,10 +153,11 @@ fn the_ends_of_the_sums_are_written() {
                         chip: Some(Celsius::from_bits(i32::MIN)),
                         ..Step::NONE
                     };
-                    let read = &decode(&written(&[Row::Step(&step, 0)], 1)).steps[0];
+                    let bytes = written(&[Row::Step(&step, 0)], 1);
                     let mean = if taken == 0 { 0.0 } else { f64::from(reading) / 16.0 };
-                    assert_eq!(read.means[14], mean.clamp(-128.0, (65_535.0 - 1_024.0) / 8.0));
-                    assert_eq!(read.tenths_k, 0);
+                    let eighths = 8.0 * mean.clamp(-128.0, (65_535.0 - 1_024.0) / 8.0) + 1_024.0;
+                    assert_eq!(f64::from(u16::from_le_bytes(number(&bytes, HEAD + 24 + 2 * 14))), eighths);
+                    assert_eq!(number(&bytes, HEAD + 22), [0; 2]);
                 }
             }
         }

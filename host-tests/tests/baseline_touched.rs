@@ -1,7 +1,6 @@
 //! The baseline must not learn the force of an object that touches a released tip: the next press would be too hard.
 
 use crate::common::*;
-use sim::mechanics::pressures::Cell;
 
 /// Presses with 1 N and releases; after a time the object is pushed into the tip for 2 s and taken away; then a press
 /// with 1 N. Returns the reading and the true force of that touch, and the largest force of the second press.

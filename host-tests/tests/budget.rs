@@ -245,8 +245,7 @@ fn after_each_fall_it_waits_twice_as_long() {
     budget.next(FitLevel::AllRows, CoreCycles(USABLE), CoreCycles(TICKS));
     let rises = frames_to_change(&mut budget, FitLevel::FiveRows, 10, 10 * WINDOW);
     assert_eq!(rises, None, "it has what it asks");
-    let rises = frames_to_change(&mut budget, FitLevel::AllRows, 10, 10 * WINDOW);
-    assert_eq!(rises, Some((WINDOW, FitLevel::AllRows)));
+    assert_eq!(frames_to_change(&mut budget, FitLevel::AllRows, 10, 10 * WINDOW), Some((WINDOW, FitLevel::AllRows)));
 }
 
 #[test]

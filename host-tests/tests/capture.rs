@@ -2,7 +2,6 @@
 
 use crate::common::*;
 use fingertip::capture::{Ended, Head};
-use fingertip::pipeline::Bridge;
 use fingertip::shipped::Gains;
 use replay::{Field, Frames, ReplayError, replay};
 
@@ -58,6 +57,14 @@ fn gains() -> Gains {
     gains
 }
 
+/// A capture that records from the next frame on.
+fn recording<const BYTES: usize>() -> Box<Burst<BYTES>> {
+    let mut capture = Box::new(Burst::NEW);
+    capture.arm();
+    capture.begin(&mut Pipeline::new(&config()));
+    capture
+}
+
 // Whatever frames hold, they come back.
 
 const CODED_BYTES: usize = 8 << 10;
@@ -101,11 +108,7 @@ proptest! {
 
     #[test]
     fn every_frame_comes_back_to_the_bit(steps in steps()) {
-        let mut pipeline = Pipeline::new(&config());
-        let mut capture = Box::new(Burst::<CODED_BYTES>::NEW);
-        capture.arm();
-        capture.begin(&mut pipeline);
-        let mut kept = 0;
+        let (mut capture, mut kept) = (recording::<CODED_BYTES>(), 0);
         for (Record { frame, sense, command }, status) in &steps {
             capture.record(frame, sense, command, status);
             kept += usize::from(capture.standing().state == CaptureState::Recording);
@@ -127,10 +130,7 @@ proptest! {
     fn any_bytes_are_read_without_a_panic(bytes in prop::collection::vec(any::<u8>(), 0..900), real in any::<bool>()) {
         let mut bytes = bytes;
         if real {
-            let mut pipeline = Pipeline::new(&config());
-            let mut capture = Box::new(Burst::<CODED_BYTES>::NEW);
-            capture.arm();
-            capture.begin(&mut pipeline);
+            let mut capture = recording::<CODED_BYTES>();
             capture.end(Ended::Asked);
             let mut head = capture.data().to_vec();
             let bits = 8 * bytes.len() as u32;
@@ -156,8 +156,7 @@ fn check(bytes: &[u8]) -> u32 {
 
 #[test]
 fn out_of_turn_nothing_is_kept() {
-    let config = config();
-    let mut pipeline = Pipeline::new(&config);
+    let mut pipeline = Pipeline::new(&config());
     let mut capture = Box::new(Burst::<CODED_BYTES>::NEW);
     let (status, tare) = (Status::default(), Command { tare_request: 1, ..Command::default() });
     assert!(!capture.is_due(&pipeline, &tare), "nobody armed it");
@@ -195,13 +194,9 @@ fn out_of_turn_nothing_is_kept() {
 /// As `docs/captures.md` has it.
 #[test]
 fn a_frame_takes_what_its_noise_says() {
-    let config = config();
     let mut rng = Rng::with_seed(1);
     for (noise, most) in [(0.0, 20.0), (0.5, 33.0), (1.0, 46.0), (2.0, 62.0)] {
-        let mut pipeline = Pipeline::new(&config);
-        let mut capture = Box::new(Burst::<{ 44 << 10 }>::NEW);
-        capture.arm();
-        capture.begin(&mut pipeline);
+        let mut capture = recording::<{ 44 << 10 }>();
         let mut frame = Frame::EMPTY;
         while capture.standing().state == CaptureState::Recording {
             frame.sequence += 1;
@@ -381,8 +376,7 @@ fn a_fault_is_in_it_and_what_comes_after() {
 #[test]
 fn another_parameter_or_a_step_that_answers_otherwise_is_found_where_it_is() {
     let difference = |bytes: &[u8]| {
-        let replayed = replay::<ROWS, COLUMNS>(bytes, &CLOCKS, |_, _| {}).expect("a capture");
-        replayed.difference.expect("a difference")
+        replay::<ROWS, COLUMNS>(bytes, &CLOCKS, |_, _| {}).expect("a capture").difference.expect("a difference")
     };
     let mut bytes = Recorded::<BYTES>::pressed().capture.data().to_vec();
     // The modulus changes no result before a contact, but the digest starts from all parameters.

@@ -5,7 +5,6 @@ mod grip;
 use crate::common::*;
 use fingertip::config::{Config, GAIN_SETS};
 use fingertip::control::{Drive, GainSchedule, Observer, Reference};
-use fingertip::units::MillimetresPerSecond2;
 use std::ops::Deref;
 
 /// The reference finger's.
@@ -79,8 +78,7 @@ fn the_voltage_limit_is_the_last_and_each_that_cuts_is_told() {
     assert_eq!(apply(&mut Drive::new(), 10_001, 0, &config), (10_000, Limits::VOLTAGE));
     assert_eq!(apply(&mut Drive::new(), -10_001, 0, &config), (-10_000, Limits::VOLTAGE));
     let all = Config { slew_max_q8_mm_per_s2: 40_000, current_max_q8_mm_per_s2: 1 << 14, ..config };
-    let told = Limits::SLEW | Limits::CURRENT | Limits::VOLTAGE;
-    assert_eq!(apply(&mut Drive::new(), 50_000, 0, &all), (10_000, told));
+    assert_eq!(apply(&mut Drive::new(), 50_000, 0, &all), (10_000, Limits::SLEW | Limits::CURRENT | Limits::VOLTAGE));
 }
 
 #[test]
@@ -456,8 +454,7 @@ fn a_large_error_counts_soon_and_is_forgotten_soon() {
         let mut schedule = calmest(&config);
         // The mean moves by 1/8 of its distance to 16 bands: 2, 3.75, 5.3, 6.6, 7.8, 8.8 of them. Rounding leaves the
         // first one at its limit or just beyond it.
-        let met = run(&mut schedule, way, 6, &config);
-        assert_eq!(met[1..], [2, 1, 1, 1, 0]);
+        assert_eq!(run(&mut schedule, way, 6, &config)[1..], [2, 1, 1, 1, 0]);
         run(&mut schedule, way, 1_000, &config);
         // Down to a quarter in 11 frames; calm from then on.
         let frames = run(&mut schedule, 0, 1_000, &config).iter().position(|number| *number == 1).unwrap() as u32;

@@ -2,7 +2,6 @@
 
 use crate::common::*;
 use core::f64::consts::PI;
-use fingertip::contact::from_sums;
 
 const NONE: [u32; ROWS] = [0; ROWS];
 /// The reference array's.
@@ -166,8 +165,7 @@ fn a_fit_is_doubted_by_what_is_hidden_and_how_unlike_it_is() {
         let unlike = 255.0 - ramp(contact.confidence.into(), 96.0, 160.0);
         let (doubt, expected) = (f64::from(contact.doubt), hidden * unlike / 255.0);
         // A confidence that goes to and fro by 1 makes 4 of it.
-        let unsure = 6.0;
-        assert!((doubt - expected).abs() <= unsure, "{doubt}, {expected} expected: ratio {ratio}, {contact:?}");
+        assert!((doubt - expected).abs() <= 6.0, "{doubt}, {expected} expected: ratio {ratio}, {contact:?}");
         kinds[usize::from(expected > 0.0) + 2 * usize::from((1.0..254.0).contains(&unlike))] += 1;
     }
     assert!(kinds[0] > 50 && kinds[1] > 10 && kinds[3] > 10, "{kinds:?}");

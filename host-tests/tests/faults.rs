@@ -2,7 +2,6 @@
 //! each mode, and in the middle of the scan of a frame.
 
 use crate::common::*;
-use fingertip::pipeline::Bridge;
 use sim::plant::Faults;
 
 /// Steps until a fault; the number of frames that took.

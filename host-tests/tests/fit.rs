@@ -2,7 +2,7 @@
 //! the work of a fit, spread over frames.
 
 use crate::common::*;
-use fingertip::contact::{CONFIDENCE_LEAST, from_sums};
+use fingertip::contact::CONFIDENCE_LEAST;
 use host_tests::fit_statistics::{BAD, CUT_MIN, FRAMES, GOOD, Judged, Outcome, Series, WAYS, judge, quantile};
 use images::picture;
 use images::single::{Refined, read};
@@ -39,8 +39,7 @@ fn mm(length: Millimetres) -> f64 {
 fn holds(scene: &Scene, bad: [u32; ROWS]) {
     let (picture, seen) = still(scene, bad);
     assert!(seen >= 12, "{seen} taxels see {scene:?}");
-    let config = scene.config();
-    let ways = all_ways(&picture, &config);
+    let ways = all_ways(&picture, &scene.config());
     let one = FitLevel::ALL.len() + Refined::One as usize;
     for (way, contact) in ways.iter().enumerate().skip(BY_MODEL).filter(|(way, _)| *way != one) {
         let outcome = Outcome::of(contact, scene, false);
@@ -330,10 +329,7 @@ fn what_was_found_is_kept_by_another_effort_and_goes_with_the_contact() {
         for frame in 0..FRAMES {
             let contact = fit.read(next, &config);
             assert_eq!(contact, fresh.read(next, &config));
-            assert!(
-                frame > 0 || contact.force == from_sums(next, &config).force,
-                "the first frame of a contact is its sum"
-            );
+            assert!(frame > 0 || contact.force == from_sums(next, &config).force, "at first a contact is its sum");
         }
     }
 }

@@ -170,11 +170,7 @@ fn moved_while_held(board: &mut Bench, goal_mn: i32, moved_mm: f64) {
 }
 
 // The loop follows a held object that is pushed towards it; a release to the surface of the first touch would hold it.
-sim::sizes!(
-    an_object_that_came_along_while_it_was_held_is_let_go,
-    let_go_of_what_came_along(&[1_000]),
-    let_go_of_what_came_along(&[300, 3_000])
-);
+sim::sizes!(an_object_that_came_along_while_it_was_held_is_let_go, let_go_of_what_came_along: &[1_000], &[300, 3_000]);
 
 fn let_go_of_what_came_along(goals_mn: &[i32]) {
     for &goal_mn in goals_mn {

@@ -2,9 +2,7 @@
 //! gains and masks of single taxels.
 
 use crate::common::*;
-use fingertip::pressure::{CODE_BITS, CalibrationError, GAIN_MAX, TARE_BITS};
-use fingertip::shipped::Array;
-use host_tests::stimulus::tared;
+use fingertip::pressure::{CODE_BITS, CalibrationError};
 
 /// Codes above the column's level, or any codes.
 #[derive(Clone, Debug)]
@@ -163,8 +161,7 @@ proptest! {
         array.continue_tare();
         array.read(&frame, &config);
         array.continue_tare();
-        let count = array.read(&frame, &config).bad_count;
-        prop_assert_eq!(array.begin(&frame, ROWS, &config).0, count);
+        prop_assert_eq!(array.read(&frame, &config).bad_count, array.begin(&frame, ROWS, &config).0);
     }
 }
 
@@ -208,8 +205,7 @@ fn a_gain_scales_its_taxel_and_no_other() {
     let mut gains = GAINS;
     gains[4][6] = GAIN_ONE / 2;
     gains[5][3] = GAIN_ONE / 4 * 5;
-    let calibration = Calibration::new(&gains, &[0; ROWS]).unwrap();
-    let scaled = *tared(&calibration, &blank, &config).read(&pressed, &config);
+    let scaled = *tared(&Calibration::new(&gains, &[0; ROWS]).unwrap(), &blank, &config).read(&pressed, &config);
     for (row, column) in places() {
         let share = f64::from(gains[row][column]) / f64::from(GAIN_ONE);
         let expected = f64::from(plain.taxels[row][column]) * share;

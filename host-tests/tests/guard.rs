@@ -334,8 +334,7 @@ struct Finger {
 impl Finger {
     /// With counts so fine that they tell the speed.
     fn new() -> Self {
-        let params = Params { encoder_counts_per_turn: 65_536, clearance_um: 10_000, ..Params::DEFAULT };
-        let config = allowed(params);
+        let config = allowed(Params { encoder_counts_per_turn: 65_536, clearance_um: 10_000, ..Params::DEFAULT });
         Self { guard: started(0, &config), config, travel_mm: 0.0, speed_mm_per_s: 0.0, force: Newtons::ZERO }
     }
 
@@ -527,8 +526,7 @@ fn a_tip_that_stands_is_stopped_from_what_must_be_expected_on() {
             // A steady push makes the change that it would in tau.
             let tau_s = finger.frame_s() * (65_536.0 / f64::from(bounds.leak) - 1.0);
             let beyond = 256.0 * share * change / tau_s;
-            let found = (0..2_000).find_map(|_| finger.pushed((held + beyond) as i32));
-            assert_eq!(found, fault, "{force_n} N, {share}");
+            assert_eq!((0..2_000).find_map(|_| finger.pushed((held + beyond) as i32)), fault, "{force_n} N, {share}");
         }
     }
 }

@@ -6,11 +6,9 @@ mod recover;
 mod several;
 mod table;
 
-use self::bench::{Bench, ID, answer, hex, packet, receive};
+use self::bench::{Bench, *};
 use crate::common::*;
-use fingertip::link::Actions;
-use fingertip::link::packet::{CRC_START, Event, LENGTH_MAX, Receiver, update_crc};
-use fingertip::shipped::REGISTERS;
+use fingertip::link::packet::LENGTH_MAX;
 
 // Packets on the wire: the examples that the protocol's manual prints, stuffing, and any slicing of any bytes.
 
@@ -173,7 +171,7 @@ fn a_million_random_and_mutated_bytes_change_nothing() {
     unmoved(&mut bench);
     let counters = *bench.server.counters();
     assert!(counters.framing > 1000, "{counters:?}");
-    assert!(bench.refused(fingertip::link::packet::StatusError::Crc) > 1000, "{counters:?}");
+    assert!(bench.refused(StatusError::Crc) > 1000, "{counters:?}");
 }
 
 #[test]
@@ -184,8 +182,7 @@ fn no_single_wrong_byte_is_believed() {
                 let mut bytes = good.clone();
                 bytes[place] ^= change;
                 let mut bench = Bench::new();
-                let replies = bench.hear(&bytes);
-                assert!(replies.iter().all(|reply| answer(reply).number() == 3), "{bytes:02X?}");
+                assert!(bench.hear(&bytes).iter().all(|reply| answer(reply).number() == 3), "{bytes:02X?}");
                 unmoved(&mut bench);
             }
         }
@@ -219,12 +216,12 @@ proptest! {
         prop_assert_eq!(&replies, &in_slices);
         prop_assert_eq!(whole.server.settings(), sliced.server.settings());
         let settings = whole.server.settings();
-        prop_assert!(fingertip::shipped::Config::shipped(&settings.record.params).is_ok());
+        prop_assert!(Config::shipped(&settings.record.params).is_ok());
         prop_assert!(settings.record.id <= 252 && settings.record.baud_code <= 5 && settings.status_return_level <= 2);
         prop_assert!(settings.command.bus_watchdog_ms <= 127 * 20);
         let goal = settings.command.goal;
-        prop_assert!(goal >= fingertip::units::Newtons::ZERO);
-        prop_assert!(goal == fingertip::units::Newtons::ZERO || settings.command.torque);
-        prop_assert!(goal <= fingertip::config::newtons(settings.record.params.force_max_mn));
+        prop_assert!(goal >= Newtons::ZERO);
+        prop_assert!(goal == Newtons::ZERO || settings.command.torque);
+        prop_assert!(goal <= newtons(settings.record.params.force_max_mn));
     }
 }

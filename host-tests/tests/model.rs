@@ -260,14 +260,10 @@ fn peak_and_mean_pressure_at_the_boundaries() {
 fn a_depth_or_force_outside_the_domain_counts_as_the_nearest() {
     for tip in boundary_tips() {
         for d in [0, -1, i32::MIN] {
-            let (radius, angle) =
-                (tip.contact_radius(mm(d)).to_bits(), paper::touching_angle_max(&tip, mm(d)).to_bits());
-            let (force, stiffness) = (tip.force(mm(d)).to_bits(), tip.stiffness(mm(d)).to_bits());
-            assert_eq!(
-                [radius, angle, force, stiffness, tip.pressure(mm(0), mm(d)).to_bits()],
-                [0; 5],
-                "{tip:?}, d {d}"
-            );
+            let angle = paper::touching_angle_max(&tip, mm(d)).to_bits();
+            let [radius, force] = [tip.contact_radius(mm(d)).to_bits(), tip.force(mm(d)).to_bits()];
+            let [stiffness, pressure] = [tip.stiffness(mm(d)).to_bits(), tip.pressure(mm(0), mm(d)).to_bits()];
+            assert_eq!([radius, angle, force, stiffness, pressure], [0; 5], "{tip:?}, d {d}");
         }
         let deepest = tip.depth_max();
         for beyond in [deepest.to_bits() + 1, tip.radius().to_bits(), i32::MAX].map(mm) {

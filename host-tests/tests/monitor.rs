@@ -2,8 +2,6 @@
 
 use crate::common::*;
 use fingertip::safety::monitor::{Monitor, MonitorInputs, array_broken, array_readable};
-use fingertip::units::MillimetresPerSecond2;
-use host_tests::stimulus::tared;
 
 /// Readings of a sound finger that presses with 1 N.
 #[derive(Clone, Copy)]
@@ -186,8 +184,7 @@ fn an_array_that_reads_less_than_at_its_tare_is_broken() {
         // A new start forgets the frames before.
         let Shown { picture, motion, .. } = with(sum);
         monitor.restart(&picture, &motion);
-        let faults = [(); 3].map(|()| monitor.check(&with(sum).view(), &config));
-        assert_eq!(faults, [None, None, broken], "{sum}");
+        assert_eq!([(); 3].map(|()| monitor.check(&with(sum).view(), &config)), [None, None, broken], "{sum}");
     }
 }
 

@@ -3,7 +3,7 @@
 
 use crate::common::*;
 use host_tests::figures::{Modulus, PITCH_MM, fit, readings, seen, tip};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -218,8 +218,7 @@ fn every_file_that_a_page_names_exists() {
             let inside = file.split_once('/').is_some_and(|(folder, _)| FOLDERS.contains(&folder));
             if inside && !file.contains(['*', '<', '{', '[']) {
                 seen += 1;
-                let beside = path.parent().unwrap_or(&path).join(file);
-                if !root().join(file).exists() && !beside.exists() {
+                if !root().join(file).exists() && !path.parent().unwrap_or(&path).join(file).exists() {
                     wrong.push(format!("{}: `{file}` does not exist", path.display()));
                 }
             }

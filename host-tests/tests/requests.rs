@@ -1,9 +1,6 @@
 //! Requests in the loop: all of one frame are executed, refused ones are reported. Also the first frame with torque.
 
 use crate::common::*;
-use fingertip::measure::MeasureStatus;
-use fingertip::pipeline::Bridge;
-use fingertip::pressure::TARE_BITS;
 
 const RUNNING: MeasureStatus = MeasureStatus::running(Task::Press);
 
@@ -386,6 +383,5 @@ fn a_tare_of_a_released_tip_is_not_flagged_by_the_one_before() {
     board.tare();
     assert!(!flagged(&mut board), "{}", told(&mut board));
     board.hold(1_000, 0.5);
-    let status = board.step();
-    assert_eq!(status.mode, Mode::Force, "{}", told(&mut board));
+    assert_eq!(board.step().mode, Mode::Force, "{}", told(&mut board));
 }

@@ -4,7 +4,6 @@ use crate::common::*;
 use host_tests::stimulus;
 use host_tests::study::inputs::Inputs;
 use images::same_bits::Comparison;
-use std::collections::BTreeSet;
 
 #[test]
 fn a_digest_is_that_of_its_inputs() {

@@ -1,11 +1,7 @@
 //! From codes to contact: the plant's electrical model against the readings of the core.
 
 use crate::common::*;
-use fingertip::contact::from_sums;
-use fingertip::pressure::TARE_BITS;
-use fingertip::shipped::Array;
 use fingertip::touch::Touch;
-use host_tests::stimulus::tared;
 
 struct Bench {
     world: Plant,
@@ -106,20 +102,17 @@ fn the_force_that_is_seen_whole_leaves_the_converter_room() {
         let config = allowed(Params { tip_radius_um, modulus_pa, ..Params::DEFAULT });
         let seen_n: f64 = config.force_seen.0.to_num();
         let mut world = Plant::new(&setup);
-        let indentation_mm = setup.tip.indentation_mm(seen_n);
-        world.place(setup.wall.distance_mm + indentation_mm);
+        world.place(setup.wall.distance_mm + setup.tip.indentation_mm(seen_n));
         let mut frame = Frame::EMPTY;
         world.fill_frame(&mut frame);
         let highest = places().map(|(row, column)| frame.code(row, column)).max().unwrap();
-        println!("{radius_mm} mm, {modulus_kpa} kPa: {seen_n} N at {indentation_mm} mm, code {highest}");
         let share = f64::from(highest) / f64::from(config.saturated_codes);
-        assert!(share <= 0.951, "{highest}");
-        // A taxel averages over a peak that may be small.
-        assert!(share >= 0.733, "{highest}: more could be seen");
+        // A taxel averages over a peak that may be small, so that not all is seen.
+        assert!((0.733..=0.951).contains(&share), "{radius_mm} mm, {modulus_kpa} kPa: {seen_n} N, code {highest}");
     }
 }
 
-// An array with a nonlinear characteristic: codes to force, drift, bad taxels, and refused parameters.
+// An array with a nonlinear characteristic: codes to force, drift and bad taxels.
 
 /// Ratio of the pressure per code at full range to that at zero.
 const GROWTH: f64 = 3.3;
@@ -182,14 +175,6 @@ fn a_dead_taxel_moves_no_baseline() {
     let after = tares(&bench.array);
     assert_eq!(before[4], after[4]);
     assert_ne!(before[5], after[5]);
-}
-
-#[test]
-fn what_leaves_too_few_codes_at_the_full_range_is_refused() {
-    let params = Params { codes_per_kpa_milli: 4_000, curve_permille: 3_500, ..Params::DEFAULT };
-    let error = Config::shipped(&params).unwrap_err();
-    assert_eq!(error.to_string(), "codes_per_kpa_milli of 4000: 4500 to 200000 are allowed");
-    allowed(Params { codes_per_kpa_milli: 4_500, ..params });
 }
 
 #[test]

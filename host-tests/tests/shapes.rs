@@ -152,12 +152,10 @@ fn presses<const ROWS: usize, const COLUMNS: usize>(
     let seen = finger.pipeline.array().picture().force(finger.pipeline.config()).0.to_num::<f64>();
     let hidden = 1.0 - seen / finger.force_n();
     let centre = [status.contact.centre_x, status.contact.centre_y].map(|place| place.0.to_num::<f64>());
-    println!(
-        "{ROWS} x {COLUMNS}, {:?}: {goal} N held to {least:.4} .. {most:.4} N with {hidden:.3} hidden, centre \
-         {centre:.2?} mm, confidence {}",
-        finger.command.fit_level, status.contact.confidence
+    assert!(
+        goal * (1.0 - share) < least && most < goal * (1.0 + share),
+        "{ROWS} x {COLUMNS}, {goal} N: {least} .. {most} N, {hidden} hidden"
     );
-    assert!(goal * (1.0 - share) < least && most < goal * (1.0 + share), "{least} .. {most} N");
     let wall = finger.plant.finger().setup.wall;
     let is = [wall.centre_x_mm, wall.centre_y_mm];
     assert!(centre.iter().zip(is).all(|(found, place)| (found - place).abs() < off_mm), "{centre:?}");
@@ -174,8 +172,7 @@ fn holds<const ROWS: usize, const COLUMNS: usize>(pitch_um: i32) {
             assert_eq!((status.contact.bad_taxels, status.contact.doubt), (0, 0));
         }
         finger.command.goal = fingertip::units::Newtons::ZERO;
-        let status = finger.run(0.4);
-        assert_eq!((status.mode, finger.force_n()), (Mode::Release, 0.0), "{fit_level:?}");
+        assert_eq!((finger.run(0.4).mode, finger.force_n()), (Mode::Release, 0.0), "{fit_level:?}");
     }
 }
 
@@ -235,7 +232,6 @@ fn held<const ROWS: usize, const COLUMNS: usize>(pitch_um: i32, frames_per_s: u3
         let ([least, most], _) = finger.hold(goal_mn, 0.1);
         off = off.max(most - goal).max(goal - least);
     }
-    println!("{ROWS} x {COLUMNS} at {frames_per_s} Hz, {converters} converters: {over:.3} N over, {off:.4} N off");
     [over, off]
 }
 

@@ -21,11 +21,14 @@ fn start_in(sector: Sector, bytes: &[u8]) -> (Loaded, Vec<Remark>) {
     (Journal::new(&nor).load(&nor, |remark| remarks.push(remark)), remarks)
 }
 
+fn load(nor: &Nor) -> Loaded {
+    Journal::new(nor).load(nor, |_| ())
+}
+
 #[test]
 fn an_erased_board_has_the_defaults_and_no_fault() {
     assert_eq!(start_in(Sector::A, &[]), (Loaded { record: Record::DEFAULT, sound: true }, vec![]));
-    let none = Nor::blank(0);
-    assert_eq!(Journal::new(&none).load(&none, |_| ()), Loaded { record: Record::DEFAULT, sound: true });
+    assert_eq!(load(&Nor::blank(0)), Loaded { record: Record::DEFAULT, sound: true });
 }
 
 #[test]
@@ -39,8 +42,7 @@ fn garbage_is_a_fault_with_the_defaults_and_the_next_save_ends_it() {
         assert_eq!(loaded, Loaded { record: Record::DEFAULT, sound: false });
         assert_eq!(journal.make_room(&mut nor, SLOT_BYTES), Ok(both));
         assert_eq!(journal.save(&mut nor, &record(1), || ()), Ok(()));
-        let journal = Journal::new(&nor);
-        assert_eq!(journal.load(&nor, |_| ()), Loaded { record: record(1), sound: true });
+        assert_eq!(load(&nor), Loaded { record: record(1), sound: true });
     }
 }
 
@@ -68,7 +70,6 @@ fn the_sequence_tells_which_sector_is_newer_also_where_it_wraps() {
         let mut nor = Nor::blank(SIZE);
         nor.sector(Sector::A)[..SLOT_BYTES].copy_from_slice(&encode(&record(1), first));
         nor.sector(Sector::B)[..SLOT_BYTES].copy_from_slice(&encode(&record(2), first.wrapping_add(1)));
-        let load = |nor: &Nor| Journal::new(nor).load(nor, |_| ());
         assert_eq!(load(&nor), Loaded { record: record(2), sound: true }, "{first}");
         nor.sector(Sector::A)[..SLOT_BYTES].copy_from_slice(&encode(&record(3), first.wrapping_add(2)));
         assert_eq!(load(&nor), Loaded { record: record(3), sound: true }, "{first}");
@@ -102,7 +103,7 @@ fn a_sector_with_older_records_is_not_written_before_it_is_erased() {
     let mut journal = Journal::new(&nor);
     assert_eq!(journal.make_room(&mut nor, SLOT_BYTES), Ok(true));
     assert_eq!(journal.save(&mut nor, &record(8), || ()), Ok(()));
-    assert_eq!(Journal::new(&nor).load(&nor, |_| ()), Loaded { record: record(8), sound: true });
+    assert_eq!(load(&nor), Loaded { record: record(8), sound: true });
 }
 
 #[test]
@@ -219,8 +220,7 @@ fn no_values_at_all_are_all_defaults() {
 fn what_contradicts_goes_back_to_its_defaults_and_the_rest_stays() {
     let settled = |mut params: Params| {
         let mut told = 0;
-        let made = settle(&mut params, Config::shipped, |_| told += 1);
-        assert_eq!(made.expect("a configuration").params, params);
+        assert_eq!(settle(&mut params, Config::shipped, |_| told += 1).expect("a configuration").params, params);
         (params, told)
     };
     let own = Params { pitch_um: 1_777, ..Params::DEFAULT };

@@ -332,8 +332,7 @@ fn a_goal_is_held_between_the_least_contact_and_the_largest_force() {
     let config = Box::leak(Box::new(Config { force_seen: newtons(1_500), ..config() }));
     let blind = Hand { config, ..hand };
     let (seen, flags) = { blind }.frame(1_500, &held, at(travel));
-    let more = { blind }.frame(1_501, &held, at(travel));
-    assert_eq!(more, (seen, flags | Limits::GOAL));
+    assert_eq!({ blind }.frame(1_501, &held, at(travel)), (seen, flags | Limits::GOAL));
 }
 
 #[test]

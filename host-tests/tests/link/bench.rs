@@ -2,12 +2,17 @@
 
 use fingertip::capture::CaptureStatus;
 use fingertip::command::Command;
-use fingertip::link::packet::{Event, Packet, Receiver, Sender, StatusError};
+pub use fingertip::link::Actions;
+pub use fingertip::link::packet::{BROADCAST, CRC_START, Event, Receiver, StatusError, update_crc};
+use fingertip::link::packet::{Packet, Sender};
+pub use fingertip::link::table::READ_MAX;
+pub use fingertip::link::table::indirect::BLOCK;
 use fingertip::link::{Captured, Crash, CrashCause, Health, Reply, ResetCause};
 use fingertip::params::Params;
 use fingertip::pipeline::{AcknowledgedRequests, Status, Taring};
 use fingertip::pressure::TARE_BITS;
-use fingertip::shipped::{CLOCKS, COLUMNS, Frame, REGISTERS, ROWS, Record, SLOTS, Server, Snapshot, address};
+use fingertip::shipped::{CLOCKS, COLUMNS, Frame, ROWS, SLOTS, Server, Snapshot, address};
+pub use fingertip::shipped::{REGISTERS, Record};
 use fingertip::state::{Fault, Mode};
 
 pub const ID: u8 = 1;

@@ -1,12 +1,9 @@
 //! Second names of registers: for drivers whose addresses or lengths have 8 bits, and for those of X-series servos.
 
-use super::bench::{Bench, owned, param, table_end};
+use super::bench::{Bench, *};
 use super::table::busy;
 use crate::common::*;
-use fingertip::link::packet::StatusError;
-use fingertip::link::table::indirect::BLOCK;
-use fingertip::link::table::{READ_MAX, mirrors};
-use fingertip::shipped::{REGISTERS, address};
+use fingertip::link::table::mirrors;
 
 #[test]
 fn a_mirror_reads_as_what_it_mirrors() {
@@ -86,7 +83,7 @@ fn a_servos_driver_finds_effort_speed_and_supply() {
 
     // Held at the ends of 16 bits.
     for (mn, expected) in [(40_000, i16::MAX), (-40_000, i16::MIN), (32_767, i16::MAX), (-5, -5)] {
-        bench.status.contact.force = fingertip::config::newtons(mn);
+        bench.status.contact.force = newtons(mn);
         assert_eq!(bench.read(address::SHORT_FORCE_MN, 2), Ok(expected.to_le_bytes().to_vec()), "{mn}");
     }
     assert!(param("force_fault_mn") < param("force_max_mn"));
@@ -116,7 +113,7 @@ fn lead(bench: &mut Bench, block: u16, place: u16, target: u16, bytes: u16) {
 #[test]
 fn bytes_are_gathered_from_anywhere_in_one_read() {
     let mut bench = Bench::new();
-    bench.status.contact.force = fingertip::config::newtons(1_234);
+    bench.status.contact.force = newtons(1_234);
     bench.status.fault = Some(Fault::Bridge);
     let (addresses, data) = BLOCKS[1];
     lead(&mut bench, addresses, 0, address::PRESENT_FORCE_MN, 4);
@@ -205,7 +202,7 @@ fn addresses_count_from_the_same_write_on() {
 fn none_leads_to_another_nor_below_64_nor_into_a_gap() {
     let mut bench = Bench::new();
     bench.status.mode = Mode::Force;
-    bench.status.contact.force = fingertip::config::newtons(1_234);
+    bench.status.contact.force = newtons(1_234);
     let indirect =
         |target: u16| BLOCKS.iter().any(|&(addresses, data)| (addresses..data + BLOCK as u16).contains(&target));
     // What the talk itself counts is not compared.

@@ -1,11 +1,8 @@
 //! Recovery in one write, goals that end with torque, values before a tare, faults, watchdog and requests.
 
-use super::bench::{Bench, ID, packet, param};
+use super::bench::{Bench, *};
 use crate::common::*;
-use fingertip::capture::CaptureState;
-use fingertip::link::packet::{BROADCAST, StatusError, instruction};
-use fingertip::measure::MeasureStatus;
-use fingertip::shipped::address;
+use fingertip::link::packet::instruction;
 
 const RECOVER: u16 = address::RECOVER;
 
@@ -42,8 +39,7 @@ fn recover_leaves_what_the_single_writes_leave() {
         };
         let all = [(address::BUS_WATCHDOG, 0), (address::TORQUE_ENABLE, 0), (address::CLEAR_FAULT, 1)];
         let single = &all[usize::from(fault != Fault::BusSilent)..];
-        let one = [(RECOVER, 1)];
-        assert_eq!(recovered(&one), recovered(single), "{fault:?}");
+        assert_eq!(recovered(&[(RECOVER, 1)]), recovered(single), "{fault:?}");
         assert_eq!(recovered(&[(address::MIRROR_RECOVER, 1)]), recovered(single), "{fault:?}");
     }
 }
@@ -62,7 +58,7 @@ fn recovers_by_cycles(fault: Fault) {
     let cycle = |bench: &mut Bench, mn: i16, recover: u8| {
         let [low, high] = mn.to_le_bytes();
         let [at, at_high] = address::INDIRECT_DATA_1.to_le_bytes();
-        let params = [at, at_high, 3, 0, super::bench::ID, low, high, recover];
+        let params = [at, at_high, 3, 0, ID, low, high, recover];
         assert_eq!(bench.ask_as(BROADCAST, instruction::SYNC_WRITE, &params), None);
     };
     bench.write(address::TORQUE_ENABLE, &[1]).expect("torque");
@@ -459,8 +455,7 @@ fn a_motion_is_refused_where_it_cannot_begin() {
     }
     // The loop has not taken the jog yet, nor the stop after it: another motion or a capture would replace them.
     let mut waits = Bench::new();
-    let answers = [1, 2, 0, 1, 2, 0].map(|task| ask(&mut waits, task).is_ok());
-    assert_eq!(answers, [true, false, true, false, false, true]);
+    assert_eq!([1, 2, 0, 1, 2, 0].map(|task| ask(&mut waits, task).is_ok()), [true, false, true, false, false, true]);
     assert_eq!(waits.write(address::CAPTURE, &[1]), RESULT);
     assert_eq!(waits.write(address::CAPTURE, &[0]), Ok(()));
     // A stop is never refused. Without a motion to end it changes nothing: it would hide how the last one ended.

@@ -1,12 +1,8 @@
 //! Sync, Bulk, Fast Sync and Fast Bulk instructions: several devices on one bus hear each other.
 
-use super::bench::{Answer, Bench, ID, answer, hex, packet};
+use super::bench::{Bench, Record, *};
 use crate::common::*;
-use fingertip::link::Actions;
-use fingertip::link::packet::{CRC_START, StatusError, update_crc};
-use fingertip::shipped::{Record, Settings, address};
-
-const BROADCAST: u8 = 254;
+use fingertip::shipped::Settings;
 
 fn device(id: u8) -> Bench {
     let mut bench = Bench::new();
@@ -83,8 +79,7 @@ fn sync_write_reaches_each_with_its_own() {
     for entries in ["00 01 04 00  01 00 00 00 00  02 00 00", "00 01 04 00  01 00 00 00 40  02 01 00 00 00"] {
         assert!(talk(&mut devices, &packet(BROADCAST, 0x83, &hex(entries))).is_empty());
     }
-    let goals = devices.each_mut().map(|device| device.number(address::GOAL_FORCE_MN, 4));
-    assert_eq!(goals, [2000, 1, 0]);
+    assert_eq!(devices.each_mut().map(|device| device.number(address::GOAL_FORCE_MN, 4)), [2000, 1, 0]);
     assert_eq!(devices[0].number(address::RANGE_ERRORS, 2), 1);
     assert_eq!(devices[0].number(address::LENGTH_ERRORS, 2), 1);
     // One device twice: the later entry is written after the earlier one, also where that was refused.
@@ -384,15 +379,13 @@ fn unknown_instructions_and_missing_and_surplus_parameters_are_refused() {
 #[test]
 fn a_packet_too_long_to_keep_is_refused() {
     let mut bench = Bench::new();
-    let params = vec![0; 384 - 11];
-    assert_eq!(bench.ask(0x03, &params).number(), 7, "the longest that fits is looked at");
+    assert_eq!(bench.ask(0x03, &vec![0; 384 - 11]).number(), 7, "the longest that fits is looked at");
     // 400 parameters and their CRC, put together by hand.
     let mut bytes = hex("FF FF FD 00 01 93 01 03");
     bytes.extend([0; 400]);
     let crc = update_crc(CRC_START, &bytes);
     bytes.extend(crc.to_le_bytes());
-    let replies = bench.hear(&bytes);
-    assert_eq!(replies.iter().map(|reply| reply[8]).collect::<Vec<_>>(), [5]);
+    assert_eq!(bench.hear(&bytes).iter().map(|reply| reply[8]).collect::<Vec<_>>(), [5]);
 }
 
 #[test]

@@ -1,13 +1,9 @@
 //! Reading the control table.
 
-use super::bench::{Bench, ID, owned, param, table_end};
+use super::bench::{Bench, Record, *};
 use crate::common::*;
-use fingertip::link::Actions;
-use fingertip::link::packet::StatusError;
-use fingertip::link::table::indirect::BLOCK;
-use fingertip::link::table::{Access, READ_MAX, Register};
-use fingertip::shipped::{Gains, REGISTERS, address};
-use fingertip::store::Record;
+use fingertip::link::table::{Access, Register};
+use fingertip::shipped::Gains;
 use host_tests::control_table::{items, step};
 
 /// Every read within the table is answered, as its bytes read one by one; an address without a register reads 0. So a
@@ -35,11 +31,7 @@ fn every_span_reads_as_its_bytes_and_gaps_as_zero() {
     for length in 1..=READ_MAX {
         assert_eq!(bench.read(end - length + 1, length), Err(StatusError::Access as u8), "{length} past the end");
     }
-}
-
-#[test]
-fn reads_of_no_or_too_many_bytes_are_refused() {
-    let mut bench = Bench::new();
+    // No bytes or too many, and addresses far beyond.
     for (address, length, error) in [
         (0, 0, StatusError::Length),
         (address::RAW_CODES, READ_MAX + 1, StatusError::Length),
@@ -237,8 +229,7 @@ fn no_register_takes_a_value_out_of_its_range() {
         // The count of refusals holds at its top.
         let mut bench = Bench::new();
         bench.write(address::TORQUE_ENABLE, &[torque.into()]).expect("torque");
-        let read_only = access == Access::ReadOnly;
-        let closed = read_only || torque && matches!(access, Access::TorqueOff | Access::Stored);
+        let closed = access == Access::ReadOnly || torque && matches!(access, Access::TorqueOff | Access::Stored);
         let refused = if closed { StatusError::Access } else { StatusError::Range };
         let all = if register.kind.width() > 2 || closed { 0..0 } else { -(1i64 << 15)..1 << 16 };
         for value in all.chain(edges.iter().copied()).chain([min - 1, min, max, max + 1]) {

@@ -9,7 +9,7 @@ use fingertip::contact::parts::{
 use fingertip::contact::{self, Fit};
 use fingertip::frame::{Frame, Shape};
 use fingertip::pipeline::Pipeline;
-use fingertip::pressure::{Array, Calibration, GAIN_MAX, TactileImage};
+use fingertip::pressure::{Array, Calibration, TactileImage};
 use images::single::{self, Refined};
 
 /// The highest code that is not saturated.
@@ -232,8 +232,7 @@ fn any_sense() -> impl Strategy<Value = Sense> {
 fn takes_anything<const ROWS: usize, const COLUMNS: usize>(cases: u32) {
     let steps = prop::collection::vec((any_frame::<ROWS, COLUMNS>(), any_sense(), 0..6_u8), 1..8);
     let test = |steps: Vec<(Frame<ROWS, COLUMNS>, Sense, u8)>| {
-        let config = config::<ROWS, COLUMNS>(&Params::DEFAULT);
-        let mut pipeline = Pipeline::new(&config);
+        let mut pipeline = Pipeline::new(&config::<ROWS, COLUMNS>(&Params::DEFAULT));
         let mut command = Command { tare_request: 1, goal: newtons(2_000), ..Command::default() };
         let quiet = frame::<ROWS, COLUMNS>(|_, _| QUIET);
         let still = Sense { supply_mv: 6_000, ..Sense::default() };
@@ -253,7 +252,7 @@ fn takes_anything<const ROWS: usize, const COLUMNS: usize>(cases: u32) {
         }
         Ok(())
     };
-    proptest::test_runner::TestRunner::new(seeded(cases, 2003)).run(&steps, test).expect("no panic");
+    TestRunner::new(seeded(cases, 2003)).run(&steps, test).expect("no panic");
 }
 
 #[test]
@@ -298,8 +297,7 @@ fn stays_within<const ROWS: usize, const COLUMNS: usize>(poses: u32) {
     let mut steepest = 0;
     for _ in 0..poses / 500 {
         let (pitch_um, tip_radius_um) = (between(&mut rng, 500, 4_000), between(&mut rng, 4_000, 16_000));
-        let params = Params { pitch_um, tip_radius_um, ..Params::DEFAULT };
-        let config = config::<ROWS, COLUMNS>(&params);
+        let config = config::<ROWS, COLUMNS>(&Params { pitch_um, tip_radius_um, ..Params::DEFAULT });
         let geometry = &config.geometry;
         let peak = between(&mut rng, 16, 4_095 * 16 * i32::from(GAIN_MAX >> 14));
         let Some(scale) = PeakScale::new(peak, geometry) else { continue };

@@ -4,7 +4,6 @@ use super::{OTHERS, Other};
 use crate::common::*;
 use fingertip::shipped::{Loaded, Record};
 use fingertip::store::{Flash, Journal, SLOT_BYTES, SaveError, Sector};
-use proptest::test_runner::TestRunner;
 use sim::encode;
 
 /// Slots of a small sector.
@@ -46,6 +45,25 @@ fn cuts(done: &[Done], words: usize, few: usize) -> Vec<Cut> {
     cuts
 }
 
+/// Cuts a save of one record at every place, of an erase at one word in `few`. The board then starts twice, with the old
+/// record or the new one, and saves another one. Returns the number of cuts, and whether there was an erase.
+fn torn(board: &Board, [next, other]: [Record; 2], words: usize, few: usize) -> (usize, bool) {
+    let mut whole = board.clone();
+    whole.start(None);
+    assert_eq!(whole.save(next), Ok(()));
+    let cuts = cuts(&whole.nor.done, words, few);
+    for cut in &cuts {
+        let mut torn = board.clone();
+        torn.start(Some(*cut));
+        let _ = torn.save(next);
+        torn.start(None);
+        torn.start(None);
+        assert_eq!(torn.save(other), Ok(()), "{cut:?}");
+        torn.start(None);
+    }
+    (cuts.len(), whole.nor.done.contains(&Done::Erase))
+}
+
 #[test]
 fn sectors_of_the_real_size_are_torn_too() {
     const SIZE: usize = 128 << 10;
@@ -56,20 +74,9 @@ fn sectors_of_the_real_size_are_torn_too() {
         let (older, _) = sector(SIZE, slots, 1_000 - slots as i32, Other::None);
         let (newer, newest) = sector(SIZE, count, 1_000, Other::None);
         let board = Board::new(Nor::new([older, newer]), newest);
-        let mut whole = board.clone();
-        whole.start(None);
-        assert_eq!(whole.save(record(3_000)), Ok(()));
-        let ops = whole.nor.done;
-        assert!(ops.contains(&Done::Erase), "room for less than a quarter is made");
-        for cut in cuts(&ops, SIZE / 4, 501) {
-            let mut torn = board.clone();
-            torn.start(Some(cut));
-            let _ = torn.save(record(3_000));
-            torn.start(None);
-            assert_eq!(torn.save(record(3_001)), Ok(()));
-            torn.start(None);
-            cases += 1;
-        }
+        let (cuts, erased) = torn(&board, [3_000, 3_001].map(record), SIZE / 4, 501);
+        assert!(erased, "room for less than a quarter is made");
+        cases += cuts;
     }
     assert!(cases > 1_000, "{cases} cases");
 }
@@ -87,20 +94,7 @@ fn gains_torn_anywhere_are_the_old_ones_or_the_new_ones() {
             board.start(None);
             assert_eq!(board.save(made(number)), Ok(()));
         }
-        let next = made(count);
-        let mut whole = board.clone();
-        whole.start(None);
-        assert_eq!(whole.save(next), Ok(()));
-        for cut in cuts(&whole.nor.done, size / 4, 61) {
-            let mut torn = board.clone();
-            torn.start(Some(cut));
-            let _ = torn.save(next);
-            torn.start(None);
-            torn.start(None);
-            assert_eq!(torn.save(with_gains(100)), Ok(()), "{count} records, {cut:?}");
-            torn.start(None);
-            cases += 1;
-        }
+        cases += torn(&board, [made(count), with_gains(100)], size / 4, 61).0;
     }
     assert!(cases > 4_000, "{cases} cases");
 }

@@ -228,8 +228,7 @@ fn a_release_never_goes_forward_and_without_a_touch_nowhere() {
     assert_eq!(hand.touch.stage(), Stage::Lost);
     // Released when already farther back than the clearance: it stays there.
     for _ in 0..2 {
-        let got = hand.frame(0, &Contact::default(), at(mm(2.0)));
-        assert_eq!(got.0.speed, MillimetresPerSecond::ZERO);
+        assert_eq!(hand.frame(0, &Contact::default(), at(mm(2.0))).0.speed, MillimetresPerSecond::ZERO);
     }
     let got = Hand::free().frame(0, &contact(39), at(mm(7.0)));
     assert_eq!(got.0.speed, MillimetresPerSecond::ZERO, "no surface is known");

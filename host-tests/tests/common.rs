@@ -184,10 +184,15 @@ pub fn ordinary(seed: u64, centre_x_mm: f64, width_percent: u32, rate_percent_pe
     board
 }
 
-/// Tactile image of a contact without noise, and the number of taxels that see it.
+/// Tactile image of a contact with this spread of the gains, and the number of taxels that see it.
+pub fn seen(scene: &Scene, spread: f64, bad: [u32; ROWS], rng: &mut Rng) -> (TactileImage, usize) {
+    let noise = if spread > 0.0 { Noise::OfReading(spread) } else { Noise::None };
+    Reading { steps: Steps::Sixteenths, noise, dead: 0 }.picture(&scene.pressures(), bad, rng)
+}
+
+/// The same without noise.
 pub fn still(scene: &Scene, bad: [u32; ROWS]) -> (TactileImage, usize) {
-    let reading = Reading { steps: Steps::Sixteenths, noise: Noise::None, dead: 0 };
-    reading.picture(&scene.pressures(), bad, &mut Rng::with_seed(0))
+    seen(scene, 0.0, bad, &mut Rng::with_seed(0))
 }
 
 /// A hemisphere on a plane.

@@ -13,9 +13,7 @@ fn mm(length: Millimetres) -> f64 {
 
 /// Tactile image of a plane contact with a spread of the taxel gains.
 fn plane(d_mm: f64, [x_mm, y_mm]: [f64; 2], spread: f64, bad: [u32; ROWS], rng: &mut Rng) -> TactileImage {
-    let noise = if spread > 0.0 { Noise::OfReading(spread) } else { Noise::None };
-    let pressures = crate::common::plane(PITCH_MM, d_mm, x_mm, y_mm).pressures();
-    Reading { steps: Steps::Sixteenths, noise, dead: 0 }.picture(&pressures, bad, rng).0
+    seen(&crate::common::plane(PITCH_MM, d_mm, x_mm, y_mm), spread, bad, rng).0
 }
 
 /// 0 up to `from`, 255 from `to` on.

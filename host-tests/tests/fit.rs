@@ -291,7 +291,7 @@ fn cut_off(d_mm: f64) -> Scene {
 }
 
 fn image(scene: &Scene) -> TactileImage {
-    still(scene, [0; ROWS]).0
+    still(scene, NONE).0
 }
 
 #[test]
@@ -387,8 +387,7 @@ fn a_fit_without_confidence_never_says_less_than_the_taxels() {
     for case in 0..600 {
         let mut scene = [Scene::edge, Scene::two, Scene::bent][case % 3](&mut rng);
         scene.pitch_mm = 1.5;
-        let reading = Reading { steps: Steps::Sixteenths, noise: Noise::OfReading(0.1), dead: 0 };
-        let picture = reading.picture(&scene.pressures(), [0; ROWS], &mut rng).0;
+        let (picture, _) = seen(&scene, 0.1, NONE, &mut rng);
         let sums = from_sums(&picture, &config);
         let mut fit = Fit::new(FitLevel::AllRows);
         for _ in 0..40 {

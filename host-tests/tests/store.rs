@@ -118,19 +118,14 @@ fn something_happens_before_each_word_of_a_save() {
 
 #[test]
 fn a_changed_layout_is_no_fault_and_every_known_value_is_taken() {
-    for other in OTHERS {
+    let new = Remark::New(LACKED);
+    let unknown = |name: &str, value| Remark::Unknown { number: number(name), value };
+    let remarks = [vec![], vec![unknown("one_more", -5)], vec![new], vec![unknown("another_name", 777), new]];
+    for (other, expected_remarks) in OTHERS.into_iter().zip(remarks) {
         let (bytes, expected) = other.record(3, 9);
         let (loaded, remarks) = start_in(Sector::B, &bytes);
         assert_eq!(loaded, Loaded { record: expected, sound: true }, "{other:?}");
-        let expected = match other {
-            Other::None => vec![],
-            Other::More => vec![Remark::Unknown { number: number("one_more"), value: -5 }],
-            Other::Fewer => vec![Remark::New(LACKED)],
-            Other::Renamed => {
-                vec![Remark::Unknown { number: number("another_name"), value: 777 }, Remark::New(LACKED)]
-            }
-        };
-        assert_eq!(remarks, expected, "{other:?}");
+        assert_eq!(remarks, expected_remarks, "{other:?}");
     }
 }
 

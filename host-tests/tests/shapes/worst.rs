@@ -22,9 +22,10 @@ fn config<const ROWS: usize, const COLUMNS: usize>(params: &Params) -> Shaped<RO
     Shaped::new(params, &CLOCKS).expect("parameters within their ranges")
 }
 
-/// Calls a check for each shape, rows x columns.
+/// Calls a check for each shape, rows x columns, with these arguments.
 macro_rules! shapes {
-    ($check:ident: $($rows:literal x $columns:literal),+) => { $($check::<$rows, $columns>();)+ };
+    ($check:ident: $($shapes:tt)+) => { shapes!($check(): $($shapes)+) };
+    ($check:ident $given:tt: $($rows:literal x $columns:literal),+) => {{ $($check::<$rows, $columns>$given;)+ }};
 }
 
 /// Parameters at the limits that matter for the sums and the fit, with the largest sag that the shape allows.
@@ -257,12 +258,9 @@ fn takes_anything<const ROWS: usize, const COLUMNS: usize>(cases: u32) {
 
 #[test]
 fn any_frame_and_any_sense_is_taken() {
-    takes_anything::<3, 3>(200);
-    takes_anything::<3, 5>(200);
-    takes_anything::<4, 4>(200);
-    takes_anything::<8, 8>(60);
-    takes_anything::<16, 16>(30);
-    takes_anything::<16, 32>(30);
+    shapes!(takes_anything(200): 3 x 3, 3 x 5, 4 x 4);
+    shapes!(takes_anything(60): 8 x 8);
+    shapes!(takes_anything(30): 16 x 16, 16 x 32);
 }
 
 // The sums over a row's slopes stay within 32 bits, also where the indentation follows the force away from the guess.
@@ -325,15 +323,10 @@ fn stays_within<const ROWS: usize, const COLUMNS: usize>(poses: u32) {
 sim::sizes!(a_rows_sums_fit_wherever_the_contact_is_and_however_deep, sums_fit(10_000), sums_fit(200_000));
 
 fn sums_fit(poses: u32) {
-    stays_within::<3, 3>(poses);
-    stays_within::<10, 10>(2 * poses);
     // The most columns that lose none, one and two bits, and the least that lose one and two.
-    stays_within::<3, 14>(poses);
-    stays_within::<3, 15>(poses);
-    stays_within::<3, 28>(poses);
-    stays_within::<3, 29>(poses);
-    stays_within::<3, 32>(poses);
-    stays_within::<16, 16>(poses / 2);
+    shapes!(stays_within(poses): 3 x 3, 3 x 14, 3 x 15, 3 x 28, 3 x 29, 3 x 32);
+    shapes!(stays_within(2 * poses): 10 x 10);
+    shapes!(stays_within(poses / 2): 16 x 16);
 }
 
 /// The finest array under the largest tip, a row just within the rim: all its taxels are as steep as may be.

@@ -4,6 +4,11 @@ use super::*;
 
 const ONE: f64 = (1_u64 << 32) as f64;
 
+/// Calls a check for each shape, rows x columns.
+macro_rules! shapes {
+    ($check:ident: $($rows:literal x $columns:literal),+) => { $($check::<$rows, $columns>();)+ };
+}
+
 #[test]
 fn the_boost_takes_the_sag_out() {
     let (mut ends, mut usual) = (0.0_f64, 0.0_f64);
@@ -116,17 +121,7 @@ fn a_pass_is_what_its_parts_say() {
         is_what_its_parts_say::<ROWS, COLUMNS>(&mut mix, true);
         (0..100).for_each(|_| is_what_its_parts_say::<ROWS, COLUMNS>(&mut mix, false));
     }
-    often::<3, 3>();
-    often::<3, 5>();
-    often::<4, 4>();
-    often::<8, 8>();
-    often::<10, 10>();
-    often::<16, 16>();
-    often::<16, 17>();
-    often::<3, 32>();
-    often::<16, 3>();
-    often::<16, 31>();
-    often::<16, 32>();
+    shapes!(often: 3 x 3, 3 x 5, 4 x 4, 8 x 8, 10 x 10, 16 x 16, 16 x 17, 3 x 32, 16 x 3, 16 x 31, 16 x 32);
     assert_eq!([(10, 10), (16, 16), (16, 32)].map(|(rows, columns)| sum_drop(rows, columns)), [0, 1, 2]);
 }
 
@@ -162,11 +157,7 @@ fn a_pass_with_a_curve_is_its_formula() {
             assert_eq!([total.first, total.second, total.running], [first, second, running]);
         }
     }
-    curved::<3, 3>();
-    curved::<3, 5>();
-    curved::<4, 4>();
-    curved::<10, 10>();
-    curved::<16, 32>();
+    shapes!(curved: 3 x 3, 3 x 5, 4 x 4, 10 x 10, 16 x 32);
 }
 
 #[test]
@@ -181,10 +172,7 @@ fn a_half_of_the_array_at_the_top_fits() {
         let moment = (total.first >> 2).wrapping_mul(ROWS as i32 + 1).wrapping_sub(total.running.wrapping_mul(2));
         assert!(i64::from(moment).abs_diff(exact) < 4 * ROWS as u64 * ROWS as u64, "{moment}, not {exact}");
     }
-    upper::<10, 10>();
-    upper::<16, 16>();
-    upper::<16, 32>();
-    upper::<15, 31>();
+    shapes!(upper: 10 x 10, 16 x 16, 16 x 32, 15 x 31);
 }
 
 /// In codes.

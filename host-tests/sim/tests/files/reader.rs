@@ -62,43 +62,29 @@ fn answers(text: &str) {
     }
 }
 
-#[test]
-fn any_tokens_are_answered() {
-    let mut rng = Rng::with_seed(1);
-    for _ in 0..20_000 {
-        let text: String = (0..rng.usize(0..30)).map(|_| TOKENS[rng.usize(0..TOKENS.len())]).collect();
-        answers(&text);
-    }
+/// Up to this number of tokens.
+fn tokens(rng: &mut Rng, most: usize) -> String {
+    (0..rng.usize(0..most)).map(|_| TOKENS[rng.usize(0..TOKENS.len())]).collect()
 }
 
 #[test]
-fn any_change_to_a_scene_is_answered() {
-    let mut rng = Rng::with_seed(2);
-    let scenes = library();
+fn any_tokens_any_change_to_a_scene_and_any_setting_are_answered() {
+    let (mut rng, scenes) = (Rng::with_seed(1), library());
+    (0..20_000).for_each(|_| answers(&tokens(&mut rng, 30)));
     for _ in 0..10_000 {
         let mut text: Vec<char> = scenes[rng.usize(0..scenes.len())].1.chars().collect();
         for _ in 0..rng.usize(1..4) {
             let at = rng.usize(0..text.len());
             match rng.u8(0..3) {
                 0 => drop(text.drain(at..(at + rng.usize(1..10)).min(text.len()))),
-                1 => {
-                    let token = TOKENS[rng.usize(0..TOKENS.len())].chars();
-                    text.splice(at..at, token).for_each(drop);
-                }
+                1 => text.splice(at..at, TOKENS[rng.usize(0..TOKENS.len())].chars()).for_each(drop),
                 _ => text[at] = char::from(rng.u8(0..128)),
             }
         }
         answers(&text.into_iter().collect::<String>());
     }
-}
-
-#[test]
-fn any_setting_is_answered() {
-    let mut rng = Rng::with_seed(3);
-    let scenes = library();
     for _ in 0..5_000 {
-        let mut some = |most| (0..rng.usize(0..most)).map(|_| TOKENS[rng.usize(0..TOKENS.len())]).collect::<String>();
-        let (place, value) = (some(5), some(3));
+        let (place, value) = (tokens(&mut rng, 5), tokens(&mut rng, 3));
         if let Ok(changed) = scene::set(&scenes[0].1, &place, &value) {
             answers(&changed);
         }

@@ -231,35 +231,34 @@ fn a_report_lies_over_another_whatever_the_scenes_are_called() {
     }
 }
 
-fn record(name: &str) -> PathBuf {
-    let path = folder(&format!("recorded/{name}")).join("wall.mcap");
-    let mut scene = wall();
-    scene.duration_s = 0.05;
-    let mut recorder = Recorder::new(&path, &scene, 10).unwrap();
-    let outcome = run(&scene, &native::board, &mut [&mut recorder]).unwrap();
+/// Records a run, every so many frames as messages; its file, trace and outcome.
+fn recorded(name: &str, scene: &Scene, every: u64) -> (PathBuf, (Trace, Outcome)) {
+    let path = folder(&format!("recorded/{name}")).join("run.mcap");
+    let mut recorder = Recorder::new(&path, scene, every).unwrap();
+    let mut trace = Trace::new(scene.duration_s);
+    let outcome = run(scene, &native::board, &mut [&mut recorder, &mut trace]).unwrap();
     recorder.finish(&outcome.summary.digest).unwrap();
-    path
+    (path, (trace, outcome))
+}
+
+fn record(name: &str) -> PathBuf {
+    recorded(name, &Scene { duration_s: 0.05, ..wall() }, 10).0
 }
 
 #[test]
 fn two_fingers_are_measured_recorded_and_drawn_each() {
     let scene = scene(&WALL.replace("wall", "grasp"), &[], None);
-    let path = folder("recorded/grasp").join("grasp.mcap");
-    let mut recorder = Recorder::new(&path, &scene, 1).unwrap();
-    let mut trace = Trace::new(scene.duration_s);
-    let outcome = run(&scene, &native::board, &mut [&mut recorder, &mut trace]).unwrap();
-    recorder.finish(&outcome.summary.digest).unwrap();
+    let (path, ran) = recorded("grasp", &scene, 1);
     let replayed = replay(&path).unwrap();
     assert_eq!(replayed.difference, None);
     assert!((6_000..6_400).contains(&replayed.steps), "{}", replayed.steps);
 
-    let value = |name: &str| outcome.measured.get(name).unwrap_or_else(|| panic!("no {name}"));
+    let value = |name: &str| ran.1.measured.get(name).unwrap_or_else(|| panic!("no {name}"));
     let [one, other] = ["finger0.peak_force_n", "finger1.peak_force_n"].map(value);
     assert_eq!(value("peak_force_n"), one.max(other));
     assert!(one > 0.9 && other > 0.9, "{one} {other}");
     assert_eq!(value("energy_j"), value("finger0.energy_j") + value("finger1.energy_j"));
 
-    let ran = (trace, outcome);
     let page = written(&scene, &ran, &[], None);
     assert!(page.contains("Finger 0") && page.contains("Finger 1") && page.contains(">finger 1</th>"));
 

@@ -6,7 +6,6 @@ use fingertip::shipped::{self, Frame};
 use sim::mechanics::decay;
 use sim::mechanics::pressures::Cell;
 use sim::mechanics::rotor::{Unreachable, profile};
-use sim::native::bench::Bench;
 use sim::plant::{Plant, Row, Setup, Taxel};
 
 /// The step that the tests vouch for.

@@ -3,7 +3,7 @@
 use crate::console::{self, Console};
 use crate::host::{self, Program};
 use crate::image::{self, Image};
-use crate::toolchain::{self, Choice, TARGET};
+use crate::toolchain::{self, TARGET};
 use crate::{docs, install};
 use anyhow::{Context, Result, ensure};
 use std::fs;
@@ -45,30 +45,29 @@ fn emulator(target: &str, board: &str) -> String {
 }
 
 /// Runs the loop on every core and writes the table.
-pub fn run_all(choice: Choice, console: &mut Console) -> Result<()> {
-    let page = page(choice, console)?;
+pub fn run_all(console: &mut Console) -> Result<()> {
+    let page = page(console)?;
     console.print(&table(&page));
     docs::renew(PAGE.0, &page, false, &mut Vec::new(), console)
 }
 
 /// Runs the image of every core and compares its digest with this machine's. Returns the page with the table.
-pub fn page(choice: Choice, console: &mut Console) -> Result<String> {
+pub fn page(console: &mut Console) -> Result<String> {
     ensure_m4(console)?;
     if host::find_program(RISCV_PROGRAM).is_none() {
         // Of the same version as the emulator for Arm: both share files.
         install::newest(&["qemu-system-riscv"], "running the loop on emulated cores", console)?;
     }
     let targets = CORES.map(|(_, _, target, ..)| target);
-    let toolchain =
-        toolchain::ensure_for(choice, &targets, "the loop is built for other cores than the board's", console)?;
+    toolchain::ensure_for(&targets, "the loop is built for other cores than the board's", console)?;
     let folder = host::made("cores")?;
     let mut list = String::new();
     for (number, (name, array, target, flags, board)) in CORES.iter().enumerate() {
-        let mut command = image::apart(toolchain, "build", LOOP, target, flags);
+        let mut command = image::apart("build", LOOP, target, flags);
         console.build(command.arg("--release"), &format!("the loop for {target}"))?;
         // Two boards have the same target and name.
         let elf = folder.join(format!("{number}.elf"));
-        fs::copy(toolchain.images_for(target, flags).join("cores"), &elf).with_context(|| host::shown(&elf))?;
+        fs::copy(toolchain::images_for(target, flags).join("cores"), &elf).with_context(|| host::shown(&elf))?;
         let bytes = Image::read(&elf)?.bytes.len();
         let (flags, emulator) = (flags.join(" "), emulator(target, board));
         list += &format!("{name}\t{array}\t{target}\t{flags}\t{bytes}\t{emulator}\t{}\n", elf.display());
@@ -79,13 +78,13 @@ pub fn page(choice: Choice, console: &mut Console) -> Result<String> {
 }
 
 /// Builds the example for another board, which links for its chip.
-pub fn example(choice: Choice, console: &mut Console) -> Result<()> {
+pub fn example(console: &mut Console) -> Result<()> {
     let target = TARGET_OF_EXAMPLE;
-    let toolchain = toolchain::ensure_for(choice, &[target], "the example for another board is built for it", console)?;
+    toolchain::ensure_for(&[target], "the example for another board is built for it", console)?;
     let mut size = |features: &[&str]| {
-        let mut command = image::apart(toolchain, "build", EXAMPLE, target, &[]);
+        let mut command = image::apart("build", EXAMPLE, target, &[]);
         console.build(command.arg("--release").args(features), EXAMPLE)?;
-        Ok::<_, anyhow::Error>(Image::read(&toolchain.images_for(target, &[]).join("rp2040"))?.bytes.len())
+        Ok::<_, anyhow::Error>(Image::read(&toolchain::images_for(target, &[]).join("rp2040"))?.bytes.len())
     };
     let measures = size(&["--features", "fingertip/measure"])?;
     let bytes = size(&[])?;
@@ -115,14 +114,14 @@ pub struct QemuArgs {
 }
 
 /// Runs recorded stimulus, and random inputs of functions with own instructions, there and here, and compares.
-pub fn run_m4(args: &QemuArgs, choice: Choice, console: &mut Console) -> Result<()> {
-    let image = prepare(choice, console)?;
+pub fn run_m4(args: &QemuArgs, console: &mut Console) -> Result<()> {
+    let image = prepare(console)?;
     let mut replay = Program::tool("qemu-host").build(console)?;
     console.run(replay.arg(&image).arg(host::target().join("stimulus")).args(&args.inject))
 }
 
-pub fn test_m4(choice: Choice, console: &mut Console) -> Result<()> {
-    let image = prepare(choice, console)?;
+pub fn test_m4(console: &mut Console) -> Result<()> {
+    let image = prepare(console)?;
     host::test(host::tests(&["--test", "qemu", "--", "--ignored"]).env("FINGERTIP_QEMU_IMAGE", image), console)
 }
 
@@ -134,8 +133,8 @@ pub fn ensure_m4(console: &mut Console) -> Result<()> {
     }
 }
 
-fn prepare(choice: Choice, console: &mut Console) -> Result<PathBuf> {
+fn prepare(console: &mut Console) -> Result<PathBuf> {
     ensure_m4(console)?;
-    let toolchain = toolchain::ensure(choice, console)?;
-    image::build(toolchain, "qemu", "qemu", console)
+    toolchain::ensure(console)?;
+    image::build("qemu", "qemu", console)
 }

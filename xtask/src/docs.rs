@@ -3,7 +3,6 @@
 use crate::console::{self, Console};
 use crate::host::{self, Program};
 use crate::install::{self, Environment};
-use crate::toolchain::Choice;
 use crate::{cores, image};
 use anyhow::{Context, Result, bail};
 use std::fs;
@@ -31,14 +30,14 @@ pub struct Args {
 }
 
 /// Writes or checks the generated files; the figures come from a run of the demonstration.
-pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
+pub fn run(args: &Args, console: &mut Console) -> Result<()> {
     let mut stale = Vec::new();
     for (path, example) in GENERATED.split(' ').map(|path| (path, "generated")).chain([SCENES]) {
         renew(path, &print(example, Some(Path::new(path)), console)?, args.check, &mut stale, console)?;
     }
     let mut budget = Program::sim("budget").build(console)?;
     renew(BUDGET.0, &console::output(budget.args(["--fingers", BUDGET.1]))?, args.check, &mut stale, console)?;
-    renew(cores::PAGE.0, &cores::page(choice, console)?, args.check, &mut stale, console)?;
+    renew(cores::PAGE.0, &cores::page(console)?, args.check, &mut stale, console)?;
     let drawn = host::target().join("docs").join("figures");
     let mut figures = Program::tool("figures").build(console)?;
     console.run(figures.arg(&drawn))?;
@@ -55,7 +54,7 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
         (root.join(FIGURES), root.join(PICTURES))
     };
     fs::create_dir_all(&pictures).with_context(|| format!("cannot make {}", host::shown(&pictures)))?;
-    let image = image::firmware(choice, console)?;
+    let image = image::firmware(console)?;
     // Like the programs before it: the one of `cargo xtask demo` would compile the emulator again, with fewer features.
     let mut command = host::SCENE_BOARD.build(console)?;
     command.args(["demo", "--image"]).arg(&image.elf).arg("--json").arg(&json).arg("--out").arg(&pictures);

@@ -5,7 +5,7 @@ use crate::console::Console;
 use crate::host::{self, Program};
 use crate::image::{self, Image};
 use crate::option_bytes::{self, PAUSE_MS, Probe};
-use crate::toolchain::{self, Choice, Toolchain};
+use crate::toolchain;
 use crate::{sim, timing};
 use anyhow::{Context, Result, bail, ensure};
 use clap::ValueEnum;
@@ -28,9 +28,9 @@ pub struct Args {
 }
 
 /// Builds the flash image, prints its SHA-256, sees to the option bytes, writes and verifies it, and starts it.
-pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
+pub fn run(args: &Args, console: &mut Console) -> Result<()> {
     need_probe_rs()?;
-    let image = image::firmware(choice, console)?;
+    let image = image::firmware(console)?;
     console.print(&image.summary());
     put(&image, args.probe.as_deref(), console)?;
     console.say("The board runs the image.");
@@ -234,16 +234,16 @@ enum Board {
 }
 
 /// Builds the image, runs it and judges what it reports. This process ends as the judge does.
-pub fn bringup(args: &BringupArgs, choice: Choice, console: &mut Console) -> Result<()> {
+pub fn bringup(args: &BringupArgs, console: &mut Console) -> Result<()> {
     // First, as it takes no time: without a board there is no wait for a build.
     let port = (args.board == Board::Nucleo).then(|| args.port.clone().map_or_else(find_port, Ok)).transpose()?;
     if port.is_some() && !args.flashed {
         need_probe_rs()?;
     }
-    let toolchain = toolchain::ensure(choice, console)?;
-    let image = image::checking(toolchain, BRINGUP, console)?;
+    toolchain::ensure(console)?;
+    let image = image::checking(BRINGUP, console)?;
     console.say(&image.summary());
-    let estimates = if args.without_estimates { None } else { Some(estimates(toolchain, console)?) };
+    let estimates = if args.without_estimates { None } else { Some(estimates(console)?) };
     let mut command = match port {
         None => {
             let mut command = host::SCENE_BOARD.build(console)?;
@@ -267,12 +267,12 @@ pub fn bringup(args: &BringupArgs, choice: Choice, console: &mut Console) -> Res
 }
 
 /// The kernels' estimated cycles, with the flash's wait states, for the image's inputs: a file with a line each.
-fn estimates(toolchain: Toolchain, console: &mut Console) -> Result<PathBuf> {
+fn estimates(console: &mut Console) -> Result<PathBuf> {
     let folder = host::made("study")?;
     let [kept, full, file] = ["kept.bin", "few.bin", "few.txt"].map(|name| folder.join(name));
     let mut inputs = Program::tool("study").build(console)?;
     console.run(inputs.arg("few").arg(&kept).arg(&full))?;
-    let study = image::build(toolchain, "study", "study", console)?;
+    let study = image::build("study", "study", console)?;
     let (_, regions) = timing::measure(&study, Some(&full), console)?;
     let call = regions.first().map_or(0, |region| region.flash.median);
     let mut text = String::new();

@@ -2,7 +2,7 @@
 
 use crate::console::Console;
 use crate::host;
-use crate::toolchain::{self, Choice, Toolchain};
+use crate::toolchain;
 use anyhow::{Context, Result, bail};
 use object::elf::{FileHeader32, PT_LOAD, SHF_ALLOC};
 use object::read::elf::{ElfFile, ProgramHeader};
@@ -89,47 +89,47 @@ fn lay_out(segments: &[(u32, &[u8])]) -> Result<(u32, Vec<u8>)> {
     Ok((base, bytes))
 }
 
-pub fn firmware(choice: Choice, console: &mut Console) -> Result<Image> {
-    let toolchain = toolchain::ensure(choice, console)?;
-    let mut command = toolchain.cargo("build");
+pub fn firmware(console: &mut Console) -> Result<Image> {
+    toolchain::ensure(console)?;
+    let mut command = toolchain::cargo("build");
     command.args(["--package", "fingertip", "--bin", "firmware", "--features", "firmware"]);
-    with_bytes(&mut command, toolchain, "firmware", console)
+    with_bytes(&mut command, "firmware", console)
 }
 
 /// Builds an image that checks a board.
-pub fn checking(toolchain: Toolchain, name: &str, console: &mut Console) -> Result<Image> {
-    let mut command = toolchain.cargo("build");
+pub fn checking(name: &str, console: &mut Console) -> Result<Image> {
+    let mut command = toolchain::cargo("build");
     command.args(["--package", name, "--bin", name, "--no-default-features", "--features", "image"]);
-    with_bytes(&mut command, toolchain, name, console)
+    with_bytes(&mut command, name, console)
 }
 
 /// Builds an image, with the flashable bytes beside it.
-fn with_bytes(command: &mut Command, toolchain: Toolchain, name: &str, console: &mut Console) -> Result<Image> {
-    let image = Image::read(&built(command.arg("--release"), toolchain, name, console)?)?;
+fn with_bytes(command: &mut Command, name: &str, console: &mut Console) -> Result<Image> {
+    let image = Image::read(&built(command.arg("--release"), name, console)?)?;
     host::write(&image.bin, &image.bytes)?;
     Ok(image)
 }
 
 /// Builds an image for the emulated core and returns where it lies.
-pub fn build(toolchain: Toolchain, name: &str, feature: &str, console: &mut Console) -> Result<PathBuf> {
-    built(emulated(toolchain, name, feature).arg("--release"), toolchain, name, console)
+pub fn build(name: &str, feature: &str, console: &mut Console) -> Result<PathBuf> {
+    built(emulated(name, feature).arg("--release"), name, console)
 }
 
-fn built(command: &mut Command, toolchain: Toolchain, name: &str, console: &mut Console) -> Result<PathBuf> {
+fn built(command: &mut Command, name: &str, console: &mut Console) -> Result<PathBuf> {
     console.build(command, &format!("the image {name}"))?;
-    Ok(toolchain.images().join(name))
+    Ok(toolchain::images().join(name))
 }
 
 /// `cargo build` of an image for the emulated core.
-pub fn emulated(toolchain: Toolchain, name: &str, feature: &str) -> Command {
-    let mut command = toolchain.cargo("build");
+pub fn emulated(name: &str, feature: &str) -> Command {
+    let mut command = toolchain::cargo("build");
     command.args(["--package", "images", "--bin", name, "--features", feature]);
     command
 }
 
 /// `cargo <subcommand>` of a program that is a workspace of its own in this folder, for a target with flags.
-pub fn apart(toolchain: Toolchain, subcommand: &str, folder: &str, target: &str, flags: &[&str]) -> Command {
-    let mut command = toolchain.cargo_for(subcommand, target, flags);
+pub fn apart(subcommand: &str, folder: &str, target: &str, flags: &[&str]) -> Command {
+    let mut command = toolchain::cargo_for(subcommand, target, flags);
     command.args(["--manifest-path", &format!("{folder}/Cargo.toml"), "--locked"]);
     command
 }
@@ -200,9 +200,9 @@ const NAME: &str = "panic-free";
 const UNDEFINED: &str = "fingertip_step_can_panic";
 
 /// Builds the proof and its two controls.
-pub fn prove_panic_free(choice: Choice, console: &mut Console) -> Result<()> {
-    let toolchain = toolchain::ensure(choice, console)?;
-    let linked = build(toolchain, NAME, "proof", console);
+pub fn prove_panic_free(console: &mut Console) -> Result<()> {
+    toolchain::ensure(console)?;
+    let linked = build(NAME, "proof", console);
     let elf = linked
         .with_context(|| format!("the proof does not link; if {UNDEFINED} is missing above, the step can panic"))?;
     console.print("The control step links without a panic handler: no panic is reachable.");
@@ -212,11 +212,11 @@ pub fn prove_panic_free(choice: Choice, console: &mut Console) -> Result<()> {
     }
     console.print("It calls no floating-point routine.");
     // Shows that the proof can fail.
-    let output = console.run_to_failure(emulated(toolchain, NAME, "proof-control-panic").arg("--release"))?;
+    let output = console.run_to_failure(emulated(NAME, "proof-control-panic").arg("--release"))?;
     if !output.contains(UNDEFINED) {
         bail!("the control that panics fails for another reason:\n{output}");
     }
-    let elf = build(toolchain, NAME, "proof-control-float", console)?;
+    let elf = build(NAME, "proof-control-float", console)?;
     if float_calls(&elf)?.is_empty() {
         bail!("the control that computes in f64 shows no floating-point routine in {}", host::shown(&elf));
     }

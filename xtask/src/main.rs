@@ -18,7 +18,6 @@ use clap::{Parser, Subcommand};
 use console::Console;
 use std::io::Write as _;
 use std::process::ExitCode;
-use toolchain::Choice;
 
 /// The fingertip's commands: watch it, test it, build it, flash it.
 ///
@@ -27,8 +26,6 @@ use toolchain::Choice;
 #[command(name = "cargo xtask", bin_name = "cargo xtask", version, arg_required_else_help = true)]
 struct Cli {
     /// Source of the firmware's compiler: rustup's target, Debian's packages, or whichever works
-    #[arg(long, global = true, value_enum, default_value_t = Choice::Auto, env = "FINGERTIP_TOOLCHAIN")]
-    toolchain: Choice,
 
     #[command(subcommand)]
     command: Command,
@@ -119,28 +116,27 @@ fn main() -> ExitCode {
 
 fn run(cli: &Cli) -> anyhow::Result<()> {
     let console = &mut Console::default();
-    let toolchain = cli.toolchain;
     match &cli.command {
-        Command::Demo(args) => sim::demo(args, toolchain, console),
-        Command::Sim(args) => sim::on_board("sim", args, toolchain, console),
+        Command::Demo(args) => sim::demo(args, console),
+        Command::Sim(args) => sim::on_board("sim", args, console),
         Command::Sweep(args) => sim::native("sweep", args, console),
-        Command::Population(args) => sim::on_board("population", args, toolchain, console),
+        Command::Population(args) => sim::on_board("population", args, console),
         Command::Budget(args) => sim::native("budget", args, console),
         Command::Sensor(args) => install::sensor(args, console),
-        Command::Serve(args) => sim::serve(args, toolchain, console),
-        Command::Test(args) => test::run(args, toolchain),
-        Command::Build => image::firmware(toolchain, console).map(|image| console.print(&image.summary())),
-        Command::Flash(args) => flash::run(args, toolchain, console),
-        Command::Bringup(args) => flash::bringup(args, toolchain, console),
-        Command::Qemu(args) => cores::run_m4(args, toolchain, console),
-        Command::Cores => cores::run_all(toolchain, console),
-        Command::Timing(args) => timing::run(args, toolchain, console),
-        Command::Study(args) => timing::study(args, toolchain, console),
+        Command::Serve(args) => sim::serve(args, console),
+        Command::Test(args) => test::run(args),
+        Command::Build => image::firmware(console).map(|image| console.print(&image.summary())),
+        Command::Flash(args) => flash::run(args, console),
+        Command::Bringup(args) => flash::bringup(args, console),
+        Command::Qemu(args) => cores::run_m4(args, console),
+        Command::Cores => cores::run_all(console),
+        Command::Timing(args) => timing::run(args, console),
+        Command::Study(args) => timing::study(args, console),
         Command::Prove(args) => host::run_tool("prove", &args.arguments, console),
         Command::Fit(args) => host::run_tool("fit", &args.arguments, console),
-        Command::PanicFree => image::prove_panic_free(toolchain, console),
-        Command::Lint => test::lint(toolchain),
-        Command::Docs(args) => docs::run(args, toolchain, console),
+        Command::PanicFree => image::prove_panic_free(console),
+        Command::Lint => test::lint(),
+        Command::Docs(args) => docs::run(args, console),
         Command::Package => docs::package(console),
         Command::Cluster => cluster::run(console),
     }

@@ -2,9 +2,9 @@
 
 use crate::console::{self, Console, clear_line, cpu_s};
 use crate::image::Sizes;
-use crate::toolchain::{self, Choice, TARGET, Toolchain};
+use crate::toolchain;
 use crate::{cores, docs, flash, host, image, install, timing};
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, bail};
 use std::process::Command;
 use std::time::Instant;
 
@@ -20,10 +20,10 @@ pub struct Args {
 }
 
 /// Runs every test at its usual size, or larger sizes and what that leaves out.
-pub fn run(args: &Args, choice: Choice) -> Result<()> {
+pub fn run(args: &Args) -> Result<()> {
     let mut stages = Stages::default();
     if args.long {
-        return long(stages, choice);
+        return long(stages);
     }
     stages.stage("core and host tests", |console| host::test(&mut host::tests(&["--no-fail-fast"]), console));
     stages.stage("fit of a sensor to recordings", |console| {
@@ -31,7 +31,7 @@ pub fn run(args: &Args, choice: Choice) -> Result<()> {
         console.run(&mut command)
     });
     let image = stages.stage("flash image", |console| {
-        let image = image::firmware(choice, console)?;
+        let image = image::firmware(console)?;
         console.print(&image.summary());
         Ok(image)
     });
@@ -41,10 +41,10 @@ pub fn run(args: &Args, choice: Choice) -> Result<()> {
         console.print(&sizes.verdict());
         sizes.check()
     });
-    stages.stage("panic-free proof", |console| image::prove_panic_free(choice, console));
-    stages.stage("emulated Cortex-M4F against this machine", |console| cores::test_m4(choice, console));
-    stages.stage("example for another board", |console| cores::example(choice, console));
-    stages.stage("timing model against published measurements", |console| timing::check(choice, console));
+    stages.stage("panic-free proof", |console| image::prove_panic_free(console));
+    stages.stage("emulated Cortex-M4F against this machine", |console| cores::test_m4(console));
+    stages.stage("example for another board", |console| cores::example(console));
+    stages.stage("timing model against published measurements", |console| timing::check(console));
     stages.stage("virtual board", |console| {
         let python = install::bus_python(console)?;
         let mut command = host::tests(&["--test", "board"]);
@@ -64,15 +64,15 @@ pub fn run(args: &Args, choice: Choice) -> Result<()> {
 }
 
 /// Runs the larger sizes (tests whose names begin with `long_`), and checks the tables of proofs and fits.
-fn long(mut stages: Stages, choice: Choice) -> Result<()> {
+fn long(mut stages: Stages) -> Result<()> {
     stages.stage("long core and host tests", |console| {
         let python = install::bus_python(console)?;
         let mut command = host::tests(&["--no-fail-fast", "--", "--ignored", "long_"]);
         host::test(command.env("FINGERTIP_PYTHON", &python), console)
     });
     stages.stage("long tests on the virtual board", |console| {
-        let image = image::firmware(choice, console)?;
-        let checking = image::checking(toolchain::ensure(choice, console)?, flash::BRINGUP, console)?;
+        let image = image::firmware(console)?;
+        let checking = image::checking(flash::BRINGUP, console)?;
         let mut command = host::tests(&["--test", "board", "--", "--ignored", "long_"]);
         command.env("FINGERTIP_IMAGE", &image.elf).env("FINGERTIP_BRINGUP", &checking.elf);
         host::test(&mut command, console)
@@ -97,7 +97,7 @@ const IMAGES: &str = "--package=fingertip --package=images --package=bringup --b
 /// Programs of other boards, each a workspace of its own.
 const APART: [&str; 2] = [cores::EXAMPLE, cores::LOOP];
 
-pub fn lint(choice: Choice) -> Result<()> {
+pub fn lint() -> Result<()> {
     let mut stages = Stages::default();
     stages.stage("format", |console| {
         console.run(console::cargo("fmt").args(["--all", "--check"]))?;
@@ -115,15 +115,13 @@ pub fn lint(choice: Choice) -> Result<()> {
     stages
         .stage("lints, least features", |console| console.run(clippy(console::cargo("clippy").args(LEAST.split(' ')))));
     stages.stage("lints, microcontroller", |console| {
-        let toolchain = toolchain::ensure(choice, console)?;
-        ensure!(toolchain == Toolchain::Native, "Debian's Rust has no clippy for {TARGET}: rustup's target is needed");
+        toolchain::ensure(console)?;
         // In the profile of the images, whose proc macros are compiled already.
-        console.run(clippy(toolchain.cargo("clippy").arg("--release").args(IMAGES.split(' '))))?;
+        console.run(clippy(toolchain::cargo("clippy").arg("--release").args(IMAGES.split(' '))))?;
         let target = cores::TARGET_OF_EXAMPLE;
-        let toolchain =
-            toolchain::ensure_for(choice, &[target], "programs of other boards are checked for it", console)?;
+        toolchain::ensure_for(&[target], "programs of other boards are checked for it", console)?;
         for folder in APART {
-            console.run(clippy(image::apart(toolchain, "clippy", folder, target, &[]).arg("--release")))?;
+            console.run(clippy(image::apart("clippy", folder, target, &[]).arg("--release")))?;
         }
         Ok(())
     });

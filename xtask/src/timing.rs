@@ -2,7 +2,7 @@
 
 use crate::console::{self, Console};
 use crate::host::{self, Program};
-use crate::toolchain::{self, Choice, Toolchain};
+use crate::toolchain;
 use crate::{image, install};
 use anyhow::{Context, Result, bail};
 use m4_timing::meter::{Measured, json_lines, parse};
@@ -34,8 +34,8 @@ pub struct Args {
 }
 
 /// Measures an image, or checks the model.
-pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
-    let Some(image) = &args.image else { return check(choice, console) };
+pub fn run(args: &Args, console: &mut Console) -> Result<()> {
+    let Some(image) = &args.image else { return check(console) };
     let image = fs::canonicalize(image).with_context(|| host::shown(image))?;
     let (_, regions) = measure(&image, None, console)?;
     console.print(&table(&regions));
@@ -43,10 +43,10 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
 }
 
 /// Runs the tests that compare the model with published measurements.
-pub fn check(choice: Choice, console: &mut Console) -> Result<()> {
+pub fn check(console: &mut Console) -> Result<()> {
     ensure(console)?;
     let plugin = plugin(console)?;
-    let image = image::build(toolchain::ensure(choice, console)?, "timing-check", "timing", console)?;
+    let image = image::build("timing-check", "timing", console)?;
     let mut command = host::tests(&["--test", "silicon", "--", "--ignored", "--nocapture", "--test-threads=1"]);
     host::test(command.env("M4_TIMING_PLUGIN", plugin).env("M4_TIMING_IMAGE", image), console)
 }
@@ -149,16 +149,16 @@ pub struct StudyArgs {
 }
 
 /// Runs the study and renews or checks its page, its table in the README and its pictures.
-pub fn study(args: &StudyArgs, choice: Choice, console: &mut Console) -> Result<()> {
-    let toolchain = toolchain::ensure(choice, console)?;
+pub fn study(args: &StudyArgs, console: &mut Console) -> Result<()> {
+    toolchain::ensure(console)?;
     let folder = host::made("study")?;
     let inputs = folder.join("inputs.bin");
     let judge = Program::tool("study");
     let mut command = judge.build(console)?;
     console.run(command.arg("inputs").arg(&inputs))?;
-    let shipped = image::build(toolchain, STUDY, STUDY, console)?;
+    let shipped = image::build(STUDY, STUDY, console)?;
     let shipped = measured(&shipped, &inputs, &folder.join("shipped.txt"), console)?;
-    let quick = measured(&build_quick(toolchain, console)?, &inputs, &folder.join("quick.txt"), console)?;
+    let quick = measured(&build_quick(console)?, &inputs, &folder.join("quick.txt"), console)?;
     let mut fingers = Program::sim("budget").build(console)?;
     let held = console::output(fingers.args(["--whole-loop", "--fingers", FINGERS]))?;
     let whole_loop = folder.join("whole-loop.txt");
@@ -170,15 +170,15 @@ pub fn study(args: &StudyArgs, choice: Choice, console: &mut Console) -> Result<
 }
 
 /// The image as quick as the compiler makes it, without what keeps the firmware's small.
-fn build_quick(toolchain: Toolchain, console: &mut Console) -> Result<PathBuf> {
-    let mut command = image::emulated(toolchain, STUDY, STUDY);
+fn build_quick(console: &mut Console) -> Result<PathBuf> {
+    let mut command = image::emulated(STUDY, STUDY);
     command.args(["--profile", STUDY_PROFILE]);
     // Instead of the flags that `.cargo/config.toml` has for the target.
     let flags = ["-C", "opt-level=3"].map(String::from).into_iter().chain(toolchain::short_paths());
     // Flags may hold blanks: a separator that no path has.
     command.env("CARGO_ENCODED_RUSTFLAGS", flags.collect::<Vec<_>>().join("\u{1f}"));
     console.build(&mut command, "the study, as quick as can be")?;
-    Ok(toolchain.images().with_file_name(STUDY_PROFILE).join(STUDY))
+    Ok(toolchain::images().with_file_name(STUDY_PROFILE).join(STUDY))
 }
 
 /// Runs an image; what it said and what it cost, in a file.

@@ -90,14 +90,9 @@ fn section(page: &mut String, title: &str, wanted: impl Fn(&Register) -> bool) {
         };
         let default = register.default.map(|value| format!("({value})"));
         let range = [Some(range(register)), default].into_iter().flatten().collect::<Vec<_>>().join(" ");
-        *page += &format!(
-            "| {} | {} | {} | {} | {} | {meaning} |\n",
-            register.address,
-            register.name.to_lowercase(),
-            kind(register),
-            access(register.access),
-            range.trim(),
-        );
+        let (address, name, range) = (register.address, register.name.to_lowercase(), range.trim());
+        let (kind, access) = (kind(register), access(register.access));
+        *page += &format!("| {address} | {name} | {kind} | {access} | {range} | {meaning} |\n");
     }
 }
 

@@ -258,23 +258,17 @@ fn motion(page: &mut String, cases: usize, fit_level: FitLevel, progress: &(impl
         | speed | force 99 % | force max | over | centre max | flagged |\n| --- | --- | --- | --- | --- | --- |\n"
     );
     for um_per_frame in [0.3, 1.0, 3.0] {
-        let outcomes: Vec<_> = (0..cases)
-            .map(|number| {
-                progress("pressed in", number);
-                pressed(number, um_per_frame, fit_level)
-            })
-            .collect();
-        let values = |of: fn(&Outcome) -> f64| outcomes.iter().map(of);
-        let force = || values(|outcome| outcome.force);
-        let _ = writeln!(
-            page,
-            "| {} mm/s | {:.3} | {:.3} | {} | {:.3} | {} |",
-            10.0 * um_per_frame,
-            quantile(force(), 0.99),
-            quantile(force(), 1.0),
-            force().filter(|force| *force > 1.0).count(),
-            quantile(values(|outcome| outcome.centre), 1.0),
-            outcomes.iter().filter(|outcome| outcome.flagged).count(),
-        );
+        let outcome = |number| {
+            progress("pressed in", number);
+            pressed(number, um_per_frame, fit_level)
+        };
+        let outcomes: Vec<_> = (0..cases).map(outcome).collect();
+        let force = || outcomes.iter().map(|outcome| outcome.force);
+        let [most, max] = [0.99, 1.0].map(|share| quantile(force(), share));
+        let centre = quantile(outcomes.iter().map(|outcome| outcome.centre), 1.0);
+        let over = force().filter(|force| *force > 1.0).count();
+        let flagged = outcomes.iter().filter(|outcome| outcome.flagged).count();
+        let mm_per_s = 10.0 * um_per_frame;
+        let _ = writeln!(page, "| {mm_per_s} mm/s | {most:.3} | {max:.3} | {over} | {centre:.3} | {flagged} |");
     }
 }

@@ -381,14 +381,10 @@ pub fn table(checks: &[Check], forces: &Forces) -> String {
     }
     let _ = writeln!(text);
     for step in &forces.steps {
-        let _ = writeln!(
-            text,
-            "{:.1} to {:.1} N: the motor at its limits needs {:.1} ms; the loop took {} times as long",
-            step.from_n,
-            step.to_n,
-            step.time_optimal_ms,
-            step.settling_to_optimal_ratio.map_or_else(|| "for ever, not".to_owned(), |ratio| format!("{ratio:.2}")),
-        );
+        let StepFigures { from_n, to_n, time_optimal_ms, settling_to_optimal_ratio, .. } = step;
+        let times = settling_to_optimal_ratio.map_or("for ever, not".into(), |ratio| format!("{ratio:.2}"));
+        let needs = format!("the motor at its limits needs {time_optimal_ms:.1} ms");
+        let _ = writeln!(text, "{from_n:.1} to {to_n:.1} N: {needs}; the loop took {times} times as long");
     }
     text
 }

@@ -9,16 +9,10 @@ use std::fmt::Write as _;
 
 /// Describes the effects of a scene, with the equations and the state of each.
 pub fn scene(scene: &Scene) -> String {
-    let mut text = format!("{}: {}\n", scene.name, scene.about);
-    let _ = writeln!(
-        text,
-        "{} s, {} goals, {} events, {} bounds, seed {}",
-        scene.duration_s,
-        scene.script.len(),
-        scene.events.len(),
-        scene.bounds.len(),
-        scene.seed
-    );
+    let Scene { name, about, duration_s, seed, .. } = scene;
+    let [goals, events, bounds] = [scene.script.len(), scene.events.len(), scene.bounds.len()];
+    let mut text = format!("{name}: {about}\n");
+    let _ = writeln!(text, "{duration_s} s, {goals} goals, {events} events, {bounds} bounds, seed {seed}");
     if scene.effects.is_empty() {
         text += "\nIt names no effect: a motor without friction presses an ideal tip on a rigid plane, read without error.\n";
     }

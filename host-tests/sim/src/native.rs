@@ -24,7 +24,7 @@ use fingertip::config::{ConfigError, newtons};
 use fingertip::contact::FitLevel;
 use fingertip::frame::Sense;
 use fingertip::pipeline::Status;
-use fingertip::shipped::{COLUMNS, Calibration, Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
+use fingertip::shipped::{COLUMNS, Calibration, Config, Frame, Gains, Pipeline, ROWS, SLOTS, TARE_FRAMES};
 use fingertip::units::{Celsius, Duty};
 use std::time::Instant;
 use twox_hash::xxhash3_128::Hasher;
@@ -50,11 +50,7 @@ pub fn simulate(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, SimErro
 }
 
 /// Runs a scene as [`simulate`], with gains of the taxels of the first finger, Q14.
-pub fn simulate_calibrated(
-    scene: &Scene,
-    gains: &fingertip::shipped::Gains,
-    watch: &mut dyn Watch,
-) -> Result<Summary, SimError> {
+pub fn simulate_calibrated(scene: &Scene, gains: &Gains, watch: &mut dyn Watch) -> Result<Summary, SimError> {
     let mut board = Board::new(scene)?;
     board.units[0].pipeline.calibrate(&Calibration::of(gains));
     board.calibration = Some(*gains.rows());

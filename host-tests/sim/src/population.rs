@@ -200,19 +200,14 @@ pub fn write_worst(
     let mut paths = Vec::new();
     for ran in report.worst().into_iter().take(count) {
         let scene = population.finger(report.seed, ran.finger - 1)?.scene;
-        let head = format!(
-            "# Drawn from the population `{}`, seed {}; of {}.\n# {}\n",
-            population.name,
-            report.seed,
-            report.of_fingers,
-            judged(ran)
-        );
+        let (name, seed, of) = (&population.name, report.seed, report.of_fingers);
+        let head = format!("# Drawn from the population `{name}`, seed {seed}; of {of}.\n# {}\n", judged(ran));
         let mut text = set(&scene.text, "seed", &scene.seed.to_string())?;
         // Removed draws leave empty lines.
         while text.contains("\n\n\n") {
             text = text.replace("\n\n\n", "\n\n");
         }
-        let path = out.join(format!("{}-{}-{}.toml", population.name, report.seed, ran.finger));
+        let path = out.join(format!("{name}-{seed}-{}.toml", ran.finger));
         write(&path, head + text.trim_start())?;
         paths.push(path);
     }

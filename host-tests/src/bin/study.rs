@@ -103,13 +103,10 @@ fn verdicts(studied: &[Studied]) {
         let firmware = points.iter().zip(beaten).filter(|(point, _)| point.firmware);
         for (point, by) in firmware {
             let place = by.map_or("front".into(), |by| format!("beaten by {}", points[by].name));
-            println!(
-                "{:<14} {:>6} cycles, error {:>8}: {place}; front of {count}, {} times in error, {cycles:.1} times in cycles",
-                kernel.name,
-                point.cycles(),
-                page::figure(point.error_max),
-                page::figure(errors),
-            );
+            let (name, own, [error, ratio]) =
+                (kernel.name, point.cycles(), [point.error_max, errors].map(page::figure));
+            let front = format!("front of {count}, {ratio} times in error, {cycles:.1} times in cycles");
+            println!("{name:<14} {own:>6} cycles, error {error:>8}: {place}; {front}");
         }
     }
 }

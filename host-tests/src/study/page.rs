@@ -56,13 +56,8 @@ fn section(page: &mut String, kernel: &Kernel, points: &[Point]) {
 
 /// A table without errors.
 fn costs(page: &mut String, kernel: &Kernel, points: &[Point]) {
-    let _ = write!(
-        page,
-        "\n## {}\n\n{}\n\n| part | {} |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
-        kernel.title,
-        kernel.text,
-        Cost::HEADS
-    );
+    let (Kernel { title, text, .. }, heads) = (kernel, Cost::HEADS);
+    let _ = write!(page, "\n## {title}\n\n{text}\n\n| part | {heads} |\n|{}\n", " --- |".repeat(9));
     for Point { name, cost, .. } in points.iter().rev() {
         let _ = writeln!(page, "| {name} | {} |", cost.cells());
     }

@@ -79,15 +79,11 @@ pub fn markdown() -> String {
         let (settle_ns, sample_cycles, frames) = row.setting;
         // Crosstalk of a full range, and noise.
         let error_codes = Array::CODES * (row.row + row.column) + row.noise_codes;
+        let noise_mn = row.noise_codes * MN_PER_CODE * (TAXELS as f64).sqrt();
+        let (settle_us, [error, noise]) = (f64::from(settle_ns) * 1e-3, [error_codes, noise_mn].map(figure));
         let bold = if row.setting == DEFAULT { "**" } else { "" };
-        let _ = writeln!(
-            page,
-            "| {bold}{}{bold} | {bold}{sample_cycles}{bold} | {frames} | {:.0} | {} | {} |",
-            f64::from(settle_ns) * 1e-3,
-            row.rate_hz,
-            figure(error_codes),
-            figure(row.noise_codes * MN_PER_CODE * (TAXELS as f64).sqrt()),
-        );
+        let setting = format!("{bold}{settle_us}{bold} | {bold}{sample_cycles}{bold} | {frames}");
+        let _ = writeln!(page, "| {setting} | {:.0} | {error} | {noise} |", row.rate_hz);
     }
     page
 }

@@ -1,7 +1,7 @@
 //! The whole loop: what cycles, frame rate and bits buy in the true force of a population of fingers.
 
-use super::page::Point;
-use super::page::{Studied, figure};
+use super::output::Passes;
+use super::page::{Point, Studied, figure};
 use fingertip::params::Params;
 use fingertip::shipped::{CLOCKS, Config, SLOTS};
 use output::plot::{Dot, Front, PlotError, front};
@@ -82,17 +82,11 @@ impl WholeLoop {
              | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
         );
         for (level, [plain, calibrated]) in self.levels.iter().enumerate() {
-            let flash = step(studied, level)?.cost.flash;
+            let point = step(studied, level)?;
+            let (cycles, Passes { median, max }) = (point.cycles(), point.cost.flash);
             let bold = if level == 2 { "**" } else { "" };
-            let _ = writeln!(
-                table,
-                "| {bold}{level}{bold} | {} | {} | {} | {} | {} |",
-                step(studied, level)?.cycles(),
-                flash.median,
-                flash.max,
-                cells(plain),
-                cells(calibrated)
-            );
+            let (plain, calibrated) = (cells(plain), cells(calibrated));
+            let _ = writeln!(table, "| {bold}{level}{bold} | {cycles} | {median} | {max} | {plain} | {calibrated} |");
         }
         Ok(table)
     }

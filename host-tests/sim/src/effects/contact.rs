@@ -23,10 +23,7 @@ pub struct Surface {
 }
 
 impl Surface {
-    fn add<F>(build: &Build, parts: &mut Parts, plain: bool, height_mm: F)
-    where
-        F: Fn(f64, f64, f64) -> f64 + Send + 'static,
-    {
+    fn add(build: &Build, parts: &mut Parts, plain: bool, height_mm: impl Fn(f64, f64, f64) -> f64 + Send + 'static) {
         parts.contact.shape.push(build.part(Box::new(Self { plain, height_mm: Box::new(height_mm) })));
     }
 }
@@ -146,10 +143,7 @@ pub const EFFECTS: &[Description] = &[
         ],
         zero: &[("along_columns_deg", 0.0), ("along_rows_deg", 0.0)],
         build: |build, parts| {
-            let slope = |name| {
-                let angle = build.number(name) * (core::f64::consts::PI / 180.0);
-                libm::tan(angle)
-            };
+            let slope = |name| libm::tan(build.number(name) * (core::f64::consts::PI / 180.0));
             let (x, y) = (slope("along_columns_deg"), slope("along_rows_deg"));
             // Additional reach of a slope into the tip, as a share of its radius.
             let over = (1.0 + x * x + y * y).sqrt() - 1.0;

@@ -207,14 +207,8 @@ pub const EFFECTS: &[Description] = &[
         build: |build, parts| {
             let [ambient_c, k_per_w, tau_s, magnet_per_k] =
                 ["ambient_c", "k_per_w", "tau_s", "magnet_per_k"].map(|name| build.number(name));
-            parts.drive.electric.push(build.part(Box::new(ThermalDerating {
-                ambient_c,
-                k_per_w,
-                tau_s,
-                magnet_per_k,
-                winding_c: ambient_c,
-                cold_ohm: 0.0,
-            })))
+            let heat = ThermalDerating { ambient_c, k_per_w, tau_s, magnet_per_k, winding_c: ambient_c, cold_ohm: 0.0 };
+            parts.drive.electric.push(build.part(Box::new(heat)))
         },
     },
     Description {

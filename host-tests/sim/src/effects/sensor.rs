@@ -314,10 +314,8 @@ pub const EFFECTS: &[Description] = &[
                 ["warming_k", "time_constant_s", "zero_kpa_per_k", "chip_share"].map(|name| build.number(name));
             let gain_per_k = build.number("gain_percent_per_k") / 100.0;
             let chip_k = warming_k * chip_share;
-            let chip_time_constant_s = match build.number("chip_time_constant_s") {
-                0.0 => time_constant_s,
-                own => own,
-            };
+            let own_s = build.number("chip_time_constant_s");
+            let chip_time_constant_s = if own_s == 0.0 { time_constant_s } else { own_s };
             parts.sensor.pressure.push(build.part(Box::new(move |_, time_s, kpa| {
                 let warmer_k = warming_k * gone(time_s.max(0.0) / time_constant_s);
                 let (gain, zero_kpa) = (1.0 + gain_per_k * warmer_k, zero_kpa_per_k * warmer_k);
@@ -511,7 +509,8 @@ pub struct Settling {
     tau_s: f64,
     /// Share of a difference that remains at the sample.
     left: f64,
-    before: Option<Before>,
+    /// Time, voltages at the edge and final voltages of the slot before.
+    before: Option<(f64, Row, Row)>,
 }
 
 impl Settling {
@@ -524,7 +523,7 @@ impl Settling {
         let end_v = *volts;
         let edge_v = match &self.before {
             None => end_v,
-            Some(Before { time_s: before_s, edge_v, end_v }) => {
+            Some((before_s, edge_v, end_v)) => {
                 let left = decay((time_s - before_s) / self.tau_s);
                 core::array::from_fn(|column| end_v[column] + left * (edge_v[column] - end_v[column]))
             }
@@ -532,14 +531,8 @@ impl Settling {
         for (volts, edge) in volts.iter_mut().zip(edge_v) {
             *volts += self.left * (edge - *volts);
         }
-        self.before = Some(Before { time_s, edge_v, end_v });
+        self.before = Some((time_s, edge_v, end_v));
     }
-}
-
-struct Before {
-    time_s: f64,
-    edge_v: Row,
-    end_v: Row,
 }
 
 const TERMS: usize = 9;

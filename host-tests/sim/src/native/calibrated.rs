@@ -276,15 +276,10 @@ pub fn errors_text(fingers: &[Unlike]) -> String {
     let mut order: Vec<usize> = (0..fingers.len()).collect();
     order.sort_by(|a, b| worst(&fingers[*b]).total_cmp(&worst(&fingers[*a])));
     for number in order {
-        let [before, after] = fingers[number].errors.map(|errors| errors.map(|error| format!("{:+.1}", 100.0 * error)));
+        let percent = |error: f64| format!("{:+.1}", 100.0 * error);
+        let [before, after] = fingers[number].errors.map(|errors| errors.map(percent).join(", "));
         let refused = fingers[number].calibrated.refused.join("; ");
-        let _ = writeln!(
-            text,
-            "finger {}: {} % before, {} % after  {refused}",
-            number + 1,
-            before.join(", "),
-            after.join(", ")
-        );
+        let _ = writeln!(text, "finger {}: {before} % before, {after} % after  {refused}", number + 1);
     }
     let [before, after] = percentiles(fingers);
     for ((name, ..), (before, after)) in TESTS.into_iter().zip(before.into_iter().zip(after)) {

@@ -240,12 +240,8 @@ pub fn text(report: &Report) -> String {
     if worst.len() > NAMED {
         let _ = writeln!(text, "  and {} more: --json FILE has them all", worst.len() - NAMED);
     }
-    let _ = writeln!(
-        text,
-        "\n{} of {count} fingers inside the envelope ({:.1} %)",
-        report.inside(),
-        percent(report.inside())
-    );
+    let inside = report.inside();
+    let _ = writeln!(text, "\n{inside} of {count} fingers inside the envelope ({:.1} %)", percent(inside));
     text
 }
 

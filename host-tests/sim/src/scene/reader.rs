@@ -99,17 +99,16 @@ impl Reader<'_> {
 
     /// Reads a table that occurs at most once.
     fn table(&mut self, table: &Table, root: &dyn TableLike) -> Values {
-        let Some(item) = root.get(table.name) else {
-            return Values::defaults(table.keys);
-        };
         let at = key_span(root, table.name);
-        match item.as_table_like() {
-            Some(given) => self.values(table, given, at, false).unwrap_or_else(|| Values::defaults(table.keys)),
-            None => {
+        let values = match root.get(table.name).map(Item::as_table_like) {
+            Some(Some(given)) => self.values(table, given, at, false),
+            Some(None) => {
                 self.error(at, format!("`{}` is a table", table.name), format!("[{}], once", table.name));
-                Values::defaults(table.keys)
+                None
             }
-        }
+            None => None,
+        };
+        values.unwrap_or_else(|| Values::defaults(table.keys))
     }
 
     /// Returns the tables of a `[[name]]`, each with its place.

@@ -96,13 +96,8 @@ impl Table {
         if !keys.is_empty() {
             for (at, rows) in points(self) {
                 let point: Vec<String> = keys.iter().zip(at).map(|(key, value)| format!("{key} = {value}")).collect();
-                let _ = writeln!(
-                    text,
-                    "  {}: {} of {} runs passed",
-                    point.join(", "),
-                    self.passes(rows.iter().copied()),
-                    rows.len()
-                );
+                let (point, passed, all) = (point.join(", "), self.passes(rows.iter().copied()), rows.len());
+                let _ = writeln!(text, "  {point}: {passed} of {all} runs passed");
             }
             text.push('\n');
         }

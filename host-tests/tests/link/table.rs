@@ -86,10 +86,11 @@ fn each_figure_stands_where_the_page_says() {
     let mut bench = busy();
     for (address, width, expected) in [
         (address::MODEL_NUMBER, 2, 0x5446),
-        (address::MODEL_INFORMATION, 4, 0x0002_0A0A),
+        (address::MODEL_INFORMATION, 4, 0x0003_0A0A),
         (address::FIRMWARE_VERSION, 1, 1),
         (address::HARDWARE_ERROR_STATUS, 1, 1 << 5),
         (address::REALTIME_TICK, 2, 0x0123),
+        (address::CHIP_ID, 4, 0xF1D0_2A17),
         (address::PRESENT_MODE, 1, 5),
         (address::FAULT, 1, 6),
         (address::LIMITS, 2, 0x101),

@@ -17,6 +17,8 @@ use std::time::{Duration, Instant};
 
 /// Number of failed reads in a row that ends the recording.
 const LOST_MAX: u64 = 20;
+/// Time without a new frame that ends it: a controller whose scan has stopped still answers, and its clock stands still.
+const FRAME_WITHIN: Duration = Duration::from_secs(2);
 /// Delay beyond which missed states are not made up for.
 const LATE_MAX: Duration = Duration::from_millis(100);
 /// Time after which what was recorded goes to the file: a killed program loses no more.
@@ -122,7 +124,7 @@ type Taken = (Counts, Option<Error>);
 fn take(args: &Args, client: &mut Client, interrupt: &Interrupt, sink: &mut dyn Sink) -> Result<Taken, Error> {
     let period = if args.rate_hz > 0.0 { Duration::from_secs_f64(1.0 / args.rate_hz) } else { Duration::ZERO };
     let (mut counts, mut stamps, mut frame, mut row) = (Counts::default(), Stamps::default(), None, 0);
-    let (mut due, mut flushed) = (Instant::now(), Instant::now());
+    let [mut due, mut flushed, mut scanned] = [Instant::now(); 3];
     while !interrupt.came() {
         let read = if args.pressures { State::read_picture(client) } else { State::read(client) };
         match read {
@@ -135,8 +137,13 @@ fn take(args: &Args, client: &mut Client, interrupt: &Interrupt, sink: &mut dyn 
                 counts.last_s = stamp.time_s;
                 if frame.replace(state.frame) == Some(state.frame) {
                     counts.repeated += 1;
+                    if scanned.elapsed() > FRAME_WITHIN {
+                        let why = format!("no new frame came for {} s", FRAME_WITHIN.as_secs());
+                        return Ok((counts, Some(why.into())));
+                    }
                 } else {
                     counts.states += 1;
+                    scanned = Instant::now();
                     let mut put = sink.put(&stamp, &state);
                     if flushed.elapsed() >= FLUSH_EVERY {
                         flushed = Instant::now();

@@ -81,7 +81,12 @@ fn a_recording_that_is_interrupted_is_whole() {
     assert!(text.ends_with('\n') && text.starts_with("time_s,"));
     assert!(!fs::exists(format!("{file}.part")).expect("a folder"));
 
-    // A recording whose connection is lost keeps its rows, and reports why it ends.
+    // So is one of a controller whose scan has stopped, and that of a lost connection; both report why they end.
+    finger.command("fault lost-frames");
+    let still = finger.file("still.csv");
+    finger.refuses(&["record", "--seconds", "1000000", &still], &["after 0.000 s: no new frame came for 2 s"]);
+    assert!(fs::metadata(&still).is_ok());
+    finger.command("mend");
     let lost = finger.file("lost.csv");
     let child = finger.start(&["record", &lost]);
     Served::begun(&format!("{lost}.part"));

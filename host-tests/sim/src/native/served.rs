@@ -54,7 +54,8 @@ struct Device {
     broken: Option<Broken>,
     /// The last frame as the controller received it, with what is broken.
     frame: Frame,
-    /// Supply voltage that the controller sensed last.
+    /// Time of its end, and supply voltage that the controller sensed with it.
+    frame_time_us: u32,
     supply_mv: u16,
     reboot_s: Option<f64>,
     capture: Box<Capture>,
@@ -116,12 +117,13 @@ impl Bus {
             device.frame = unit.frame;
             let frame = &mut device.frame;
             let scanned = device.broken.as_mut().is_none_or(|broken| broken.change(frame, &mut sense, params));
-            device.supply_mv = sense.supply_mv;
             let command = device.server.command();
             if device.capture.is_due(&unit.pipeline, &command) {
                 device.capture.begin(&mut unit.pipeline);
             }
             let status = if scanned {
+                device.frame_time_us = ((now_s - device.started_s) * 1e6) as u64 as u32;
+                device.supply_mv = sense.supply_mv;
                 let (_, status) = unit.pipeline.step(frame, &sense, &command);
                 device.capture.record(frame, &sense, &command, status);
                 device.capture.follow(&unit.pipeline);
@@ -175,7 +177,7 @@ impl Bus {
                 status: *pipeline.status(),
                 supply_mv: device.supply_mv,
                 tick_ms: ((at_s - device.started_s) * 1e3) as u64 as u32,
-                frame_time_us: ((self.board.clock.since(self.board.start) - device.started_s) * 1e6) as u64 as u32,
+                frame_time_us: device.frame_time_us,
                 frame_ns: pipeline.config().timing.frame_ns,
                 loop_time_us: 0,
                 loop_time_max_us: 0,
@@ -215,6 +217,7 @@ impl Device {
             packets: (0, started_s),
             broken: None,
             frame: Frame::EMPTY,
+            frame_time_us: 0,
             supply_mv: 0,
             reboot_s: None,
             capture: Box::new(Capture::NEW),

@@ -69,8 +69,6 @@ pub struct Args {
 struct Bus {
     client: Client,
     connections: BTreeMap<SocketAddr, Connection>,
-    /// Bus watchdogs by ID, whoever set them.
-    watchdogs: BTreeMap<u8, Duration>,
     /// IDs that answered a client.
     answered: BTreeSet<u8>,
     /// Fingers that got goal 0 and are neither seen idle yet nor commanded again: why, and when the next try is due, if not
@@ -86,6 +84,8 @@ struct Connection {
     ids: BTreeSet<u8>,
     /// Instant of its last packet.
     heard: Option<Instant>,
+    /// Instant from which on its silence is judged, if not judged yet.
+    judged: Option<Instant>,
     /// True once another client stopped one of its fingers: it writes no more.
     stopped: bool,
     stream: Option<TcpStream>,
@@ -117,7 +117,6 @@ pub fn run(args: &Args, reach: &Reach, json: bool) -> Result<(), Error> {
     let bus = Arc::new(Mutex::new(Bus {
         client,
         connections: BTreeMap::new(),
-        watchdogs: BTreeMap::new(),
         answered: BTreeSet::new(),
         ending: BTreeMap::new(),
         urgent: false,
@@ -249,19 +248,37 @@ fn converse(mut stream: TcpStream, bus: &Mutex<Bus>, lost: &Outbox<Error>) {
 impl Bus {
     /// Ends the command of clients that left or are silent, except the one whose packet is next.
     fn end_commands(&mut self, next: Option<SocketAddr>) {
-        // Reads of others would feed the watchdogs of a silent client. One whose packet waits for a stop is not silent.
-        let slack = self.client.timeout + Duration::from_secs_f64(RELEASE_S);
-        let silent = |one: &Connection| {
-            let most = one.ids.iter().filter_map(|id| self.watchdogs.get(id)).min().zip(one.heard);
-            most.is_some_and(|(most, heard)| heard.elapsed() > *most + slack)
-        };
-        let ended = |(from, one): (&SocketAddr, &Connection)| {
-            let why = if one.left() { LEFT } else { silent(one).then_some(SILENT)? };
-            (Some(*from) != next && !one.ids.is_empty()).then_some((*from, why))
-        };
-        for (from, why) in self.connections.iter().filter_map(ended).collect::<Vec<_>>() {
-            self.end_command(from, why);
+        let others = self.connections.iter().filter(|(from, one)| Some(**from) != next && !one.ids.is_empty());
+        for from in others.map(|(from, _)| *from).collect::<Vec<_>>() {
+            if self.connections[&from].left() {
+                self.end_command(from, LEFT);
+            } else if self.is_silent(from) {
+                self.end_command(from, SILENT);
+            }
         }
+    }
+
+    /// True once a client has been silent for longer than the bus watchdog of one of its fingers, which reads of others feed.
+    /// Whoever set the watchdog, and by which instruction: the fingers are asked.
+    fn is_silent(&mut self, from: SocketAddr) -> bool {
+        let Connection { ids, heard: Some(heard), judged, .. } = &self.connections[&from] else { return false };
+        let from_then = *heard + self.client.timeout + Duration::from_secs_f64(RELEASE_S);
+        if judged.unwrap_or(from_then) > Instant::now() {
+            return false;
+        }
+        if judged.is_none() && !ids.is_subset(&self.answered) {
+            // A client that writes in group packets: absent IDs would take a time-out each.
+            self.answered.extend(self.client.ping_all().unwrap_or_default().iter().map(|pong| pong.id));
+        }
+        let steps = ids.intersection(&self.answered).filter_map(|id| {
+            self.client.id = *id;
+            self.client.number(address::BUS_WATCHDOG).ok().filter(|steps| *steps > 0)
+        });
+        // Without a watchdog it may be set yet.
+        let next =
+            steps.min().map_or(Instant::now() + RETRY, |steps| from_then + Duration::from_millis(20) * steps as u32);
+        self.connections.entry(from).or_default().judged = Some(next);
+        next <= Instant::now()
     }
 
     /// Passes a client's packet on, where it may, and returns the answers. A finger is stopped before its next commander's
@@ -269,13 +286,13 @@ impl Bus {
     fn pass(&mut self, from: SocketAddr, packet: &Packet<'_>, raw: &[u8]) -> Result<Vec<u8>, Error> {
         self.end_commands(Some(from));
         let (reads, parts) = (READS.contains(&packet.instruction), parts(packet));
-        let (stops, commander, mut first) = (is_stop(packet, &parts), self.commander(), false);
+        let (stops, commander) = (is_stop(packet, &parts), self.commander());
         if !reads && !stops && commander.is_none_or(|other| other == from) {
             self.end(packet.id)?;
         }
         let mut ids = parts.iter().flat_map(|part| part.ids.clone());
         let own = self.connections.entry(from).or_default();
-        own.heard = Some(Instant::now());
+        (own.heard, own.judged) = (Some(Instant::now()), None);
         if commander != Some(from) && stops {
             // A stopped client stops its own fingers before it exits, torque off last. That takes the command from nobody;
             // what it stops later does.
@@ -287,15 +304,11 @@ impl Bus {
             }
         } else if !reads {
             let stopped = own.stopped || commander.is_some_and(|other| other != from);
-            // The bus speed is fixed, and a finger without answers is not seen to stop. A Reg Write acts only at an Action, so
-            // `share` would not know which watchdog time holds.
-            let later = packet.instruction == instruction::REG_WRITE;
+            // The bus speed is fixed, and a finger without answers is not seen to stop.
             let fixed = |part: &Part<'_>| {
+                let level = part.byte(address::STATUS_RETURN_LEVEL);
                 part.byte(address::BAUD_RATE).is_some()
-                    || part
-                        .byte(address::STATUS_RETURN_LEVEL)
-                        .is_some_and(|level| i64::from(level) != stop::ALL_ANSWERED)
-                    || later && part.byte(address::BUS_WATCHDOG).is_some()
+                    || level.is_some_and(|level| i64::from(level) != stop::ALL_ANSWERED)
             };
             // A write to no device feeds the watchdogs. A stopped client keeps its other fingers alive by it.
             let refused = if parts.is_empty() { own.ids.is_empty() } else { stopped || parts.iter().any(fixed) };
@@ -307,15 +320,7 @@ impl Bus {
             }
             // From now on this client's end stops these fingers.
             self.ending.retain(|id, _| !ids.clone().any(|own| own == *id));
-            first = !own.ids.contains(&packet.id);
             own.ids.extend(ids);
-            let reset = (packet.instruction == instruction::REBOOT).then_some(0);
-            for part in &parts {
-                // A finger refuses a larger number of steps.
-                if let Some(steps @ ..=127) = reset.or(part.byte(address::BUS_WATCHDOG)) {
-                    self.watch(part.ids.clone(), steps.into());
-                }
-            }
         }
         let answer = self.client.pass(raw, Some(packet.id).filter(|id| *id != BROADCAST), answers(packet))?;
         // Byte 8 of an answer is its error, whose top bit is the alert. A packet to all IDs is no finger's.
@@ -330,29 +335,14 @@ impl Bus {
                 one.ids = one.ids.iter().map(|known| if *known == id { new } else { *known }).collect();
             }
             self.answered.remove(&id);
-            (id, first) = (new, true);
+            id = new;
         }
         self.answered.insert(id);
-        if first {
-            // The client may rely on a watchdog that another one set, or `recover` may have reset it.
-            self.client.id = id;
-            if let Ok(steps) = self.client.again(|client| client.number(address::BUS_WATCHDOG)) {
-                self.watch(id..=id, steps);
-            }
-        }
         // It can be stopped now, and reads would feed its watchdog.
         if let Some((_, due)) = self.ending.get_mut(&id) {
             *due = None;
         }
         Ok(answer)
-    }
-
-    /// Notes the bus watchdog of these IDs: 0 is off, and less has tripped.
-    fn watch(&mut self, ids: RangeInclusive<u8>, steps: i64) {
-        self.watchdogs.retain(|id, _| !ids.contains(id));
-        if let Ok(steps @ 1..) = u64::try_from(steps) {
-            self.watchdogs.extend(ids.map(|id| (id, Duration::from_millis(20 * steps))));
-        }
     }
 
     /// The client that may write: it wrote and was not stopped.

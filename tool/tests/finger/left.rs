@@ -2,9 +2,11 @@
 
 use crate::served::Served;
 use crate::shared::{Shared, sync_write};
+use fingertip::link::packet::instruction;
 use fingertip::shipped::address;
 use fingertip::state::Mode;
 use fingertip_cli::Client;
+use fingertip_cli::client::packet;
 use std::io::Read as _;
 use std::time::Duration;
 
@@ -180,22 +182,41 @@ fn a_finger_is_stopped_once_the_line_is_back_unless_another_client_commands_it()
     }
 }
 
-/// Another program set the bus watchdog, and has left.
+/// Another program has set the bus watchdog, before `share` began or since, or the commander sets it in a packet that does not
+/// name its register; and the commander may write in group packets only.
 #[test]
 fn a_silent_commander_is_stopped_whoever_set_the_watchdog() {
-    for direct in [false, true] {
+    for (way, groups) in [("before", false), ("before", true), ("since", false), ("later", false), ("indirect", false)]
+    {
         let finger = Served::patient("wall");
-        if direct {
+        if way == "before" {
             finger.set(&[(address::BUS_WATCHDOG, 25)]);
         }
         let shared = tared(finger, 1..=1);
-        if !direct {
+        if way == "since" {
             shared.client().set(address::BUS_WATCHDOG, 25).expect("it obeys");
         }
         let (mut commander, mut reader) = (shared.client(), shared.client());
-        presses(&mut commander);
+        if groups {
+            sync_write(&mut commander, address::TORQUE_ENABLE, 1, &[1, 1]);
+            sync_write(&mut commander, address::GOAL_FORCE_MN, 4, &[1, 0xE8, 3, 0, 0]);
+        } else {
+            presses(&mut commander);
+        }
+        let [low, high] = address::BUS_WATCHDOG.to_le_bytes();
+        if way == "later" {
+            for (number, params) in [(instruction::REG_WRITE, &[low, high, 25][..]), (instruction::ACTION, &[])] {
+                let answer = commander.pass(&packet(1, number, params), Some(1), 1).expect("it answers");
+                assert_eq!(answer[8], 0);
+            }
+        }
+        if way == "indirect" {
+            commander.write(address::INDIRECT_ADDRESS_1, &[low, high]).expect("it obeys");
+            commander.write(address::INDIRECT_DATA_1, &[25]).expect("it obeys");
+        }
         reads_until_off(&shared.finger, &mut reader, 20_000);
-        assert_eq!(reader.number(address::FAULT).expect("it answers"), 0, "the broker stopped it, not the watchdog");
+        let fault = reader.number(address::FAULT).expect("it answers");
+        assert_eq!(fault, 0, "{way}: the broker stopped it, not the watchdog");
     }
 }
 

@@ -1,6 +1,6 @@
 //! `fingertip params`: what outlives a reset. A backup of it is TOML, a line each with its meaning.
 
-use super::{Interrupt, say, say_json};
+use super::{Interrupt, aside, say, say_json};
 use crate::state::RESTARTED;
 use crate::table::{self, name};
 use crate::{Client, Error, whole};
@@ -354,7 +354,7 @@ pub(super) fn set(values: &[Value], gains: Option<Vec<Vec<u16>>>, client: &mut C
     // Parameters that contradict each other are refused by the core's own check.
     let config = Config::shipped(&meant.params());
     let config = config.map_err(|why| format!("these do not go together: {why}; nothing was changed"))?;
-    config.warnings(|warning| eprintln!("warning: {warning}"));
+    config.warnings(|warning| aside(format_args!("warning: {warning}")));
     let changed = before.values.iter().zip(&meant.values).enumerate().filter(|(_, (from, to))| from != to);
     let (params, mut others): (Vec<_>, Vec<_>) =
         changed.map(|(at, (_, to))| (at, *to)).partition(|(_, (register, _))| is_param(register));

@@ -262,4 +262,8 @@ fn a_full_disk_is_told_and_a_closed_pipe_is_no_error() {
         drop(reader);
         assert_eq!(finger.writing_to(arguments, writer).status.code(), Some(0), "{arguments:?}");
     }
+    // Nor is a warning that cannot be written.
+    let set = finger.fingertip(&["params", "set", "force_max_mn=60"]).stderr(full()).status();
+    assert_eq!(set.expect("it starts").code(), Some(0));
+    assert_eq!(finger.json(&["params", "get", "force_max_mn"])["force_max_mn"], 60);
 }

@@ -112,7 +112,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Staged<'_, ROWS, COLUMNS> {
         }
         let (status, faulted, taring) = (&self.snapshot.status, self.snapshot.faulted(), self.taring());
         let tared = !status.limits.has(Limits::NOT_TARED);
-        let goal = command.goal == Newtons::ZERO || command.torque;
+        // Torque off in the same write counts, and takes the goal back: a driver may repeat its goal.
+        let goal = command.goal == Newtons::ZERO || command.torque || before.command.torque;
         let stopped = faulted && command.clear_request == status.taken.clear;
         let tare = command.tare_request == before.command.tare_request || !stopped;
         let measure = command.measure_request == before.command.measure_request

@@ -174,6 +174,14 @@ fn torque_off_takes_the_goal_back() {
         assert_eq!(bench.ask_as(BROADCAST, instruction::BULK_WRITE, &entries(torque)), None);
         assert_eq!(bench.number(address::GOAL_FORCE_MN, 4), expected);
     }
+    // Both in one write, in the other order, as from a driver that repeats its goal: torque off is not refused.
+    let places = [address::TORQUE_ENABLE, address::SHORT_GOAL_MN, address::SHORT_GOAL_MN + 1];
+    bench.write(address::INDIRECT_ADDRESS_1, &places.map(u16::to_le_bytes).concat()).expect("addresses");
+    for (torque, result, expected) in [(1, Ok(()), 300), (0, Ok(()), 0), (0, RESULT, 0)] {
+        assert_eq!(bench.write(address::INDIRECT_DATA_1, &[torque, 44, 1]), result);
+        let command = bench.server.command();
+        assert_eq!((command.torque, bench.number(address::GOAL_FORCE_MN, 4)), (torque != 0, expected));
+    }
 }
 
 proptest! {

@@ -6,6 +6,7 @@ use crate::link::packet::{BROADCAST, Packet, Sender, StatusError, instruction};
 use crate::link::settings::Saved;
 use crate::link::table::{Staged, TableView, address};
 use crate::store::Record;
+use crate::units::Newtons;
 use heapless::Vec;
 
 /// Bits of the longest status packet to a Ping, 10 per byte: a device with a higher ID waits for as long.
@@ -104,6 +105,10 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> Exchange<'a, ROWS, COLUMNS> {
             staged.actions.calibrate |= before.gains != after.gains;
             staged.actions.baud |= before.baud_code != after.baud_code;
             staged.settings.saved = Saved::Changed;
+        }
+        let command = &mut staged.settings.command;
+        if !command.torque {
+            command.goal = Newtons::ZERO;
         }
         self.state.settings = staged.settings;
         self.state.actions = staged.actions;

@@ -77,7 +77,12 @@ type Change = fn(&mut Bench);
 /// Each board with the mode after the tare.
 #[test]
 fn a_tare_that_comes_with_another_request_is_done() {
-    let cases: [(&str, Bench, Change, Mode); 4] = [
+    let peak: Change = |board| {
+        board.command().torque = false;
+        board.step_with(pressed);
+    };
+    let cases: [(&str, Bench, Change, Mode); 5] = [
+        ("a frame that reads too much, just before", ready(), peak, Mode::Off),
         ("torque off", ready(), |board| board.command().torque = false, Mode::Off),
         ("torque off and on again, before the loop looks", ready(), |_| {}, Mode::Release),
         ("the clearing of a fault", faulted(), |board| board.command().clear_request += 1, Mode::Off),

@@ -11,7 +11,7 @@
 //! | request | accepted | otherwise |
 //! | --- | --- | --- |
 //! | clear | in fault, with torque off | the fault remains, or there is none |
-//! | tare | in every activity but fault and the last release, also in the frame that clears one; not while something is pressed, unless that was [forced](Command::tare_forced): the zero before remains | refused: [`Taring::Refused`] |
+//! | tare | in every activity but fault and the last release, also in the frame that clears one; not while something has been pressed for 3 ms, unless that was [forced](Command::tare_forced): the zero before remains | refused: [`Taring::Refused`] |
 //! | torque on | in off, once the tip is slow; not before a tare, nor after one while something touched the tip, unless that was [forced](Command::tare_forced); not before the direction is confirmed, nor while it has been on since before the tare or the configuration | the finger stays off; limits 6, 10, 14 and 15 give the reason |
 //! | torque off | in every activity; a release for a silent bus stops with fault 7 | |
 //! | jog, strokes | in off, with torque off, the array tared and nothing at the tip; they wait until the tip is at rest | refused: [`Ended`] |
@@ -238,7 +238,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         let readable = monitor::array_readable(bad_count, undriven_max, &self.config);
         let touches = readable && self.status.contact.force >= self.config.contact_on;
         let unseen = self.touch.stage() == Stage::None && touches;
-        let pressed = self.tared && (self.touch.held() || unseen) && !forced;
+        let pressed = self.tared && (self.touch.lasts(&self.config) || unseen) && !forced;
         !pressed && !matches!(self.activity, Activity::LastRelease { .. } | Activity::Fault(_))
     }
 

@@ -172,7 +172,7 @@ control_table! {
     /// Fit level in use: lower than requested if the time is too short.
     368 FIT_LEVEL_IN_USE: U8 ReadOnly in 0..=5, |view, _| view.status().fit_level as u32;
     /// State of the last requested tare: 0 none since reset, 1 running, 2 done, 3 refused, or ended by a fault:
-    /// remove the object or clear the fault, then request again.
+    /// remove the object and let the reading of its contact decay, or clear the fault, then request again.
     369 TARE_STATE: U8 ReadOnly in 0..=3, |view, _| view.tare_state();
     /// Part of present_force_mn that counts as the array's creep:
     /// the held force is lower by it. 0 if creep_permille is 0.

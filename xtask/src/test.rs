@@ -41,10 +41,10 @@ pub fn run(args: &Args) -> Result<()> {
         console.print(&sizes.verdict());
         sizes.check()
     });
-    stages.stage("panic-free proof", |console| image::prove_panic_free(console));
-    stages.stage("emulated Cortex-M4F against this machine", |console| cores::test_m4(console));
-    stages.stage("example for another board", |console| cores::example(console));
-    stages.stage("timing model against published measurements", |console| timing::check(console));
+    stages.stage("panic-free proof", image::prove_panic_free);
+    stages.stage("emulated Cortex-M4F against this machine", cores::test_m4);
+    stages.stage("example for another board", cores::example);
+    stages.stage("timing model against published measurements", timing::check);
     stages.stage("virtual board", |console| {
         let python = install::bus_python(console)?;
         let mut command = host::tests(&["--test", "board"]);

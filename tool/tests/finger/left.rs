@@ -130,6 +130,7 @@ fn absent_fingers_of_who_left_keep_nobody_from_the_bus() {
     let (mut first, mut press) = (shared.client(), shared.client());
     let goals: Vec<u8> = (1..60).flat_map(|id| [id, 1, 0, 0, 0]).collect();
     sync_write(&mut first, address::GOAL_FORCE_MN, 4, &goals);
+    first.ping().expect("it answers");
     press.timeout = Duration::from_millis(5_500);
     for (register, value) in [(address::TORQUE_ENABLE, 0), (address::TORQUE_ENABLE, 1), (address::GOAL_FORCE_MN, 1_000)]
     {
@@ -177,6 +178,7 @@ fn a_finger_is_stopped_once_the_line_is_back_unless_another_client_commands_it()
     // A client that writes to it in a group packet commands it before the next try to stop it.
     let mut next = shared.client();
     sync_write(&mut next, address::TORQUE_ENABLE, 1, &[1, 1]);
+    next.ping().expect("it answers");
     for _ in 0..1_000 {
         assert_eq!(reader.number(address::TORQUE_ENABLE).expect("it answers"), 1, "it has a commander");
     }
@@ -214,6 +216,7 @@ fn a_silent_commander_is_stopped_whoever_set_the_watchdog() {
             commander.write(address::INDIRECT_ADDRESS_1, &[low, high]).expect("it obeys");
             commander.write(address::INDIRECT_DATA_1, &[25]).expect("it obeys");
         }
+        while reader.number(address::PRESENT_MODE).expect("it answers") == Mode::Off as i64 {}
         reads_until_off(&shared.finger, &mut reader, 20_000);
         let fault = reader.number(address::FAULT).expect("it answers");
         assert_eq!(fault, 0, "{way}: the broker stopped it, not the watchdog");

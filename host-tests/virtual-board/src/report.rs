@@ -107,7 +107,7 @@ impl Rig {
     }
 
     /// Differences between the emulated and the real part that the run has met, a line each. Known and harmless are
-    /// [`DCKCFGR2`] and the sectors of the stored parameters: the flash interface keeps nothing, but this crate does.
+    /// `DCKCFGR2` and the sectors of the stored parameters: the flash interface keeps nothing, but this crate does.
     pub fn gaps(&mut self) -> Result<Vec<String>, Error> {
         self.with(|stand| {
             let session = &*stand.session;

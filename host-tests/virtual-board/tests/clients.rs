@@ -5,7 +5,7 @@
 //! the board that is served.
 
 #[path = "../../tests/link/bench.rs"]
-#[allow(dead_code, reason = "the link's tests take more of it")]
+#[allow(dead_code, unused_imports, reason = "the link's tests take more of it")]
 mod bench;
 
 use crate::common::{image, named};

@@ -135,6 +135,5 @@ pub fn ensure_m4(console: &mut Console) -> Result<()> {
 
 fn prepare(console: &mut Console) -> Result<PathBuf> {
     ensure_m4(console)?;
-    toolchain::ensure(console)?;
     image::build("qemu", "qemu", console)
 }

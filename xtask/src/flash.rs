@@ -5,7 +5,6 @@ use crate::console::Console;
 use crate::host::{self, Program};
 use crate::image::{self, Image};
 use crate::option_bytes::{self, PAUSE_MS, Probe};
-use crate::toolchain;
 use crate::{sim, timing};
 use anyhow::{Context, Result, bail, ensure};
 use clap::ValueEnum;
@@ -240,7 +239,6 @@ pub fn bringup(args: &BringupArgs, console: &mut Console) -> Result<()> {
     if port.is_some() && !args.flashed {
         need_probe_rs()?;
     }
-    toolchain::ensure(console)?;
     let image = image::checking(BRINGUP, console)?;
     console.say(&image.summary());
     let estimates = if args.without_estimates { None } else { Some(estimates(console)?) };

@@ -90,7 +90,6 @@ fn lay_out(segments: &[(u32, &[u8])]) -> Result<(u32, Vec<u8>)> {
 }
 
 pub fn firmware(console: &mut Console) -> Result<Image> {
-    toolchain::ensure(console)?;
     let mut command = toolchain::cargo("build");
     command.args(["--package", "fingertip", "--bin", "firmware", "--features", "firmware"]);
     with_bytes(&mut command, "firmware", console)
@@ -116,6 +115,7 @@ pub fn build(name: &str, feature: &str, console: &mut Console) -> Result<PathBuf
 }
 
 fn built(command: &mut Command, name: &str, console: &mut Console) -> Result<PathBuf> {
+    toolchain::ensure(console)?;
     console.build(command, &format!("the image {name}"))?;
     Ok(toolchain::images().join(name))
 }
@@ -201,7 +201,6 @@ const UNDEFINED: &str = "fingertip_step_can_panic";
 
 /// Builds the proof and its two controls.
 pub fn prove_panic_free(console: &mut Console) -> Result<()> {
-    toolchain::ensure(console)?;
     let linked = build(NAME, "proof", console);
     let elf = linked
         .with_context(|| format!("the proof does not link; if {UNDEFINED} is missing above, the step can panic"))?;

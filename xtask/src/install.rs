@@ -129,7 +129,7 @@ fn is_main(release: &str, uri: &str) -> bool {
     uri.trim_end_matches('/').ends_with("/debian") && !release.contains("security")
 }
 
-pub fn installed(package: &str) -> bool {
+fn installed(package: &str) -> bool {
     let query = Command::new("dpkg-query").args(["-W", "-f", "${Status}", package]).output();
     query.is_ok_and(|output| output.stdout.ends_with(b" installed"))
 }

@@ -25,8 +25,6 @@ use std::process::ExitCode;
 #[derive(Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask", version, arg_required_else_help = true)]
 struct Cli {
-    /// Source of the firmware's compiler: rustup's target, Debian's packages, or whichever works
-
     #[command(subcommand)]
     command: Command,
 }

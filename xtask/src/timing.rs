@@ -150,7 +150,6 @@ pub struct StudyArgs {
 
 /// Runs the study and renews or checks its page, its table in the README and its pictures.
 pub fn study(args: &StudyArgs, console: &mut Console) -> Result<()> {
-    toolchain::ensure(console)?;
     let folder = host::made("study")?;
     let inputs = folder.join("inputs.bin");
     let judge = Program::tool("study");

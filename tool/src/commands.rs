@@ -24,7 +24,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// End of a command.
+/// Result of a command.
 type Done = Result<(), Error>;
 /// True once output was lost against the user's will.
 static LOST: AtomicBool = AtomicBool::new(false);

@@ -7,7 +7,7 @@ pub fn seconds(text: &str) -> Result<f64, String> {
     within(text, &(0.0..=1e9))
 }
 
-/// A rate: from one in a quarter of an hour to more than there are frames.
+/// A rate, Hz: from one state in a quarter of an hour to more states than there are frames.
 pub fn rate_hz(text: &str) -> Result<f64, String> {
     within(text, &(0.001..=1e6))
 }
@@ -31,7 +31,7 @@ pub fn shown_n(text: &str) -> Result<f64, String> {
     within(text, &(0.0..=150.0)).map(|newtons| (newtons * 1e3).round() * 1e-3)
 }
 
-/// Resistance of a winding and what drives it.
+/// Resistance of motor and bridge, Ohm.
 pub fn ohm(text: &str) -> Result<f64, String> {
     within(text, &(0.05..=200.0))
 }

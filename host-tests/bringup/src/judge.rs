@@ -179,7 +179,11 @@ impl Judgement {
 }
 
 const fn word(verdict: Verdict) -> &'static str {
-    ["pass        ", "FAIL        ", "(not shown) "][verdict as usize]
+    match verdict {
+        Verdict::Pass => "pass        ",
+        Verdict::Fail => "FAIL        ",
+        Verdict::NotShown => "(not shown) ",
+    }
 }
 
 fn number(figure: f64) -> String {

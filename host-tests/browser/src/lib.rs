@@ -1,4 +1,5 @@
-//! A headless Chromium, driven over the DevTools protocol: opens a page in various looks and reports its errors.
+//! A headless Chromium, driven over the DevTools protocol: opens a page on a screen or a phone, light or dark, and
+//! reports its errors.
 
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use serde_json::{Value, json};

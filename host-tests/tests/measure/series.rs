@@ -13,7 +13,7 @@ fn number<const BYTES: usize>(bytes: &[u8], at: usize) -> [u8; BYTES] {
     *bytes[at..].first_chunk().expect("more bytes")
 }
 
-/// Kind, number of the end, number of rows, and the number behind the end.
+/// Kind of a record, number of the reason of its end, number of rows, and the value that explains the end.
 pub fn head(bytes: &[u8]) -> (u8, u8, u32, i32) {
     (bytes[4], bytes[7], u32::from_le_bytes(number(bytes, 8)), i32::from_le_bytes(number(bytes, 28)))
 }
@@ -102,8 +102,11 @@ fn comes_back<const ROWS: usize, const COLUMNS: usize>() {
             assert!((read.time_s[end] - 99_762e-9 * f64::from(step.frames[end])).abs() < 1e-9);
             assert!((read.travel_mm[end] - travel_mm).abs() < 1e-6, "{:?}", step.counts);
         }
-        // The host does not read the voltage.
-        let voltage_mv = i16::from_le_bytes(number(&bytes, HEAD + place * step_bytes(ROWS * COLUMNS) + 20));
+        // The host reads neither the voltage nor the bytes that are 0.
+        let row = &bytes[HEAD + place * step_bytes(ROWS * COLUMNS)..][..step_bytes(ROWS * COLUMNS)];
+        let voltage_mv = i16::from_le_bytes(number(row, 20));
+        let padding = 24 + 3 * ROWS * COLUMNS + (ROWS * COLUMNS).div_ceil(8);
+        assert!(row[19] == 0 && row[padding..].iter().all(|byte| *byte == 0), "{row:?}");
         assert_eq!(i32::from(voltage_mv), step.voltage_mv / i32::from(step.taken));
         let [read_c, chip_c] = [read.chip_c, step.chip.map(|chip| chip.0.to_num())].map(|chip| chip.unwrap_or(-273.15));
         assert!((read_c - chip_c).abs() <= 0.15, "{read_c} {chip_c}");

@@ -34,7 +34,7 @@ impl Part {
         level(self, PORT_C, 8) == Level::High
     }
 
-    /// State of the bridge by IN1 and IN2 averaged over the PWM period. It coasts asleep, or with both low.
+    /// State of the bridge, from IN1 and IN2 averaged over the PWM period. It coasts while nSLEEP or both inputs are low.
     pub fn bridge(&mut self) -> Bridge {
         if level(self, PORT_C, 9) == Level::Low {
             return Bridge::Coast;

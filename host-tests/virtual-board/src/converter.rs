@@ -332,7 +332,7 @@ pub const SAMPLING_NS: u64 = 10_000;
 /// Address of the unique ID. After it and a gap come the factory's codes: of the reference, and of the temperature sensor
 /// at 30 and 110 degrees Celsius.
 pub const FACTORY_AT: u64 = 0x1fff_7a10;
-/// Unique ID of the virtual microcontroller, and the gap.
+/// Unique ID of the virtual microcontroller, with the gap behind it.
 pub const UNIQUE_ID: [u8; 26] = *b"virtual chip\xff\xff\xff\xff\xff\xff\xff\xff\xff\xff\xff\xff\xff\xff";
 /// Default ambient temperature of the board, degrees Celsius.
 pub const ROOM_C: f64 = 25.0;

@@ -26,7 +26,7 @@ struct RowDrive {
     since_ns: u64,
 }
 
-/// A slot of a scene's scan: begins with the update that moves the rows; a fixed time later the trigger comes.
+/// Slot of a scene's scan. The update that moves the rows begins it; the trigger follows a fixed time later.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Slot {
     pub begun_ns: u64,

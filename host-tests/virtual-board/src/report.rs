@@ -106,8 +106,8 @@ impl Rig {
         })
     }
 
-    /// Differences between the emulated and the real part that the run has met, a line each. Known and harmless are
-    /// `DCKCFGR2` and the sectors of the stored parameters: the flash interface keeps nothing, but this crate does.
+    /// Accesses of the run that the emulated part does not model, a line each. Two kinds are left out, as they are harmless:
+    /// `DCKCFGR2`, and the sectors of the stored parameters, which [`Programmer`](crate::flash::Programmer) keeps.
     pub fn gaps(&mut self) -> Result<Vec<String>, Error> {
         self.with(|stand| {
             let session = &*stand.session;

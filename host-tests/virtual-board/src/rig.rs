@@ -136,7 +136,7 @@ impl Rig {
         self.run_until_ns(self.now_ns + ms * 1_000_000)
     }
 
-    /// Runs in steps of this many ns until a look behind a step, on the emulator's thread, returns false.
+    /// Runs in steps of `step_ns` until `look`, called on the emulator's thread after each step, returns false.
     pub fn run_while(&mut self, step_ns: u64, look: Look) -> Result<(), Error> {
         self.order(Order::Run(self.now_ns + step_ns, step_ns, look))?;
         self.await_reached()

@@ -199,7 +199,7 @@ fn set_up(rig: &mut Rig, scene: &Scene, start_ns: u64) -> Result<(), Error> {
 
 /// Offset from the converters' frame number to the image's own, which is in memory at the symbol.
 ///
-/// The status alone does not tell it: the least delay of an answer depends on the load of the core.
+/// The status alone does not show it: the least delay of an answer depends on the load of the core.
 fn frame_offset(rig: &mut Rig) -> Result<u32, Error> {
     let Some(address) = rig.image().item("scan", "SEQUENCE") else {
         let why = "the image has no counter of frames named `scan::SEQUENCE`".into();

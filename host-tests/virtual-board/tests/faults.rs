@@ -249,7 +249,7 @@ fn bridge(rig: &mut Rig) -> Bridge {
     rig.with(|stand| stand.session.board_mut().bridge()).expect("it runs")
 }
 
-/// Checks the retreat after a fault that brakes: at most the indentation, the clearance and 1 mm together.
+/// Checks that after a fault that brakes the tip springs back by at most the indentation, the clearance and 1 mm together.
 fn check_way_back(rig: &mut Rig, name: &str, held_mm: f64) {
     let params = Params::DEFAULT;
     let indentation_mm = (1e6 / (std::f64::consts::PI * f64::from(params.modulus_pa))).sqrt();
@@ -276,7 +276,8 @@ fn mend(rig: &mut Rig) {
     hold_again(rig);
 }
 
-/// Breaks a held board in one of `every` slots of a frame and mends it. Prints the longest time until it is off.
+/// Breaks a held board in one of `every` slots of a frame and mends it. Prints the longest time until the bridge
+/// is off.
 fn break_and_time(rig: &mut Rig, name: &str, every: usize, faults: &[Number], limit_us: f64, harm: impl Fn(&mut Rig)) {
     let mut worst_us = 0.0_f64;
     for phase in (0..PHASES as u64).step_by(every) {

@@ -4,7 +4,7 @@ use super::*;
 
 const ONE: f64 = (1_u64 << 32) as f64;
 
-/// Calls a check for each shape, rows x columns.
+/// Calls a generic check with each of these array shapes, rows x columns.
 macro_rules! shapes {
     ($check:ident: $($rows:literal x $columns:literal),+) => { $($check::<$rows, $columns>();)+ };
 }

@@ -20,7 +20,7 @@ fn solved(draw: &Draw, presses: &[Press]) -> (Modulus, [f64; 2]) {
     (found, errors)
 }
 
-/// Median, worst, standard uncertainty, and how many are within two; printed too.
+/// Median and largest error, standard uncertainty, and the number of errors within two of it. Prints them, too.
 fn summary(name: &str, errors: &[[f64; 2]]) -> [f64; 4] {
     let mut sizes: Vec<f64> = errors.iter().map(|[error, _]| error.abs()).collect();
     sizes.sort_by(f64::total_cmp);

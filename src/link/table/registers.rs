@@ -48,7 +48,7 @@ control_table! {
     11 OPERATING_MODE: U8 TorqueOff in 0..=0 = 0, |_, _| 0, |_, _| Ok(());
     /// 1 enables the bridge; refused with a result error before direction_confirmed
     /// is 1 and before a tare was requested. A fault sets 0. 0 sets the goal to 0,
-    /// whatever its own write sets, and stops a measuring motion.
+    /// even if the same write sets another goal, and stops a measuring motion.
     64 TORQUE_ENABLE: U8 ReadWrite in 0..=1 = 0, |view, _| view.settings().command.torque.into(), Staged::set_torque;
     /// Answered instructions: 0 only Ping, 1 also reads, 2 all.
     68 STATUS_RETURN_LEVEL: U8 ReadWrite in 0..=2 = 2, |view, _| view.settings().status_return_level.into(),

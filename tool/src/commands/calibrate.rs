@@ -102,7 +102,8 @@ pub fn calibrate(args: &Calibrate, client: &mut Client, json: bool) -> Result<()
     procedure.finish()
 }
 
-/// Modulus, and with a scale the sensitivity: a press measures modulus times common gain, a scale that gain.
+/// Solves for the modulus and, with a scale, for the array's sensitivity: a press measures modulus times common gain, a
+/// scale the common gain.
 fn scale(args: &Calibrate, goals_mn: &[i64], modulus: &Modulus, procedure: &mut Procedure<'_>) -> Result<(), Error> {
     let share = modulus.sigma_kpa / modulus.kpa;
     if goals_mn.is_empty() {

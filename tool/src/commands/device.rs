@@ -76,7 +76,7 @@ const SHOWN: &str = "chip_id return_delay_time torque_enable bus_watchdog hardwa
                      reset_cause crash_cause crash_count good_packets result_errors instruction_errors crc_errors \
                      range_errors length_errors limit_errors access_errors framing_errors";
 
-/// Name of a register whose number has the register's scale in it.
+/// Name of a register, with the unit in which its number is shown.
 fn scaled_name(register: &Register) -> String {
     match register.address {
         address::RETURN_DELAY_TIME => "return_delay_us".into(),

@@ -354,7 +354,8 @@ pub(super) const DIRECTION: &str = "direction_confirmed";
 const WRITTEN: &str = "written";
 
 impl Session {
-    /// Names of what has neither its value before the session nor, with `written`, one that it began to write.
+    /// Names of parameters, and `gains`, that have neither the value before the session nor, with `written`, one that the
+    /// session sent.
     fn changed(&self, now: &Settings, written: bool) -> Vec<&'static str> {
         let written = if written { self.numbers(WRITTEN) } else { &[] };
         let sent: Vec<Settings> = written.iter().filter_map(Settings::of).chain([self.before.clone()]).collect();

@@ -117,10 +117,10 @@ struct Counts {
     last_s: f64,
 }
 
-/// Counts of a recording, and the reason of a loss.
+/// Counts of a recording, and the error that ended it, if any.
 type Taken = (Counts, Option<Error>);
 
-/// Records states until an end.
+/// Records states until the time is over, a signal comes, or the controller is lost.
 fn take(args: &Args, client: &mut Client, interrupt: &Interrupt, sink: &mut dyn Sink) -> Result<Taken, Error> {
     let period = if args.rate_hz > 0.0 { Duration::from_secs_f64(1.0 / args.rate_hz) } else { Duration::ZERO };
     let (mut counts, mut stamps, mut frame, mut row) = (Counts::default(), Stamps::default(), None, 0);

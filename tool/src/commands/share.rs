@@ -84,7 +84,7 @@ struct Connection {
     ids: BTreeSet<u8>,
     /// Instant of its last packet.
     heard: Option<Instant>,
-    /// Instant from which on its silence is judged, if not judged yet.
+    /// Instant at which its silence is judged again; none before the first time.
     judged: Option<Instant>,
     /// True once another client stopped one of its fingers: it writes no more.
     stopped: bool,
@@ -259,7 +259,7 @@ impl Bus {
     }
 
     /// True once a client has been silent for longer than the bus watchdog of one of its fingers, which reads of others feed.
-    /// Whoever set the watchdog, and by which instruction: the fingers are asked.
+    /// Asks the fingers: it does not matter who set the watchdog, nor by which instruction.
     fn is_silent(&mut self, from: SocketAddr) -> bool {
         let Connection { ids, heard: Some(heard), judged, .. } = &self.connections[&from] else { return false };
         let from_then = *heard + self.client.timeout + Duration::from_secs_f64(RELEASE_S);
@@ -275,8 +275,8 @@ impl Bus {
             self.client.number(address::BUS_WATCHDOG).ok().filter(|steps| *steps > 0)
         });
         // Without a watchdog it may be set yet.
-        let next =
-            steps.min().map_or(Instant::now() + RETRY, |steps| from_then + Duration::from_millis(20) * steps as u32);
+        let within = |steps: i64| Duration::from_millis((stop::WATCHDOG_UNIT_MS * steps) as u64);
+        let next = steps.min().map_or(Instant::now() + RETRY, |steps| from_then + within(steps));
         self.connections.entry(from).or_default().judged = Some(next);
         next <= Instant::now()
     }

@@ -14,8 +14,10 @@ use std::time::{Duration, Instant};
 
 /// Bus watchdog while a command moves the finger: the controller stops the motor after this silence.
 const WATCHDOG_MS: i64 = 500;
-/// The same in steps of the register `bus_watchdog`.
-const WATCHDOG: i64 = WATCHDOG_MS / 20;
+/// Unit of the register `bus_watchdog`, ms.
+pub const WATCHDOG_UNIT_MS: i64 = 20;
+/// [`WATCHDOG_MS`] in this unit.
+const WATCHDOG: i64 = WATCHDOG_MS / WATCHDOG_UNIT_MS;
 /// Longest release at the end of a command, in seconds of the controller's clock.
 const RELEASE_S: f64 = 10.0;
 /// Longest wait for the controller, for example if no frames come and its clock does not advance.
@@ -212,7 +214,7 @@ fn stop(client: &mut Client, releases: bool, json: bool) -> Result<Value, Error>
         let shown = match watchdog {
             0 => "off".into(),
             ..0 => "tripped".into(),
-            steps => format!("{} ms", 20 * steps),
+            steps => format!("{} ms", WATCHDOG_UNIT_MS * steps),
         };
         say(format_args!("torque is off, measurements are aborted, the bus watchdog is {now} (it was {shown})"));
         if let Some(fault) = after.fault_name() {

@@ -25,7 +25,7 @@ fn answered(finger: &Served, arguments: &[&str], answers: &str) -> (Option<i32>,
     served::ended(&child.wait_with_output().expect("it ends"))
 }
 
-/// A command that reads its answers there.
+/// Starts a command that reads its answers from this input.
 fn spawned(finger: &Served, arguments: &[&str], answers: impl Into<Stdio>) -> Child {
     let mut command = finger.fingertip(arguments);
     command.stdin(answers).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("it starts")

@@ -1,4 +1,5 @@
-//! Reports in a real browser, in various looks. `cargo xtask test` installs the browser and runs this.
+//! Reports in a real browser, light and dark, on a screen and on a phone. `cargo xtask test` installs the browser and
+//! runs this.
 //!
 //! The pictures that it takes lie in `target/tmp`.
 

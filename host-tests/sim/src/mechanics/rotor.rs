@@ -301,8 +301,8 @@ pub enum Unreachable {
 /// The voltage is at most that of the supply.
 ///
 /// The drive uses the limits of voltage and current, then brakes with them, and switches once: the time-optimal profile
-/// for a shaft with friction against a load that depends on the place. Bisection (shooting) on the equations of motion
-/// of the plant finds the switch time.
+/// for a shaft with friction against a load that depends on the place. The switch time is found by shooting: bisection on
+/// the plant's equations of motion.
 pub fn profile(
     setup: &Setup,
     d_from_mm: f64,

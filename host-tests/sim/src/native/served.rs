@@ -54,7 +54,7 @@ struct Device {
     broken: Option<Broken>,
     /// The last frame as the controller received it, with what is broken.
     frame: Frame,
-    /// Time of its end, and supply voltage that the controller sensed with it.
+    /// Time of that frame's end, and supply voltage that the controller sensed with that frame.
     frame_time_us: u32,
     supply_mv: u16,
     reboot_s: Option<f64>,

@@ -231,7 +231,7 @@ fn a_report_lies_over_another_whatever_the_scenes_are_called() {
     }
 }
 
-/// Records a run, every so many frames as messages; its file, trace and outcome.
+/// Runs a scene with a recorder that writes every n-th frame as a message. Returns the file, the trace and the outcome.
 fn recorded(name: &str, scene: &Scene, every: u64) -> (PathBuf, (Trace, Outcome)) {
     let path = folder(&format!("recorded/{name}")).join("run.mcap");
     let mut recorder = Recorder::new(&path, scene, every).unwrap();

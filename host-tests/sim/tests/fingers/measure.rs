@@ -115,7 +115,7 @@ fn presses_complete(count: usize) {
     assert!((0.5..3.0).contains(&honest), "the uncertainty is {honest:.2} times the error");
 }
 
-/// Where an object is, mm, by its distance and the time, s.
+/// Position of an object, mm, from its distance and the time, s.
 type Place = fn(f64, f64) -> f64;
 
 const VANISHES: Place = |distance_mm, time_s| if time_s > 1.0 + 0.2 * distance_mm { 1e3 } else { distance_mm };

@@ -27,7 +27,12 @@ const RELEASE: Duration = Duration::from_secs(2);
 
 /// Words for an early end: reason with its number, and what to do.
 fn ended_early(task: Task, number: i64, value: i64) -> Error {
-    let what = format!("{task:?}").to_lowercase();
+    let what = match task {
+        Task::Stop => "motion",
+        Task::Jog => "jog",
+        Task::Strokes => "strokes",
+        Task::Press => "press",
+    };
     let why = match u8::try_from(number).ok().and_then(Reason::of) {
         None => table::meaning(address::MEASURE_ENDED, number),
         Some(reason) => record::Ended { reason, value: value as i32 }.to_string(),
@@ -333,7 +338,7 @@ impl Procedure<'_> {
     }
 }
 
-/// Shown and read forces of holds, the latter as after the change of each taxel's gain by its factor.
+/// Shown and read forces of holds. The read ones are those after each taxel's gain has changed by its factor.
 pub fn held(holds: &[Value], factors: &[f64]) -> Vec<Held> {
     let one = |hold: &Value| {
         let pressures = hold["pressures_pa"].as_array()?.iter().filter_map(Value::as_f64);

@@ -14,7 +14,7 @@ pub const PROGRAMS: &str = "debug";
 /// Selects all tests, with the features that [`SHARED`] gives to programs: crates that both use are compiled once.
 pub const TESTS: &str = "--workspace --features=fingertip-cli/foxglove --ignore-rust-version";
 /// Selects the packages that bring most dependencies, next to a program's own: cargo unifies their features.
-pub const SHARED: &str = "--package=virtual-board --package=serve --package=browser --package=fingertip-cli \
+pub const SHARED: &str = "--package=virtual-board --package=serve --package=fingertip-cli \
                           --features=fingertip-cli/foxglove";
 /// Selects what the demonstration's two programs need, and no more.
 const LEAST: &str = "--package=sim --package=virtual-board --no-default-features";

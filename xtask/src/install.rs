@@ -1,7 +1,7 @@
 //! What the commands install: Debian packages where they are missing, and Python environments.
 //!
 //! Apt's package lists and downloads are kept in the build folder, so its own lists, caches and sources stay as they are. The
-//! environments have clients of the bus, readers of a sweep's files, and the fit of a real sensor.
+//! environments have clients of the bus, the driver of a browser, and the fit of a real sensor.
 
 use crate::console::Console;
 use crate::{host, sim};
@@ -143,14 +143,22 @@ fn is_root() -> bool {
 /// Names of the program on various systems.
 const BROWSERS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
 
-/// Finds a Chromium, or installs Debian's; with fonts, without which a page has no letters.
-pub fn browser(console: &mut Console) -> Result<PathBuf> {
+const PLAYWRIGHT: Environment = Environment {
+    folder: "venv-browser",
+    packages: &["playwright==1.65.2"],
+    imports: "playwright.sync_api",
+    does: "the test that opens reports drives the browser with it",
+};
+
+/// Finds or installs a browser, with fonts, without which a page has no letters. Returns the interpreter that drives it,
+/// and the browser.
+pub fn browser(console: &mut Console) -> Result<[PathBuf; 2]> {
     let find = || BROWSERS.into_iter().find_map(host::find_program);
-    if let Some(program) = find() {
-        return Ok(program);
+    if find().is_none() {
+        packages(&["chromium", "fonts-dejavu-core"], "the test that opens reports in a browser", console)?;
     }
-    packages(&["chromium", "fonts-dejavu-core"], "the test that opens reports in a browser", console)?;
-    find().context("Debian's package `chromium` is installed, but no `chromium` is in PATH")
+    let program = find().context("Debian's package `chromium` is installed, but no `chromium` is in PATH")?;
+    Ok([environment(&PLAYWRIGHT, console)?, program])
 }
 
 /// A virtual environment in the build folder.

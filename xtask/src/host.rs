@@ -30,7 +30,7 @@ pub struct Program {
 pub const NATIVE_DEMO: Program = Program { package: "sim", name: "demo", with: LEAST };
 /// The native core behind a port.
 pub const SERVE: Program = Program { package: "serve", name: "serve", with: SHARED };
-/// The emulated board without scenes and without the text of the log.
+/// The emulated board without scenes.
 pub const BOARD: Program = Program { package: "virtual-board", name: "virtual-board", with: LEAST };
 /// The emulated board with all that it can.
 pub const SCENE_BOARD: Program = Program { with: SHARED, ..BOARD };

@@ -166,7 +166,6 @@ impl Bench {
         }
         if session.resets().len() != self.resets {
             self.resets = session.resets().len();
-            self.log.restart();
             self.clock.restarted(host);
             if std::mem::take(&mut self.core_held) {
                 host.hold(false);
@@ -177,7 +176,7 @@ impl Bench {
             host.turn(now_ns, now_ns + self.grid_ns, received, seen, session.board_mut().wire());
         }
         if now_ns.is_multiple_of(LOG_NS) {
-            self.log.drain(now_ns, host);
+            self.log.drain(host);
         }
     }
 

@@ -1,4 +1,4 @@
-//! The flash image: its bytes, its symbols, its log table.
+//! The flash image: its bytes and its symbols.
 
 use crate::Error;
 use crate::rig::Rig;

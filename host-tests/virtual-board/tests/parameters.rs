@@ -77,9 +77,9 @@ fn stored_parameters_outlive_long_times_full_sectors_and_damage() {
     let mut rig = start();
     a_parameter_and_torque_in_one_packet_both_act(&mut rig);
     a_save_with_the_longest_times_is_no_fault_and_no_reset(&mut rig);
-    assert!(!tells_of_a_record(&mut rig, 0));
-    after_a_save_cut_short_the_old_values_count_and_fault_8_says_so(&mut rig);
-    damaged_parameters_are_a_fault_that_the_bus_tells(&mut rig);
+    let sound = messages_of_a_start(&mut rig, encode(&record(1_700), 1).to_vec());
+    after_a_save_cut_short_the_old_values_count_and_fault_8_says_so(&mut rig, sound);
+    damaged_parameters_are_a_fault_that_the_bus_tells(&mut rig, sound);
     nearly_full_sectors_take_turns(&mut rig);
 }
 
@@ -145,27 +145,34 @@ fn nearly_full_sectors_take_turns(rig: &mut Rig) {
     rig.check_gaps().expect("no unknown gap");
 }
 
-fn after_a_save_cut_short_the_old_values_count_and_fault_8_says_so(rig: &mut Rig) {
+fn after_a_save_cut_short_the_old_values_count_and_fault_8_says_so(rig: &mut Rig, sound: usize) {
     let mut records = encode(&Record { id: 1, ..record(1_111) }, 1).to_vec();
     records.extend(&encode(&record(1_222), 2)[..200]);
-    start_with(rig, records, Vec::new());
-    rig.run_ms(START_MS).expect("it runs");
+    let told = messages_of_a_start(rig, records);
     assert_eq!((pitch_um(rig), read_u8(rig, address::FAULT)), (1_111, 8));
+    // Of the record, and of the fault.
+    assert_eq!(told, sound + 2, "messages of the log");
 }
 
-fn damaged_parameters_are_a_fault_that_the_bus_tells(rig: &mut Rig) {
+fn damaged_parameters_are_a_fault_that_the_bus_tells(rig: &mut Rig, sound: usize) {
     let from_ns = rig.now_ns();
-    start_with(rig, vec![0x55; 64], Vec::new());
-    rig.run_ms(START_MS).expect("it runs");
+    let told = messages_of_a_start(rig, vec![0x55; 64]);
     assert_eq!(read_u8(rig, address::FAULT), Fault::BrokenParameters as u8);
-    assert!(tells_of_a_record(rig, from_ns));
+    // Of the record, and of the fault.
+    assert_eq!(told, sound + 2, "messages of the log");
     assert_ne!(refused(rig, address::TORQUE_ENABLE, &[1]) & 0x7f, 0, "torque stays off in a fault");
     assert_eq!(read_u8(rig, address::PRESENT_MODE), 5);
     assert!(rig.bridge_edges().expect("it runs").iter().all(|edge| edge.at_ns < from_ns || !edge.on));
 }
 
-/// True if the log has warned of a record since an instant.
-fn tells_of_a_record(rig: &mut Rig, from_ns: u64) -> bool {
-    let mut lines = rig.log().expect("it runs").into_iter().filter(|(at_ns, _)| *at_ns > from_ns);
-    lines.any(|(_, line)| !line.starts_with("info") && line.contains("record"))
+/// Lets the board start with these bytes in its first sector. Returns the number of messages in its log.
+fn messages_of_a_start(rig: &mut Rig, stored: Vec<u8>) -> usize {
+    let messages = |stand: &mut Stand<'_>| {
+        stand.bench.log.drain(stand.host);
+        stand.bench.log.messages
+    };
+    start_with(rig, stored, Vec::new());
+    let before = rig.with(messages).expect("it runs");
+    rig.run_ms(START_MS).expect("it runs");
+    rig.with(messages).expect("it runs") - before
 }

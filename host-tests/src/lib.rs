@@ -9,6 +9,7 @@ pub mod fit_cases;
 pub mod fit_statistics;
 pub mod long_run;
 pub mod page;
+pub mod paper;
 pub mod program;
 /// The proof of the model's error bounds: every result against its exact value.
 ///

@@ -14,9 +14,7 @@ use fingertip::params::Params;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{Array, Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
 use fingertip::state::Limits;
-use fingertip::units::{Millimetres, Newtons};
-use paper::units::Ratio;
-use paper::{Relaxation, RelaxationState, RelaxationTerm};
+use fingertip::units::Millimetres;
 use sim::cores;
 
 /// Inputs that a run represents.
@@ -204,8 +202,7 @@ const CALM_TRAVEL_SWING: i64 = 12;
 const SPEED_SWING: i64 = 131;
 const DISTURBANCE_SWING: i64 = 1_024;
 
-/// All machines. With `whole`, those that are quick enough also take all their steps one by one, and the relaxation has
-/// its longest time constant.
+/// All machines. With `whole`, those that are quick enough also take all their steps one by one.
 pub fn all(whole: bool) -> Vec<Outcome> {
     let mut runs: Vec<Run> = Vec::new();
     for (scan, settle_ns, sample_cycles) in SCANS {
@@ -218,7 +215,6 @@ pub fn all(whole: bool) -> Vec<Outcome> {
     }
     queue(&mut runs, baselines(), false);
     queue(&mut runs, tares(), false);
-    queue(&mut runs, relaxations(whole), whole);
     queue(&mut runs, windings(whole), whole);
     cores::map(runs, |run| run())
 }
@@ -380,34 +376,6 @@ fn tares() -> Vec<Machine<Array>> {
             inputs: 2 * u64::from(TARE_FRAMES),
             step: Box::new(move |array: &mut Array| frames.iter().for_each(|frame| tare(array, frame, &config))),
             outputs: vec![("sum of the tares", tare_sum, 0)],
-        }
-    };
-    inputs.map(machine).into()
-}
-
-/// Three terms from the shortest to the longest time constant.
-fn relaxations(longest: bool) -> Vec<Machine<RelaxationState<3>>> {
-    let period_us = 94;
-    let periods = if longest { paper::PERIODS_MAX } else { 1 << 14 };
-    let terms = [(20_000, 1), (20_000, 1_000), (25_536, periods)];
-    let terms = terms.map(|(share, periods)| RelaxationTerm {
-        share: Ratio::from_bits(share),
-        time_constant_us: periods * period_us,
-    });
-    let inputs =
-        [("none", [0; 2]), ("the least", [1; 2]), ("the largest", [i32::MAX; 2]), ("extremes in turns", [0, i32::MAX])];
-    let machine = |(input, pair): (&str, [i32; 2])| {
-        let filter = Relaxation::new(period_us, &terms).expect("allowed");
-        Machine {
-            name: format!("relaxation over {periods} periods, force {input}"),
-            start: RelaxationState::settled(Newtons::from_bits(1 << 20)),
-            inputs: 2,
-            step: Box::new(move |state: &mut RelaxationState<3>| {
-                for force in pair.map(Newtons::from_bits) {
-                    filter.step(state, force);
-                }
-            }),
-            outputs: vec![],
         }
     };
     inputs.map(machine).into()

@@ -5,8 +5,6 @@ use crate::common::*;
 use fingertip::config::ConfigError;
 use fingertip::params::ParamError;
 use fingertip::scan::{ScanError, ScanTiming};
-use paper::units::Ratio;
-use paper::{Relaxation, RelaxationError, RelaxationTerm};
 
 fn warned(config: &Config) -> Vec<String> {
     let mut warned = Vec::new();
@@ -142,27 +140,4 @@ fn a_scan_that_the_hardware_cannot_time() {
     assert_eq!(refused(&params).to_string(), "sample_cycles of 16: [3, 15, 28, 56, 84, 112, 144, 480] are allowed");
     let error = ScanTiming::new(400_000, 15, [10, 10], &CLOCKS).unwrap_err();
     assert_eq!(error.to_string(), "settle_ns and sample_cycles make a slot of 68328 ticks: 65535 are allowed");
-}
-
-#[test]
-fn a_relaxation_by_each_of_its_parts() {
-    let term = |share: i32, time_constant_us: u32| RelaxationTerm { share: Ratio::from_bits(share), time_constant_us };
-    let sound = term(1 << 14, 1_000);
-    let refused =
-        |period_us: u32, terms: [RelaxationTerm; 2]| Relaxation::new(period_us, &terms).map(drop).expect_err("refused");
-    assert_eq!(refused(0, [sound; 2]), RelaxationError::Period);
-    let cases = [
-        (refused(0, [sound; 2]), "a period of 0 us: at least 1 us is needed"),
-        (refused(100, [sound, term(-1, 1_000)]), "term 1 has the share -0.00002: 0 to 1 are covered"),
-        (refused(100, [term(65_537, 1_000), sound]), "term 0 has the share 1.00002: 0 to 1 are covered"),
-        (refused(100, [term(1 << 15, 1_000), term((1 << 15) + 1, 1_000)]), "the shares add up to 65537/65536"),
-        (refused(100, [sound, term(1, 99)]), "term 1 has a time constant of 99 us: 100 to 104857600 us are covered"),
-        (
-            refused(100, [term(1, 104_857_601), sound]),
-            "term 0 has a time constant of 104857601 us: 100 to 104857600 us are covered",
-        ),
-    ];
-    for (error, text) in cases {
-        assert!(error.to_string().starts_with(text), "{error}");
-    }
 }

@@ -44,9 +44,7 @@ fn main() -> ExitCode {
             all
         });
     let grid = judged("A grid of the reference tip, pressures by integers", |progress| {
-        let mut all = exact::pressures(&tip, 4_000 / share, 2_500, progress).to_vec();
-        all.extend(random::touching_angles(&tip, 1_000_000 / share, progress));
-        all
+        exact::pressures(&tip, 4_000 / share, 2_500, progress).to_vec()
     });
     let points = judged("Boundaries and random points of the whole domain, also by integers", |progress| {
         let mut all = random::boundaries(progress);
@@ -55,12 +53,7 @@ fn main() -> ExitCode {
         all.to_vec()
     });
     let rest = judged("The rest of the model at random points", |progress| {
-        let points = 0..200_000 / share;
-        let mut all = reference::geometry(points.clone(), progress).to_vec();
-        all.extend(reference::tilt(points.clone(), progress));
-        all.extend(reference::friction(points, progress));
-        all.extend(reference::relaxation(0..1_000_000 / share / 1_000, progress));
-        all
+        reference::columns(0..200_000 / share, progress).to_vec()
     });
     let sections = [inputs, grid, points, rest];
     let (oracle, unread) = match reference::check() {

@@ -13,66 +13,44 @@ pub const SEED: u64 = 0x2003_0914;
 
 const CHUNK: u64 = 1_000;
 
-/// Ratio of all points to those whose angle is also checked: the reference's arc tangent takes ten times as long as
-/// the rest together.
-const ANGLE_EVERY: u64 = 10;
-
-/// Tallies without results: force, indentation, contact radius, stiffness, pressure and touching angle.
-const TALLIES: [Tally; 6] = [
+/// Tallies without results: force, indentation, contact radius, stiffness and pressure.
+const TALLIES: [Tally; 5] = [
     Tally::new("F(d)", 0.5),
     Tally::new("d(F)", 0.5),
     Tally::new("r_c(d)", 0.5),
     Tally::new("k(d)", 0.5),
     Tally::new("p(r, d)", 0.5),
-    Tally::new("theta_max(d)", 1.0),
 ];
 
 /// Random tips, depths, forces and distances.
-pub fn points(range: Range<u64>, progress: Progress<'_>) -> [Tally; 6] {
+pub fn points(range: Range<u64>, progress: Progress<'_>) -> [Tally; 5] {
     parallel(range, CHUNK, TALLIES, progress, |range, tallies| {
         let mut rng = Rng::with_seed(SEED ^ range.start);
-        for place in range {
+        for _ in range {
             let Point { tip, d, force, r } = Point::random(&mut rng);
             let reference = Reference::new(&tip);
-            let [by_depth @ .., by_angle] = tallies;
-            depth(&tip, &reference, d, by_depth);
-            indentation(&tip, &reference, force, &mut by_depth[1]);
-            pressure(&tip, &reference, r, d, &mut by_depth[4]);
-            if place % ANGLE_EVERY == 0 {
-                touching_angle_max(&tip, &reference, d, by_angle);
-            }
+            depth(&tip, &reference, d, tallies);
+            indentation(&tip, &reference, force, &mut tallies[1]);
+            pressure(&tip, &reference, r, d, &mut tallies[4]);
         }
     })
 }
 
 /// Every combination of boundary tips with boundary depths, forces and distances.
-pub fn boundaries(progress: Progress<'_>) -> [Tally; 6] {
+pub fn boundaries(progress: Progress<'_>) -> [Tally; 5] {
     let tips = boundary_tips();
     parallel(0..tips.len() as u64, 1, TALLIES, progress, |range, tallies| {
         for tip in &tips[range.start as usize..range.end as usize] {
             let reference = Reference::new(tip);
-            let [by_depth @ .., by_angle] = tallies;
             for force in boundary_forces(tip) {
-                indentation(tip, &reference, force, &mut by_depth[1]);
+                indentation(tip, &reference, force, &mut tallies[1]);
             }
             for d in boundary_depths(tip) {
-                depth(tip, &reference, d, by_depth);
-                touching_angle_max(tip, &reference, d, by_angle);
+                depth(tip, &reference, d, tallies);
                 for r in boundary_distances(tip, d) {
-                    pressure(tip, &reference, r, d, &mut by_depth[4]);
+                    pressure(tip, &reference, r, d, &mut tallies[4]);
                 }
             }
-        }
-    })
-}
-
-/// The touching angle at `count` depths of a tip, evenly spread.
-pub fn touching_angles(tip: &Tip, count: u64, progress: Progress<'_>) -> [Tally; 1] {
-    let reference = Reference::new(tip);
-    let top = tip.depth_max().to_bits() as u64;
-    parallel(1..count + 1, CHUNK, [Tally::new("theta_max(d)", 1.0)], progress, |range, [tally]| {
-        for place in range {
-            touching_angle_max(tip, &reference, (place * top / count).max(1) as i32, tally);
         }
     })
 }
@@ -102,12 +80,6 @@ fn pressure(tip: &Tip, reference: &Reference, r: i32, d: i32, tally: &mut Tally)
     let by_reference = error_ulp(p, 16, &reference.pressure(&real(r, 24), &real(d, 24)));
     let by_integers = exact::pressure(tip, r.min(tip.radius().to_bits()), d, p, 2);
     tally.add(agreed(by_integers, by_reference), at(tip, d, r));
-}
-
-fn touching_angle_max(tip: &Tip, reference: &Reference, d: i32, tally: &mut Tally) {
-    let angle = paper::touching_angle_max(tip, mm(d)).to_bits();
-    let by_reference = error_ulp(angle, 24, &reference.touching_angle_max(&real(d, 24)));
-    tally.add(Judged::by_error(by_reference, tally.bound_ulp), at(tip, d, 0));
 }
 
 /// The integers' verdict, refused where the two judges do not see the same error.

@@ -212,7 +212,7 @@ pub const EFFECTS: &[Description] = &[
             "F_e < share q: the tip has not recovered and does not touch; then tau_s dq/dt = (share - 1) q",
         ],
         state: "relaxed force, N",
-        reference: "Fung, Biomechanics, 1993, 7.6; not in Park, Kim, Hirai 2003; in fixed point: paper::Relaxation",
+        reference: "Fung, Biomechanics, 1993, 7.6; not in Park, Kim, Hirai 2003",
         keys: &[
             Key::number("share", "Share of the force that is lost in the end.", 0.0, 0.95, 0.15),
             Key::number("tau_s", "Time constant.", 0.0001, 10000.0, 0.5),

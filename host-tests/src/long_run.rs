@@ -1,4 +1,4 @@
-//! Filters and integrators over 10^9 steps.
+//! Filters and integrators over any number of steps.
 //!
 //! Each is a machine with finitely many states. Under an input that repeats it must come to a state that it was in
 //! before, and from then on it repeats itself for ever: finding that cycle proves what any number of steps would show.
@@ -16,9 +16,6 @@ use fingertip::shipped::{Array, Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAME
 use fingertip::state::Limits;
 use fingertip::units::Millimetres;
 use sim::cores;
-
-/// Inputs that a run represents.
-pub const STEPS: u64 = 1_000_000_000;
 
 /// End state of a machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,8 +51,6 @@ pub struct Outcome {
     /// The machine and its input.
     pub name: String,
     pub cycle: Cycle,
-    /// Number of inputs that were applied one by one.
-    pub taken: u64,
     /// Name, swing within the cycle and documented swing of each output, in units of the last place.
     pub swings: Vec<(&'static str, i64, i64)>,
 }
@@ -71,7 +66,7 @@ impl std::fmt::Display for Outcome {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Cycle { lead, length } = self.cycle;
         let kind = if length == 1 { "rests".into() } else { format!("repeats every {length} periods") };
-        write!(f, "{}: {kind} after {lead} periods, {} inputs taken;", self.name, self.taken)?;
+        write!(f, "{}: {kind} after {lead} periods;", self.name)?;
         for (name, swing, allowed) in &self.swings {
             write!(f, " {name} swings {swing} of {allowed}")?;
         }
@@ -84,8 +79,6 @@ pub struct Machine<S> {
     /// Name of the machine and its input.
     pub name: String,
     pub start: S,
-    /// Number of inputs in a period.
-    pub inputs: u64,
     /// One period of the input.
     pub step: Box<dyn Fn(&mut S) + Send>,
     /// The outputs, with the swing allowed in a cycle.
@@ -96,9 +89,8 @@ pub struct Machine<S> {
 pub type Output<S> = (&'static str, fn(&S) -> i64, i64);
 
 impl<S: Clone + PartialEq + 'static> Machine<S> {
-    /// Finds the cycle and measures it. With `whole`, all [`STEPS`] are also taken one by one, and must end
-    /// where the cycle says.
-    pub fn run(&self, most: u64, whole: bool) -> Outcome {
+    /// Finds the cycle and measures it.
+    pub fn run(&self, most: u64) -> Outcome {
         let found = cycle(&self.start, most, &self.step);
         let (cycle, begin) = found.unwrap_or_else(|| panic!("{}: no cycle within {most} steps", self.name));
         let mut state = begin.clone();
@@ -110,24 +102,9 @@ impl<S: Clone + PartialEq + 'static> Machine<S> {
                 *range = (range.0.min(value), range.1.max(value));
             }
         }
-        let mut taken = (cycle.lead + 2 * cycle.length) * self.inputs;
-        if whole {
-            self.whole(&cycle, &begin);
-            taken = STEPS;
-        }
         let swings =
             self.outputs.iter().zip(ranges).map(|((name, _, allowed), (low, high))| (*name, high - low, *allowed));
-        Outcome { name: self.name.clone(), cycle, taken, swings: swings.collect() }
-    }
-
-    fn whole(&self, cycle: &Cycle, begin: &S) {
-        let mut state = self.start.clone();
-        let steps = STEPS / self.inputs;
-        (0..steps).for_each(|_| (self.step)(&mut state));
-        // `begin` lies a whole number of cycles after the lead.
-        let mut expected = begin.clone();
-        (0..(steps - cycle.lead) % cycle.length).for_each(|_| (self.step)(&mut expected));
-        assert!(state == expected, "{}: {steps} periods do not end in the cycle", self.name);
+        Outcome { name: self.name.clone(), cycle, swings: swings.collect() }
     }
 }
 
@@ -177,7 +154,7 @@ pub fn hold(name: &str, torque: bool, goal_mn: i32, codes: u16, most: u64) -> (O
         taken += next + PERIOD;
         if state(&pipeline, shown.sequence) == before {
             let cycle = Cycle { lead: taken - PERIOD, length: PERIOD };
-            return (Outcome { name: name.into(), cycle, taken, swings: vec![] }, status);
+            return (Outcome { name: name.into(), cycle, swings: vec![] }, status);
         }
         next *= 2;
     }
@@ -202,20 +179,18 @@ const CALM_TRAVEL_SWING: i64 = 12;
 const SPEED_SWING: i64 = 131;
 const DISTURBANCE_SWING: i64 = 1_024;
 
-/// All machines. With `whole`, those that are quick enough also take all their steps one by one.
-pub fn all(whole: bool) -> Vec<Outcome> {
+/// All machines, the winding with its usual or its longest lags.
+pub fn all(longest: bool) -> Vec<Outcome> {
     let mut runs: Vec<Run> = Vec::new();
     for (scan, settle_ns, sample_cycles) in SCANS {
         let config = Config::shipped(&Params { settle_ns, sample_cycles, ..cool() }).expect("allowed");
-        // Every single step is taken for the default scan only.
-        let whole = whole && scan == "default";
-        queue(&mut runs, observers(scan, &config), whole);
-        queue(&mut runs, drives(scan, &config), whole);
-        queue(&mut runs, loops(scan, &config), whole);
+        queue(&mut runs, observers(scan, &config));
+        queue(&mut runs, drives(scan, &config));
+        queue(&mut runs, loops(scan, &config));
     }
-    queue(&mut runs, baselines(), false);
-    queue(&mut runs, tares(), false);
-    queue(&mut runs, windings(whole), whole);
+    queue(&mut runs, baselines());
+    queue(&mut runs, tares());
+    queue(&mut runs, windings(longest));
     cores::map(runs, |run| run())
 }
 
@@ -227,8 +202,8 @@ pub fn cool() -> Params {
 
 type Run = Box<dyn FnOnce() -> Outcome + Send>;
 
-fn queue<S: Clone + PartialEq + Send + 'static>(runs: &mut Vec<Run>, machines: Vec<Machine<S>>, whole: bool) {
-    runs.extend(machines.into_iter().map(|machine| Box::new(move || machine.run(MOST, whole)) as Run));
+fn queue<S: Clone + PartialEq + Send + 'static>(runs: &mut Vec<Run>, machines: Vec<Machine<S>>) {
+    runs.extend(machines.into_iter().map(|machine| Box::new(move || machine.run(MOST)) as Run));
 }
 
 /// Encoder and acceleration, held or in turns.
@@ -252,7 +227,6 @@ fn observers(scan: &str, config: &Config) -> Vec<Machine<Observer>> {
         Machine {
             name: format!("observer, {scan} scan, gain set {gain_set}, {input}"),
             start: Observer::new(),
-            inputs: 2,
             step: Box::new(move |observer: &mut Observer| {
                 let gains = &config.gain_sets[gain_set];
                 pair.iter()
@@ -278,7 +252,6 @@ fn drives(scan: &str, config: &Config) -> Vec<Machine<Drive>> {
         Machine {
             name: format!("drive, {scan} scan, {input} wanted"),
             start: Drive::new(),
-            inputs: 2,
             step: Box::new(move |drive: &mut Drive| {
                 for wanted in pair {
                     drive.apply(wanted, 0, SUPPLY_MV, &config, &mut Limits::default());
@@ -299,7 +272,6 @@ fn loops(scan: &str, config: &Config) -> Vec<Machine<SpeedLoop>> {
         Machine {
             name: format!("speed loop, {scan} scan, blocked motor, error {input}"),
             start: SpeedLoop::new(),
-            inputs: 2,
             step: Box::new(move |motion: &mut SpeedLoop| {
                 for way in pair.map(Millimetres::from_bits) {
                     motion.observe(0, &config);
@@ -342,7 +314,6 @@ fn baselines() -> Vec<Machine<Array>> {
         Machine {
             name: format!("baseline, {input}"),
             start,
-            inputs: ROWS as u64,
             step: Box::new(move |array: &mut Array| {
                 // Ten rows, one a frame: the shortest time after which the same row meets the same frame.
                 for frame in frames.iter().cycle().take(ROWS) {
@@ -373,7 +344,6 @@ fn tares() -> Vec<Machine<Array>> {
         Machine {
             name: format!("tare, {input}"),
             start: Array::new(),
-            inputs: 2 * u64::from(TARE_FRAMES),
             step: Box::new(move |array: &mut Array| frames.iter().for_each(|frame| tare(array, frame, &config))),
             outputs: vec![("sum of the tares", tare_sum, 0)],
         }
@@ -393,7 +363,6 @@ fn windings(longest: bool) -> Vec<Machine<Winding>> {
         Machine {
             name: format!("winding over {} s, {input}", housing_time_ms / 1_000),
             start: Winding::new(),
-            inputs: frames,
             step: Box::new(move |winding: &mut Winding| {
                 for net in currents.into_iter().cycle().take(frames as usize) {
                     winding.observe(net, &config);

@@ -1,5 +1,5 @@
 //! The loop natively: steps, limits, release. The same bounds hold for the flash image on the virtual board. At the end
-//! filters and integrators of the loop over 10^9 steps, by their cycles; `long-run` also takes the steps one by one.
+//! filters and integrators of the loop over any number of steps, by their cycles.
 
 use crate::common::*;
 use fingertip::control::Observer;
@@ -276,9 +276,10 @@ fn the_end_of_the_travel_stops_an_approach() {
     }
 }
 
-#[test]
-fn nothing_in_the_loop_drifts_or_swings() {
-    for outcome in all(false) {
+sim::sizes!(nothing_in_the_loop_drifts_or_swings, rests_or_repeats(false), rests_or_repeats(true));
+
+fn rests_or_repeats(longest: bool) {
+    for outcome in all(longest) {
         assert!(outcome.passes(), "{outcome}");
     }
 }
@@ -339,7 +340,7 @@ fn known_cycles_are_found_and_measured() {
     for (allowed, passes) in [(5, true), (4, false)] {
         let step = Box::new(|x: &mut i64| *x = 5 - *x);
         let outputs: Vec<Output<i64>> = vec![("value", |x| *x, allowed)];
-        let machine = Machine { name: "two-step".into(), start: 0, inputs: 1, step, outputs };
-        assert_eq!(machine.run(100, false).passes(), passes);
+        let machine = Machine { name: "two-step".into(), start: 0, step, outputs };
+        assert_eq!(machine.run(100).passes(), passes);
     }
 }

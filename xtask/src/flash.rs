@@ -1,19 +1,14 @@
 //! Writing an image to a board: the firmware, and for the first hour with a board the image that checks a bare
 //! NUCLEO-F446RE, or the emulated one, and its judge.
 
-use crate::console::Console;
+use crate::console::{self, Console};
 use crate::host::{self, Program};
 use crate::image::{self, Image};
-use crate::option_bytes::{self, PAUSE_MS, Probe};
 use crate::{sim, timing};
 use anyhow::{Context, Result, bail, ensure};
 use clap::ValueEnum;
-use std::io::{BufRead, BufReader, Read, Write};
-use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::time::Duration;
-use std::{iter, thread};
+use std::process::Command;
 
 /// The part on the board, in probe-rs's words.
 const CHIP: &str = "STM32F446RETx";
@@ -55,141 +50,78 @@ pub fn put(image: &Image, probe: Option<&str>, console: &mut Console) -> Result<
         command.args([subcommand, "--chip", CHIP]).args(probe.iter().flat_map(|probe| ["--probe", probe]));
         command
     };
+    let read = |address: u32| {
+        let text = console::output(command("read").args(["b32", &format!("{address:#x}"), "1"]))?;
+        u32::from_str_radix(text.trim(), 16).with_context(|| format!("probe-rs reads {text:?}, not a word"))
+    };
     // First, because this refuses another device.
-    let mut session = Session::open(command("gdb"))?;
-    if let Some(options) = option_bytes::check(&mut session)? {
-        console.say(&format!("Programming brown-out level 3 into the option bytes ({options:#010x} before)."));
-        option_bytes::program(&mut session, options)?;
+    if set_brown_out_level(read, |user| write_options(user, probe))? {
+        console.say("Programmed brown-out level 3 into the option bytes.");
     }
-    drop(session);
     let mut download = command("download");
     download.args(["--verify", "--binary-format", "bin", "--base-address"]);
     console.run(download.arg(format!("{:#x}", image.base)).arg(&image.bin))?;
     console.run(&mut command("reset"))
 }
 
-// One session with a board: `probe-rs gdb`, spoken to in GDB's remote protocol.
-//
-// `probe-rs read` lets a halted core run when it ends, and other commands when they begin or end, as the version has
-// it: no sequence of commands keeps the core halted. The GDB server does until it is killed, and needs no GDB. Its
-// packet `M` writes bytes, but the option keys take words only (RM0390 3.8.3): so the core itself stores each word, by one
-// stepped instruction in RAM. The library of probe-rs would do both, but adds minutes to the build of this program.
+// The option bytes (RM0390 3.6, 3.8). A write that a reset or a power loss cuts short can leave the device at read protection
+// level 1, and leaving level 1 erases the whole flash. The image's watchdogs reset a halted core too: so OpenOCD writes behind
+// a reset that halts the core before its first instruction, with the watchdogs stopped.
 
-/// Any word of RAM. The reset at the end of the session frees it.
-const RAM: u32 = 0x2000_0000;
-/// `str r1, [r0]`, its bytes in order.
-const STORE: &str = "0160";
+/// Device identifier in its lowest twelve bits (RM0390 33.6.1).
+const DBGMCU_IDCODE: u32 = 0xe004_2000;
+const STM32F446: u32 = 0x421;
+const OPTCR: u32 = 0x4002_3c14;
+/// Zero is level 3, the highest threshold. The factory leaves brown-out reset off.
+const BOR_LEV: u32 = 0b11 << 2;
+/// Read protection, and its level 0. Any other byte but 0xCC is level 1; 0xCC is level 2, for ever.
+const RDP: u32 = 0xff << 8;
+const RDP_LEVEL_0: u32 = 0xaa << 8;
+/// One while only software starts the independent watchdog; zero starts it at reset, and 0.5 s later it resets.
+const WDG_SW: u32 = 1 << 5;
+/// The bits that OpenOCD takes; it keeps the protection of reads and sectors.
+const USER: u32 = 0xfc;
+/// All bits of the register that are option bytes.
+const OPTIONS: u32 = 0x80ff_ffec;
 
-/// The server; the core is left halted, whatever ends it.
-struct Server(Child);
-
-impl Drop for Server {
-    fn drop(&mut self) {
-        // It ended by itself where it cannot be killed.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
+/// Programs brown-out level 3, without which the image refuses torque; all other option bytes stay. False if it is set.
+fn set_brown_out_level(read: impl Fn(u32) -> Result<u32>, write: impl FnOnce(u32) -> Result<()>) -> Result<bool> {
+    let device = read(DBGMCU_IDCODE)? & 0xfff;
+    ensure!(device == STM32F446, "the device has the identifier {device:#x}, an STM32F446 has {STM32F446:#x}");
+    let options = read(OPTCR)?;
+    if options & BOR_LEV == 0 {
+        return Ok(false);
     }
+    ensure!(
+        options & (RDP | WDG_SW) == RDP_LEVEL_0 | WDG_SW,
+        "the option bytes are {options:#010x}: set read protection level 0 and a software watchdog with STM32CubeProgrammer"
+    );
+    write(options & USER & !BOR_LEV)?;
+    let written = read(OPTCR)?;
+    ensure!(
+        written & OPTIONS == options & OPTIONS & !BOR_LEV,
+        "the option bytes are {written:#010x}, they were {options:#010x}: set brown-out level 3 with STM32CubeProgrammer"
+    );
+    Ok(true)
 }
 
-pub struct Session {
-    stream: BufReader<TcpStream>,
-    _server: Option<Server>,
-}
-
-impl Session {
-    /// Starts `probe-rs gdb` with the flags that name the probe, and connects to it.
-    pub fn open(mut command: Command) -> Result<Self> {
-        let address = TcpListener::bind("127.0.0.1:0")?.local_addr()?;
-        command.args(["--gdb-connection-string", &address.to_string()]);
-        let mut server = Server(command.stdin(Stdio::null()).stdout(Stdio::null()).spawn()?);
-        // 20 s.
-        for _ in 0..2000 {
-            // Before the server listens, a connection can come about that is its own other end.
-            match TcpStream::connect(address) {
-                Ok(stream) if stream.local_addr()? != address => return Self::over(stream, Some(server)),
-                _ => {}
-            }
-            if let Some(status) = server.0.try_wait()? {
-                bail!("probe-rs gdb: {status}");
-            }
-            thread::sleep(Duration::from_millis(10));
-        }
-        bail!("probe-rs gdb does not listen on {address}")
+fn write_options(user: u32, probe: Option<&str>) -> Result<()> {
+    if host::find_program("openocd").is_none() {
+        bail!(
+            "the board needs brown-out level 3 once, which OpenOCD programs, and it is not in PATH.\n\
+             Install it (`apt install openocd`), or set BOR level 3 with STM32CubeProgrammer; then try again."
+        );
     }
-
-    fn over(stream: TcpStream, server: Option<Server>) -> Result<Self> {
-        stream.set_read_timeout(Some(Duration::from_secs(5)))?;
-        Ok(Self { stream: BufReader::new(stream), _server: server })
+    let mut command = Command::new("openocd");
+    command.args(["-f", "board/st_nucleo_f4.cfg"]);
+    if let Some(serial) = probe.and_then(|probe| probe.splitn(3, ':').nth(2)) {
+        command.arg("-c").arg(format!("adapter serial {serial}"));
     }
-
-    fn ask(&mut self, request: &str) -> Result<String> {
-        let sum = request.bytes().fold(0, u8::wrapping_add);
-        write!(self.stream.get_mut(), "${request}#{sum:02x}")?;
-        self.reply().with_context(|| format!("probe-rs gdb does not answer {request}"))
-    }
-
-    fn reply(&mut self) -> Result<String> {
-        let mut packed = Vec::new();
-        self.stream.read_until(b'$', &mut Vec::new())?;
-        self.stream.read_until(b'#', &mut packed)?;
-        ensure!(packed.pop() == Some(b'#'), "the connection is closed");
-        self.stream.read_exact(&mut [0; 2])?;
-        self.stream.get_mut().write_all(b"+")?;
-        let (mut text, mut packed) = (String::new(), packed.into_iter());
-        while let Some(byte) = packed.next() {
-            match (byte, text.chars().last()) {
-                // A run: n - 29 more of the same.
-                (b'*', Some(last)) => {
-                    let count = packed.next().unwrap_or_default().saturating_sub(29);
-                    text.extend(iter::repeat_n(last, count.into()));
-                }
-                _ => text.push(byte.into()),
-            }
-        }
-        Ok(text)
-    }
-
-    fn order(&mut self, request: &str) -> Result<()> {
-        let reply = self.ask(request)?;
-        ensure!(reply == "OK", "probe-rs gdb answers {request} with {reply:?}");
-        Ok(())
-    }
-}
-
-impl Probe for Session {
-    fn read(&mut self, address: u32) -> Result<u32> {
-        let reply = self.ask(&format!("m{address:x},4"))?;
-        let word = u32::from_str_radix(&reply, 16).ok().filter(|_| reply.len() == 8);
-        Ok(word.with_context(|| format!("probe-rs gdb reads {reply:?} at {address:#x}, not a word"))?.swap_bytes())
-    }
-
-    fn write(&mut self, address: u32, value: u32) -> Result<()> {
-        self.order(&format!("M{RAM:x},2:{STORE}"))?;
-        for (register, word) in [(0, address), (1, value), (15, RAM)] {
-            self.order(&format!("P{register:x}={:08x}", word.swap_bytes()))?;
-        }
-        let stop = self.ask("vCont;s:1")?;
-        ensure!(stop.starts_with(['S', 'T']), "probe-rs gdb answers a step with {stop:?}");
-        Ok(())
-    }
-
-    fn reset_and_halt(&mut self) -> Result<()> {
-        let hex: String = "reset halt".bytes().map(|byte| format!("{byte:02x}")).collect();
-        let mut reply = self.ask(&format!("qRcmd,{hex}"))?;
-        let mut said = String::new();
-        while let Some(text) = reply.strip_prefix('O').filter(|text| *text != "K") {
-            let bytes =
-                text.as_bytes().chunks(2).filter_map(|pair| u8::from_str_radix(str::from_utf8(pair).ok()?, 16).ok());
-            said.extend(bytes.map(char::from));
-            reply = self.reply()?;
-        }
-        ensure!(said.contains("Target halted"), "probe-rs gdb: {}", said.trim());
-        Ok(())
-    }
-
-    fn pause(&mut self) {
-        thread::sleep(Duration::from_millis(PAUSE_MS));
-    }
+    let write = format!("init; reset halt; stm32f2x options_write 0 {user:#04x}; reset halt; shutdown");
+    console::output(command.arg("-c").arg(write)).map(drop).context(
+        "OpenOCD did not end well: the flash may still be writing, and an interrupted write can lock the device.\n\
+         Do not press reset, and leave the board powered for 2 s more. Then try again.",
+    )
 }
 
 pub const BRINGUP: &str = "bringup";
@@ -301,70 +233,55 @@ fn find_port() -> Result<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::cell::Cell;
 
-    use std::net::Shutdown;
+    /// Factory setting: brown-out reset off, read protection off, no sector protected, software watchdog.
+    const FACTORY: u32 = 0x0fff_aaed;
 
-    /// A session with a server that answers each request with the next of these packets, then no more.
-    fn session(packets: &'static [&'static str]) -> (Session, thread::JoinHandle<Vec<String>>) {
-        let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
-        let stream = TcpStream::connect(listener.local_addr().expect("its number")).expect("a connection");
-        let server = thread::spawn(move || {
-            let mut stream = BufReader::new(listener.accept().expect("a connection").0);
-            let answer = |packets: &&str| {
-                let mut request = Vec::new();
-                stream.read_until(b'#', &mut request).expect("a request");
-                stream.read_exact(&mut [0; 2]).expect("its sum");
-                stream.get_mut().write_all(format!("+{packets}").as_bytes()).expect("an answer");
-                String::from_utf8(request).expect("text").trim_start_matches('+').into()
-            };
-            let requests = packets.iter().map(answer).collect();
-            stream.get_ref().shutdown(Shutdown::Write).expect("an end");
-            stream.read_to_end(&mut Vec::new()).expect("the end of the session");
-            requests
-        });
-        (Session::over(stream, None).expect("a session"), server)
+    /// Tries it on a device whose options become `after` by a write: what was written, and the result.
+    fn tried(device: u32, before: u32, after: u32) -> (Option<u32>, Result<bool>) {
+        let (options, user) = (Cell::new(before), Cell::new(None));
+        let read = |address| Ok(if address == DBGMCU_IDCODE { device } else { options.get() });
+        let write = |value| {
+            user.set(Some(value));
+            options.set(after);
+            Ok(())
+        };
+        let result = set_brown_out_level(read, write);
+        (user.get(), result)
     }
 
     #[test]
-    fn a_server_that_finds_no_board_is_told() {
-        let error = Session::open(Command::new("false")).err().expect("an error").to_string();
-        assert_eq!(error, "probe-rs gdb: exit status: 1");
+    fn only_the_brown_out_level_changes() {
+        let device = 0x1000_6421;
+        let (user, result) = tried(device, FACTORY, FACTORY & !BOR_LEV);
+        assert!(result.is_ok_and(|written| written) && user == Some(0xe0), "{user:x?}");
+        // Sectors 1 and 2 protected, no reset in stop mode; the lock bit is no option.
+        let protected = 0x0ff9_aaac;
+        let (user, result) = tried(device, protected, protected & !BOR_LEV & !1);
+        assert!(result.is_ok_and(|written| written) && user == Some(0xa0), "{user:x?}");
+        let (user, result) = tried(device, FACTORY & !BOR_LEV, 0);
+        assert!(result.is_ok_and(|written| !written) && user.is_none());
     }
 
     #[test]
-    fn a_word_is_read_low_byte_first_with_its_runs() {
-        let (mut session, server) = session(&["$21640010#00", "$0*\"00#00", "$E01#00"]);
-        assert_eq!(session.read(0xe004_2000).expect("a word"), 0x1000_6421);
-        assert_eq!(session.read(0x4002_3c0c).expect("a word"), 0);
-        assert!(session.read(0).is_err());
-        let error = format!("{:#}", session.read(0).expect_err("a closed connection"));
-        assert!(error.contains("does not answer m0,4: the connection is closed"), "{error}");
-        drop(session);
-        assert_eq!(server.join().expect("requests"), ["$me0042000,4#", "$m40023c0c,4#", "$m0,4#"]);
+    fn another_device_or_a_protected_one_is_left_alone() {
+        for (device, options, expected) in [
+            (0x2003_6411, FACTORY, "an STM32F446 has 0x421"),
+            (0x421, FACTORY & !RDP, "set read protection level 0"),
+            (0x421, FACTORY & !WDG_SW, "a software watchdog"),
+        ] {
+            let (user, result) = tried(device, options, options);
+            let error = result.expect_err("refused").to_string();
+            assert!(user.is_none() && error.contains(expected), "{error}");
+        }
     }
 
     #[test]
-    fn the_core_stores_a_word_by_one_instruction_in_ram() {
-        let (mut session, server) = session(&["$OK#00", "$OK#00", "$OK#00", "$OK#00", "$T05thread:01;#00", "$E01#00"]);
-        session.write(0x4002_3c08, 0x0819_2a3b).expect("a write");
-        assert!(session.write(0x4002_3c08, 0).is_err());
-        drop(session);
-        let requests = server.join().expect("requests");
-        let [store, address, value, place, step, _] = &requests[..] else { panic!("{requests:?}") };
-        assert_eq!([store, address], ["$M20000000,2:0160#", "$P0=083c0240#"]);
-        assert_eq!([value, place, step], ["$P1=3b2a1908#", "$Pf=00000020#", "$vCont;s:1#"]);
-    }
-
-    #[test]
-    fn a_reset_that_does_not_halt_is_told() {
-        let (mut session, server) = session(&[
-            "$O54617267657420#00$O68616c7465640a#00$OK#00",
-            "$O4572726f72207768696c652068616c74696e67#00$OK#00",
-        ]);
-        session.reset_and_halt().expect("a halted core");
-        let error = session.reset_and_halt().expect_err("an error").to_string();
-        assert_eq!(error, "probe-rs gdb: Error while halting");
-        drop(session);
-        assert_eq!(server.join().expect("requests")[0], "$qRcmd,72657365742068616c74#");
+    fn a_write_that_changes_nothing_or_more_is_told() {
+        for after in [FACTORY, FACTORY & !BOR_LEV & !RDP] {
+            let error = tried(0x421, FACTORY, after).1.expect_err("told").to_string();
+            assert!(error.contains("set brown-out level 3 with STM32CubeProgrammer"), "{error}");
+        }
     }
 }

@@ -8,7 +8,6 @@ mod flash;
 mod host;
 mod image;
 mod install;
-mod option_bytes;
 mod sim;
 mod test;
 mod timing;

@@ -182,7 +182,7 @@ pub fn run_scene(args: &Args, scene: &Scene, board: Run) -> Result<bool, RunErro
     let json = args.json.as_ref().map_or(Ok(()), |path| write(path, json()));
     let report =
         Report { scene, board: name, outcome: &outcome, trace: &trace, ablated: &ablated, over: over.as_ref() };
-    let reported = args.out.as_ref().map_or(Ok(()), |out| write(&out.join("report.html"), page(&report)?));
+    let reported = args.out.as_ref().map_or(Ok(()), |out| write(&out.join("report.html"), page(&report)));
     // A file that cannot be written does not affect the others.
     let failed: Vec<String> =
         [recorded, json, reported].into_iter().filter_map(Result::err).map(|error| error.to_string()).collect();

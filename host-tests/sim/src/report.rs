@@ -11,7 +11,6 @@ use crate::report::plots::{Line, Plot, Style};
 use crate::run::{Outcome, RunError, Without, asked, difference, differences, ledger_rows};
 use crate::scene::Scene;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-use output::plot::PlotError;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
@@ -46,11 +45,9 @@ const SCRIPTS: [&str; 5] = [
     include_str!("report/script/main.js"),
 ];
 
-pub fn page(report: &Report) -> Result<String, RunError> {
+pub fn page(report: &Report) -> String {
     let Report { scene, board, outcome, trace, over, .. } = report;
     let summary = &outcome.summary;
-    let fingers: Result<Vec<Markup>, PlotError> =
-        trace.fingers.iter().enumerate().map(|(n, tracks)| finger(n, tracks, trace.fingers.len() > 1)).collect();
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -77,7 +74,10 @@ pub fn page(report: &Report) -> Result<String, RunError> {
                     section id="plots" {
                         h2 { "Over time" }
                         (player())
-                        @for finger in fingers? { (finger) }
+                        noscript { p.note { "Plots and pressure maps need a script, which this page contains." } }
+                        @for (number, tracks) in trace.fingers.iter().enumerate() {
+                            (finger(number, tracks, trace.fingers.len() > 1))
+                        }
                     }
                     section id="metrics" { h2 { "Metrics" } (metrics(report)) }
                     section id="ledger" {
@@ -103,7 +103,7 @@ pub fn page(report: &Report) -> Result<String, RunError> {
             }
         }
     };
-    Ok(page.into_string())
+    page.into_string()
 }
 
 /// Controls of the script. The page has none without it.
@@ -176,33 +176,24 @@ fn table_of_bounds(verdicts: &[&Verdict]) -> Markup {
     }
 }
 
-/// Draws the plots without the script, which replaces them, and the array.
-fn finger(number: usize, tracks: &Tracks, several: bool) -> Result<Markup, PlotError> {
-    let times = tracks.time.means();
-    let drawn: Result<Vec<_>, PlotError> =
-        plots::all(tracks).into_iter().map(|plot| plots::drawn(&plot, &times).map(|svg| (plot, svg))).collect();
-    Ok(html! {
+/// The places in which the script draws the plots and the array, and the strip.
+fn finger(number: usize, tracks: &Tracks, several: bool) -> Markup {
+    html! {
         div.finger data-finger=(number) {
             @if several { h3 { "Finger " (number) } }
             div.plots {
-                @for (Plot { title, about, .. }, svg) in &drawn? {
-                    figure.plot data-title=(title) {
-                        div.still role="img" aria-label=(about) { (PreEscaped(svg)) }
-                        figcaption { (about) }
-                    }
+                @for Plot { title, about, .. } in plots::all(tracks) {
+                    figure.plot data-title=(title) { figcaption { (about) } }
                 }
                 figure.plot data-title="strip" {
                     h3 { "Mode, faults and limits" }
-                    (plots::strip(&tracks.strip(), &times))
+                    (plots::strip(&tracks.strip(), &tracks.time.means()))
                     figcaption { "What occurred, however short, is as wide as a nine-hundredth of the run." }
                 }
             }
-            div.array {
-                h3 { "Pressure on the array" }
-                (plots::pressures(tracks))
-            }
+            div.array {}
         }
-    })
+    }
 }
 
 /// Lists the metrics by group. Groups with a broken bound are first and open.

@@ -1,13 +1,9 @@
-//! Plots of a report, each also drawn for a page without a script.
+//! Plots of a report, which its script draws, and the strip of modes, faults and limits.
 
 use crate::metrics::shown;
-use crate::report::trace::{Drawn, Instant, Kept, QUANTITIES, Row, Track, Tracks};
+use crate::report::trace::{Drawn, Kept, QUANTITIES, Row, Track, Tracks};
 use maud::{Markup, html};
-use output::plot::{Curve, Curves, PlotError, Pressures, curves};
 use serde::Serialize;
-
-/// Width and height of a plot without a script: its letters stay readable on a phone.
-const SIZE_PX: (u32, u32) = (400, 200);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -91,37 +87,6 @@ pub fn all(tracks: &Tracks) -> Vec<Plot> {
     plots
 }
 
-/// Draws a plot without a script.
-pub fn drawn(plot: &Plot, times: &[f64]) -> Result<String, PlotError> {
-    let mut lines: Vec<Curve> = plot.lines.iter().flat_map(|line| curves_of(line, times)).collect();
-    let (x_range, all) = ranges(&mut lines);
-    let y_range @ [low, high] = plot.range.unwrap_or(all);
-    lines.iter_mut().flat_map(Curve::points_mut).for_each(|(_, y)| *y = y.clamp(low, high));
-    let panel = Curves { title: plot.title.into(), x: "time, s", y: plot.unit, x_range, y_range, curves: lines };
-    curves(&[panel], SIZE_PX)
-}
-
-fn curves_of(line: &Line, times: &[f64]) -> Vec<Curve> {
-    let kept = || times.iter().zip(&line.kept).filter_map(|(time_s, kept)| Some((*time_s, (*kept)?)));
-    let means = || kept().map(|(time_s, kept)| (time_s, kept.mean)).collect::<Vec<_>>();
-    let band = || kept().flat_map(|(time_s, Kept { low, high, .. })| [(time_s, low), (time_s, high)]).collect();
-    match line.style {
-        Style::Main => vec![Curve::Pale(band()), Curve::Solid(means())],
-        Style::Second => vec![Curve::Second(means())],
-        Style::Goal => vec![Curve::Dashed(steps(&means()))],
-    }
-}
-
-/// Ranges from 0 to the end, and around all values with a margin. The range includes 0 if it is near.
-fn ranges(lines: &mut [Curve]) -> ([f64; 2], [f64; 2]) {
-    let points = lines.iter_mut().flat_map(Curve::points_mut);
-    let (mut end, mut low, mut high) = (0.0_f64, f64::INFINITY, f64::NEG_INFINITY);
-    for (x, y) in points {
-        (end, low, high) = (end.max(*x), low.min(*y), high.max(*y));
-    }
-    ([0.0, if end > 0.0 { end } else { 1e-3 }], around(low, high))
-}
-
 pub fn around(low: f64, high: f64) -> [f64; 2] {
     if low > high {
         return [0.0, 1.0];
@@ -133,12 +98,6 @@ pub fn around(low: f64, high: f64) -> [f64; 2] {
     // An axis narrower than the resolution of its numbers would have endless marks.
     let air = if air > 1e-9 * low.abs().max(high.abs()) { air } else { (0.1 * high.abs()).max(0.1) };
     [if low == 0.0 { 0.0 } else { low - air }, if high == 0.0 { air } else { high + air }]
-}
-
-/// The corners of a line of steps.
-fn steps(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
-    let corners = points.windows(2).flat_map(|pair| [pair[0], (pair[1].0, pair[0].1)]);
-    corners.chain(points.last().copied()).collect()
 }
 
 /// Units of the whole width.
@@ -165,55 +124,6 @@ pub fn strip(rows: &[Row], times: &[f64]) -> Markup {
                 }
             }
             p.note { "From 0 to " (shown(times.last().copied())) " s." }
-        }
-    }
-}
-
-const MAPS: usize = 10;
-const STEPS: u32 = 20;
-
-pub fn pressures(tracks: &Tracks) -> Markup {
-    let all = &tracks.instants;
-    let full_kpa = all.iter().flat_map(|at| at.true_kpa.iter().flatten()).copied().fold(1.0, f64::max);
-    let chosen = (0..MAPS.min(all.len())).map(|n| &all[(2 * n + 1) * all.len() / (2 * MAPS.min(all.len()))]);
-    html! {
-        div.still {
-            p.note { "True mean pressure on each taxel." }
-            (scale(full_kpa))
-            div.maps { @for Instant { time_s, true_kpa, .. } in chosen { (map(*time_s, true_kpa, full_kpa)) } }
-        }
-    }
-}
-
-fn scale(full_kpa: f64) -> Markup {
-    html! {
-        div.scale {
-            span { "0" }
-            svg viewBox={ "0 0 " (STEPS) " 1" } preserveAspectRatio="none" role="img" aria-label="Colours of the maps" {
-                @for n in 0..STEPS {
-                    @let share = (f64::from(n) + 0.5) / f64::from(STEPS);
-                    rect x=(n) y="0" width="1" height="1" fill-opacity=(format!("{share:.3}")) {}
-                }
-            }
-            span { (format!("{full_kpa:.1}")) " kPa" }
-        }
-    }
-}
-
-fn map(time_s: f64, map: &Pressures, full_kpa: f64) -> Markup {
-    let peak = format!("{:.1}", map.iter().flatten().copied().fold(0.0, f64::max));
-    let time = shown(Some((time_s * 1e3).round() / 1e3));
-    let about = format!("Pressure map at {time} s, at most {peak} kPa");
-    let cells =
-        map.iter().rev().enumerate().flat_map(|(y, row)| row.iter().enumerate().map(move |(x, kpa)| (x, y, kpa)));
-    html! {
-        figure {
-            svg viewBox="0 0 10 10" role="img" aria-label=(about) shape-rendering="crispEdges" {
-                @for (x, y, kpa) in cells.filter(|(.., kpa)| **kpa > 0.0) {
-                    rect x=(x) y=(y) width="1" height="1" fill-opacity=(format!("{:.3}", kpa / full_kpa)) {}
-                }
-            }
-            figcaption { (time) " s, " (peak) " kPa" }
         }
     }
 }

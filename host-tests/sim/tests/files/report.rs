@@ -144,7 +144,7 @@ fn traced(scene: &Scene) -> (Trace, Outcome) {
 
 /// Report of a run.
 pub fn written(scene: &Scene, (trace, outcome): &(Trace, Outcome), ablated: &[Without], over: Option<&Over>) -> String {
-    page(&Report { scene, board: "native", outcome, trace, ablated, over }).unwrap()
+    page(&Report { scene, board: "native", outcome, trace, ablated, over })
 }
 
 #[test]
@@ -170,11 +170,10 @@ fn a_report_stands_alone_and_has_every_part() {
     for address in ["http:", "https:", "src=", "href=", "url(", "@import"] {
         assert!(!fetched.contains(address), "{address}");
     }
+    assert!(page.matches("<figure class=\"plot\"").count() > 4 && page.contains("<noscript>"));
     // Every picture has a description.
     let pictures: Vec<&str> = page.split(" role=\"img\"").skip(1).collect();
-    assert!(pictures.len() > 20, "{} pictures", pictures.len());
     assert!(pictures.iter().all(|tag| tag.split('>').next().unwrap().contains(" aria-label=\"")));
-    assert_eq!(page.matches("Pressure map at").count(), 10);
     assert_eq!(plots.instants.len(), 150);
     assert!(plots.instants.iter().any(|at| at.true_kpa.iter().flatten().any(|kpa| *kpa > 10.0)));
     assert!(plots.instants.iter().any(|at| at.codes.iter().flatten().any(|code| *code > 100)));

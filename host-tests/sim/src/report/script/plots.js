@@ -106,7 +106,7 @@ function draw(figure, finger, plot, other) {
     },
   };
   const chart = new uPlot(options, columns, here);
-  figure.querySelectorAll('.drawn, .still').forEach(old => old.remove());
+  figure.querySelector('.drawn')?.remove();
   figure.prepend(here);
   handle(chart);
   drawn.push(chart);

@@ -26,18 +26,16 @@ const TITLE_PX: u32 = 15;
 const INK: RGBColor = RGBColor(20, 40, 90);
 const PALE_INK: RGBColor = RGBColor(185, 195, 215);
 const GOAL_INK: RGBColor = RGBColor(200, 110, 0);
-const SECOND_INK: RGBColor = RGBColor(0, 130, 120);
 const FAINT: RGBColor = RGBColor(225, 225, 225);
 
 /// Every colour that a picture may have, and what a dark page has in its place.
-const DARK: [(&str, &str); 7] = [
+const DARK: [(&str, &str); 6] = [
     ("#FFFFFF", "#0E1116"),
     ("#000000", "#E6EDF3"),
     ("#E1E1E1", "#30363D"),
     ("#14285A", "#8FB4FF"),
     ("#B9C3D7", "#4A5F8A"),
     ("#C86E00", "#F0A04B"),
-    ("#008278", "#3FD0BF"),
 ];
 
 /// A picture that follows the light or dark scheme of the page it is shown on.
@@ -96,8 +94,6 @@ pub enum Curve {
     Solid(Vec<(f64, f64)>),
     /// A thin, pale line through points.
     Pale(Vec<(f64, f64)>),
-    /// A thin line in a second colour through points.
-    Second(Vec<(f64, f64)>),
     /// A dashed line through points.
     Dashed(Vec<(f64, f64)>),
     /// A thin dotted line through points.
@@ -107,21 +103,10 @@ pub enum Curve {
 }
 
 impl Curve {
-    pub fn points_mut(&mut self) -> &mut Vec<(f64, f64)> {
-        let (Self::Solid(points)
-        | Self::Pale(points)
-        | Self::Second(points)
-        | Self::Dashed(points)
-        | Self::Dotted(points)
-        | Self::Circles(points)) = self;
-        points
-    }
-
     fn draw(&self, chart: &mut Chart<'_, '_>) -> Result<(), PlotError> {
         match self {
             Self::Solid(points) => line(chart, points, INK.stroke_width(2 * FINE)),
             Self::Pale(points) => line(chart, points, PALE_INK.stroke_width(FINE)),
-            Self::Second(points) => line(chart, points, SECOND_INK.stroke_width(FINE)),
             Self::Dashed(points) => dashes(chart, points, [7, 4], GOAL_INK.stroke_width(2 * FINE)),
             Self::Dotted(points) => dashes(chart, points, [2, 3], BLACK.stroke_width(FINE)),
             Self::Circles(points) => {
@@ -314,22 +299,10 @@ fn ink(share: f64) -> RGBAColor {
 }
 
 const WIDTH_PX: u32 = 1_000;
-const FRONT_HEIGHT_PX: u32 = 560;
-/// More points than this make the picture higher, by so much each.
-const POINTS_MAX: usize = 12;
-const POINT_PX: u32 = 20;
-/// Width of a letter and height of a line, generously.
-const LETTER_PX: f64 = 0.5 * LABEL_PX as f64;
-const LINE_PX: f64 = 1.1 * LABEL_PX as f64;
-/// Half of a point's width, with a little air.
-const DOT_PX: f64 = 7.0;
-/// Distances at which a label is tried.
-const NEAR_PX: f64 = 10.0;
-const STEP_PX: f64 = 5.0;
-const RINGS: u32 = 50;
-const DIRECTIONS: u32 = 24;
-/// Distance from which a line connects the label to its point, pixels.
-const FAR_PX: f64 = 14.0;
+const FRONT_HEIGHT_PX: u32 = 520;
+/// Width of the list of names beside the chart, and height of its lines.
+const NAMES_PX: u32 = 270;
+const NAME_PX: i32 = 22;
 
 /// One point of a plot: a variant with its cost and its error.
 #[derive(Clone, Debug)]
@@ -341,7 +314,7 @@ pub struct Dot {
     pub label: String,
     /// True if it is on the front: filled, on the line.
     pub best: bool,
-    /// True if it is drawn as a square, its label framed.
+    /// True if it is drawn as a square.
     pub own: bool,
 }
 
@@ -363,9 +336,9 @@ pub fn front(front: &Front<'_>) -> Result<String, PlotError> {
     let (y_low, y_high) = range(positive(|dot| dot.y))?;
     let has_zero = dots.iter().any(|dot| dot.y <= 0.0);
     let y_low = if has_zero { y_low / 10.0 } else { y_low };
-    let more = dots.len().saturating_sub(POINTS_MAX) as u32;
-    picture((WIDTH_PX, FRONT_HEIGHT_PX + POINT_PX * more), |area| {
-        let mut chart = ChartBuilder::on(area)
+    picture((WIDTH_PX, FRONT_HEIGHT_PX), |area| {
+        let (left, right) = area.split_horizontally(WIDTH_PX - NAMES_PX);
+        let mut chart = ChartBuilder::on(&left)
             .margin(10)
             .margin_right(20)
             .caption(title, (FONT, TITLE_PX))
@@ -383,12 +356,10 @@ pub fn front(front: &Front<'_>) -> Result<String, PlotError> {
             .y_label_formatter(&|value| if has_zero && *value < 2.0 * y_low { "0".into() } else { power(value) })
             .draw()?;
         let place = |dot: &Dot| (dot.x.max(x_low), dot.y.max(y_low));
-        let stairs = stairs(dots, place);
-        let line: Vec<_> = stairs.iter().map(|at| chart.backend_coord(at)).collect();
-        chart.draw_series(LineSeries::new(stairs, INK.stroke_width(1)))?;
+        chart.draw_series(LineSeries::new(stairs(dots, place), INK.stroke_width(1)))?;
         let places: Vec<_> = dots.iter().map(|dot| chart.backend_coord(&place(dot))).collect();
-        let corners = [chart.backend_coord(&(x_low, y_high)), chart.backend_coord(&(x_high, y_low))];
-        draw_dots(area, dots, &places, &line, corners)
+        draw_dots(&left, dots, &places)?;
+        draw_names(&right, dots)
     })
 }
 
@@ -425,136 +396,43 @@ fn stairs(dots: &[Dot], place: impl Fn(&Dot) -> (f64, f64)) -> Vec<(f64, f64)> {
 
 type Pixel = (i32, i32);
 
-/// Left, upper, right and lower side.
-#[derive(Clone, Copy)]
-struct Box4([f64; 4]);
-
-impl Box4 {
-    fn around(x: f64, y: f64, half_width: f64, half_height: f64) -> Self {
-        Self([x - half_width, y - half_height, x + half_width, y + half_height])
+/// Points with their numbers, each number where no other one and no other point is, if there is room.
+fn draw_dots(area: &Area<'_>, dots: &[Dot], places: &[Pixel]) -> Result<(), PlotError> {
+    let mut taken = places.to_vec();
+    for (n, &(x, y)) in places.iter().enumerate() {
+        // The line of the front leaves a point to the right, and comes to it from above.
+        let sides = [(11, -11), (-11, -11), (11, 11), (-11, 11)].map(|(right, down)| (x + right, y + down));
+        let is_free = |(x, y): &Pixel| taken.iter().all(|(ox, oy)| (x - ox).abs() > 10 || (y - oy).abs() > 10);
+        let side = sides.into_iter().find(is_free).unwrap_or(sides[0]);
+        area.draw(&Text::new((n + 1).to_string(), side, centred(HPos::Center)))?;
+        taken.push(side);
     }
-
-    fn meets(&self, other: &Self) -> bool {
-        let (Self([l, u, r, d]), Self([ol, ou, or, od])) = (self, other);
-        l < or && ol < r && u < od && ou < d
-    }
-
-    /// True if a straight line meets it.
-    fn is_crossed(&self, from: (f64, f64), to: (f64, f64)) -> bool {
-        // Enough places along the line to miss nothing of a label's size.
-        (0..=40).map(|n| f64::from(n) / 40.0).any(|t| {
-            let (x, y) = (from.0 + t * (to.0 - from.0), from.1 + t * (to.1 - from.1));
-            self.meets(&Self::around(x, y, 1.0, 1.0))
-        })
-    }
-
-    /// Point of the box nearest to another point.
-    fn nearest(&self, (x, y): (f64, f64)) -> (f64, f64) {
-        let Self([left, up, right, down]) = *self;
-        (x.max(left).min(right), y.max(up).min(down))
-    }
-
-    fn lies_in(&self, other: &Self) -> bool {
-        let (Self([l, u, r, d]), Self([ol, ou, or, od])) = (self, other);
-        l >= ol && r <= or && u >= ou && d <= od
-    }
+    dots.iter().zip(places).try_for_each(|(dot, place)| draw_dot(area, dot, *place))
 }
 
-fn draw_dots(
-    area: &Area<'_>,
-    dots: &[Dot],
-    places: &[Pixel],
-    line: &[Pixel],
-    [upper, lower]: [Pixel; 2],
-) -> Result<(), PlotError> {
-    let frame = Box4([upper.0, upper.1, lower.0, lower.1].map(f64::from));
-    let mut taken: Vec<_> =
-        places.iter().map(|(x, y)| Box4::around(f64::from(*x), f64::from(*y), DOT_PX, DOT_PX)).collect();
-    taken.extend(line.windows(2).map(|ends| {
-        let [(ax, ay), (bx, by)] = [ends[0], ends[1]].map(|(x, y)| (f64::from(x), f64::from(y)));
-        Box4([ax.min(bx) - 1.0, ay.min(by) - 1.0, ax.max(bx) + 1.0, ay.max(by) + 1.0])
-    }));
-    let style = TextStyle::from((FONT, LABEL_PX).into_font()).pos(Pos::new(HPos::Center, VPos::Center));
-    // Points of the front choose first.
-    let order = (0..dots.len()).filter(|n| dots[*n].best).chain((0..dots.len()).filter(|n| !dots[*n].best));
-    let mut leaders = Vec::new();
-    for n in order {
-        let dot = &dots[n];
-        let at = (f64::from(places[n].0), f64::from(places[n].1));
-        let half = (0.5 * LETTER_PX * dot.label.chars().count() as f64 + 3.0, 0.5 * LINE_PX + 2.0);
-        // Where points crowd, a line to a label may cross what a label may not.
-        let others: Vec<_> =
-            places.iter().map(|(x, y)| (f64::from(*x), f64::from(*y))).filter(|other| *other != at).collect();
-        let found = [(&others[..], Some(&leaders[..])), (&[], Some(&leaders)), (&[], None)]
-            .into_iter()
-            .find_map(|(others, lines)| free_place(at, half, &taken, lines, others, &frame));
-        let (far, middle) = found.ok_or_else(|| format!("cannot draw: no room for the label {}", dot.label))?;
-        let label = Box4::around(middle.0, middle.1, half.0, half.1);
-        if far > FAR_PX {
-            let end = label.nearest(at);
-            let line = vec![places[n], (end.0 as i32, end.1 as i32)];
-            area.draw(&PathElement::new(line, BLACK.mix(0.5).stroke_width(1)))?;
-            leaders.push((at, end));
-        }
-        if dot.own {
-            let Box4([left, up, right, down]) = label;
-            let corners = [(left as i32, up as i32), (right as i32, down as i32)];
-            area.draw(&Rectangle::new(corners, BLACK.stroke_width(1)))?;
-        }
-        let text = Text::new(dot.label.clone(), (middle.0 as i32, middle.1 as i32), style.clone());
-        area.draw(&text)?;
-        taken.push(label);
-    }
-    for (dot, (x, y)) in dots.iter().zip(places) {
-        let fill = if dot.best { INK.filled() } else { WHITE.filled() };
-        if dot.own {
-            let corners = [(x - 5, y - 5), (x + 5, y + 5)];
-            area.draw(&Rectangle::new(corners, fill))?;
-            area.draw(&Rectangle::new(corners, INK.stroke_width(2)))?;
-        } else {
-            area.draw(&Circle::new((*x, *y), 4, fill))?;
-            area.draw(&Circle::new((*x, *y), 4, INK.stroke_width(1)))?;
-        }
+fn draw_dot(area: &Area<'_>, dot: &Dot, (x, y): Pixel) -> Result<(), PlotError> {
+    let fill = if dot.best { INK.filled() } else { WHITE.filled() };
+    if dot.own {
+        let corners = [(x - 5, y - 5), (x + 5, y + 5)];
+        area.draw(&Rectangle::new(corners, fill))?;
+        area.draw(&Rectangle::new(corners, INK.stroke_width(2)))?;
+    } else {
+        area.draw(&Circle::new((x, y), 4, fill))?;
+        area.draw(&Circle::new((x, y), 4, INK.stroke_width(1)))?;
     }
     Ok(())
 }
 
-type Place = (f64, f64);
-
-fn apart(a: Place, b: Place) -> f64 {
-    (a.0 - b.0).hypot(a.1 - b.1)
+/// Names of the points by their numbers.
+fn draw_names(area: &Area<'_>, dots: &[Dot]) -> Result<(), PlotError> {
+    for (n, dot) in dots.iter().enumerate() {
+        let y = 40 + NAME_PX * n as i32;
+        draw_dot(area, dot, (10, y))?;
+        area.draw(&Text::new(format!("{}  {}", n + 1, dot.label), (24, y), centred(HPos::Left)))?;
+    }
+    Ok(())
 }
 
-/// The nearest place for a label where it and the line to it cover nothing, nearer to its point than to another: its
-/// distance from the point, and its middle.
-fn free_place(
-    at: Place,
-    half: (f64, f64),
-    taken: &[Box4],
-    leaders: Option<&[(Place, Place)]>,
-    others: &[Place],
-    frame: &Box4,
-) -> Option<(f64, Place)> {
-    let own = Box4::around(at.0, at.1, 1.0, 1.0);
-    for ring in 0..RINGS {
-        let far = NEAR_PX + STEP_PX * f64::from(ring);
-        for n in 0..DIRECTIONS {
-            // Beside first, then around.
-            let turn = f64::from(n / 2) * if n % 2 == 0 { 1.0 } else { -1.0 };
-            let (sin, cos) = (core::f64::consts::TAU * turn / f64::from(DIRECTIONS)).sin_cos();
-            let middle = (at.0 + cos * (far + half.0), at.1 - sin * (far + half.1));
-            let label = Box4::around(middle.0, middle.1, half.0, half.1);
-            let end = label.nearest(at);
-            let covers = taken.iter().any(|other| label.meets(other))
-                || leaders.into_iter().flatten().any(|(from, to)| label.is_crossed(*from, *to))
-                || others.iter().any(|other| apart(label.nearest(*other), *other) < 1.5 * apart(end, at))
-                || (leaders.is_some()
-                    && far > FAR_PX
-                    && taken.iter().any(|other| !other.meets(&own) && other.is_crossed(at, end)));
-            if label.lies_in(frame) && !covers {
-                return Some((far, middle));
-            }
-        }
-    }
-    None
+fn centred(across: HPos) -> TextStyle<'static> {
+    TextStyle::from((FONT, LABEL_PX).into_font()).pos(Pos::new(across, VPos::Center))
 }

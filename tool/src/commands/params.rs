@@ -95,7 +95,19 @@ pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Err
             Ok(())
         }
         Command::Restore { file, save } => {
-            let Backup { mut values, gains } = read_backup(file)?;
+            let Backup { mut values, gains, origin } = read_backup(file)?;
+            let (path, [chip, version]) = (file.display(), read_origin(client)?);
+            if let [Some(other), _] = origin
+                && other != chip
+            {
+                let whose = format!("{path} is of the finger with {CHIP} {other}; this one has {chip}");
+                return Err(format!("{whose}. Where that is meant, take out the line `{CHIP}`").into());
+            }
+            if let [_, Some(other)] = origin
+                && other != version
+            {
+                aside(format_args!("warning: {path} is of {VERSION} {other}; this controller has {version}"));
+            }
             // Who moves a device to another address or speed means it, and says so by `set`.
             values.retain(|(register, _)| !is_bus(register));
             conclude(&set(&values, gains, client)?, *save, client, json)
@@ -184,7 +196,7 @@ fn diff(file: Option<&Path>, client: &mut Client, json: bool) -> Result<(), Erro
     let Stored { values: now, gains: gains_now } = Stored::read(client)?;
     let (other, other_gains, what) = match file {
         Some(path) => {
-            let Backup { values, gains } = read_backup(path)?;
+            let Backup { values, gains, .. } = read_backup(path)?;
             (values, gains, path.display().to_string())
         }
         None => {
@@ -440,25 +452,32 @@ const PARAMETERS: &str = "parameters";
 const GAINS: &str = "gains";
 /// Number of entries: a file that was cut has fewer, or a last line without an end.
 const ENTRIES: &str = "entries";
+/// What a backup is of: the register, and the version of the control table.
+const CHIP: &str = "chip_id";
+const VERSION: &str = "table_version";
 
 struct Backup {
     /// Values of registers with a name.
     values: Vec<Value>,
     /// The taxels' gains, in rows; `None` if the file has none.
     gains: Option<Vec<Vec<u16>>>,
+    /// Numbers of [`CHIP`] and [`VERSION`], where the file has them.
+    origin: [Option<i64>; 2],
+}
+
+/// Reads [`CHIP`] and [`VERSION`].
+fn read_origin(client: &mut Client) -> Result<[i64; 2], Error> {
+    Ok([client.number(address::CHIP_ID)?, client.number(address::MODEL_INFORMATION)? >> 16])
 }
 
 /// Writes it, whole or not at all.
 fn write_backup(path: &Path, force: bool, client: &mut Client, stored: &Stored) -> Result<(), Error> {
     let Stored { values, gains } = stored;
-    let information = client.number(address::MODEL_INFORMATION)?;
-    let pong = client.ping()?;
+    let [chip, version] = read_origin(client)?;
     let mut text = format!(
         "# A fingertip's stored parameters, by `fingertip params backup`; `restore` sets them again.\n\
-         # Units stand in the names; what is left out stays as it is.\nfirmware_version = {}\ntable_version = {}\n\
-         {ENTRIES} = {}\n\n[{PARAMETERS}]\n",
-        pong.firmware,
-        information >> 16,
+         # Units stand in the names; what is left out stays as it is.\n\
+         {CHIP} = {chip}\n{VERSION} = {version}\n{ENTRIES} = {}\n\n[{PARAMETERS}]\n",
         values.len() + gains.len()
     );
     for (register, value) in values {
@@ -482,7 +501,8 @@ fn read_backup(path: &Path) -> Result<Backup, Error> {
     let table = table.ok_or_else(|| Error::file("read", path, format_args!("it has no table [{PARAMETERS}]")))?;
     let rows = document.get(GAINS).and_then(|item| item.as_table());
     let entries = table.len() + rows.map_or(0, |rows| rows.len());
-    if let Some(count) = document.get(ENTRIES).and_then(|item| item.as_integer())
+    let number = |name| document.get(name).and_then(|item| item.as_integer());
+    if let Some(count) = number(ENTRIES)
         && (count != entries as i64 || !text.ends_with('\n'))
     {
         let why = format!(
@@ -519,7 +539,12 @@ fn read_backup(path: &Path) -> Result<Backup, Error> {
         }
         gains
     });
-    if wrong.is_empty() { Ok(Backup { values, gains }) } else { Err(Error::file("read", path, wrong.join("; "))) }
+    let origin = [CHIP, VERSION].map(number);
+    if wrong.is_empty() {
+        Ok(Backup { values, gains, origin })
+    } else {
+        Err(Error::file("read", path, wrong.join("; ")))
+    }
 }
 
 // The taxels' gains, which outlive a reset beside the parameters.

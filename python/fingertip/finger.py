@@ -105,7 +105,9 @@ class Finger(Device):
         self.write(reg.TARE, 1)
         state = self.wait(reg.TARE_STATE, _TARING)
         if state != _TARED:
-            raise FingertipError(f"the tare came to nothing: fault {self.read(reg.FAULT)}")
+            fault = Fault(self.read(reg.FAULT))
+            why = fault.name if fault else "something seems to touch the tip: free it, and let the reading decay"
+            raise FingertipError(f"the tare came to nothing: {why}")
         if self.read(reg.LIMITS) & Limits.TARED_TOUCHING:
             raise FingertipError("something seemed to touch the tip while it was tared: free it and tare again")
 

@@ -283,13 +283,21 @@ pub fn recover(client: &mut Client, json: bool) -> Result<(), Error> {
     Ok(())
 }
 
+/// Values of `TARE`: a tare, and one that takes as zero whatever the array reads.
+pub(super) const TARE: i64 = 1;
+const TARE_FORCED: i64 = 2;
 /// Values of `TARE_STATE`.
 const TARE_RUNNING: i64 = Taring::Running as i64;
 const TARE_DONE: i64 = Taring::Done as i64;
 
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  fingertip tare")]
+#[command(
+    after_help = "Examples:\n  fingertip tare\n  fingertip tare --force    (in the air, while the reading of a contact decays)"
+)]
 pub struct Tare {
+    /// Take the present reading as zero, even if something seems to touch: a force that is there now is not measured then
+    #[arg(long)]
+    force: bool,
     /// Longest time that it may take; a real controller needs 20 ms
     #[arg(long, default_value_t = 5.0, value_parser = numbers::seconds)]
     within_s: f64,
@@ -300,14 +308,15 @@ pub fn tare(args: &Tare, client: &mut Client, json: bool) -> Result<(), Error> {
     if client.number(address::TORQUE_ENABLE)? != 0 {
         return Err("torque is on: the tip may be pressing on something. Turn it off first: `fingertip stop`".into());
     }
-    let Tared { touched, least, most } = measure_tare(Duration::from_secs_f64(args.within_s), client)?;
+    let request = if args.force { TARE_FORCED } else { TARE };
+    let Tared { touched, least, most } = measure_tare(request, Duration::from_secs_f64(args.within_s), client)?;
     if json {
         let id = client.id;
         say_json(&json!({ "id": id, "tared": true, "touched": touched, "least_codes": least, "most_codes": most }));
     } else {
         say(format_args!("tared: zeros of {least} to {most} codes"));
     }
-    if touched { Err(TOUCHED.into()) } else { Ok(()) }
+    if touched && !args.force { Err(TOUCHED.into()) } else { Ok(()) }
 }
 
 pub(super) struct Tared {
@@ -320,12 +329,14 @@ pub(super) struct Tared {
 
 /// Error of a tare that ended in this `TARE_STATE`.
 pub(super) fn no_tare(state: i64) -> Error {
-    format!("the tare came to nothing: {}", table::meaning(address::TARE_STATE, state)).into()
+    let state = table::meaning(address::TARE_STATE, state);
+    let next = "free the tip, and let the reading of its contact decay or `fingertip tare --force`";
+    format!("the tare came to nothing: {state}. Something seems to touch: {next}").into()
 }
 
 /// Measures the zeros, with torque off.
-pub(super) fn measure_tare(within: Duration, client: &mut Client) -> Result<Tared, Error> {
-    client.set(address::TARE, 1)?;
+pub(super) fn measure_tare(request: i64, within: Duration, client: &mut Client) -> Result<Tared, Error> {
+    client.set(address::TARE, request)?;
     let state = wait_for(client, address::TARE_STATE, within, |state| state != TARE_RUNNING)?;
     match state {
         TARE_DONE => {}

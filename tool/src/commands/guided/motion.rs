@@ -1,7 +1,7 @@
 //! Steps of a guided procedure: motions that measure, presses, forces held on a scale, a weight on the tip.
 
 use super::{GainRows, Presses, Procedure, Run};
-use crate::commands::stop::{Moving, measure_tare};
+use crate::commands::stop::{Moving, TARE, measure_tare};
 use crate::commands::{TOUCHED, capture, no_fault, no_fault_nor_motion, press, stopped, wait_for};
 use crate::state::{RESTARTED, State};
 use crate::{Client, Error, numbers, table};
@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 /// Time between two looks at the motion.
 const LOOK: Duration = Duration::from_millis(10);
 const REPORT: Duration = Duration::from_secs(1);
-const TARE: Duration = Duration::from_secs(5);
+const TARE_WITHIN: Duration = Duration::from_secs(5);
 /// Longest wait for a controller that releases the object by itself.
 const RELEASE: Duration = Duration::from_secs(2);
 
@@ -84,7 +84,7 @@ impl Procedure<'_> {
     pub fn zeros(&mut self) -> Result<(), Error> {
         self.at_rest()?;
         self.run.report("tare: nothing may touch the tip");
-        if measure_tare(TARE, self.client)?.touched { Err(TOUCHED.into()) } else { Ok(()) }
+        if measure_tare(TARE, TARE_WITHIN, self.client)?.touched { Err(TOUCHED.into()) } else { Ok(()) }
     }
 
     /// Carries out a motion, which always ends at rest with torque off. Returns the record; a jog has none.

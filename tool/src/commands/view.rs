@@ -47,6 +47,10 @@ impl Seen {
     /// Takes the next state, or the reason for its absence.
     pub fn take(&mut self, read: Result<State, Error>) {
         match read {
+            Ok(state) if self.state.as_ref().is_some_and(|last| last.time_us == state.time_us) => {
+                self.state = Some(state);
+                self.lost = Some("no new frame: all that is measured is old".into());
+            }
             Ok(state) => {
                 let time_s = self.clock.time_s(&state).unwrap_or_else(|| {
                     // The past is another run's.
@@ -89,7 +93,7 @@ fn watch(args: &Args, client: &mut Client, seen: &mut Seen, terminal: &mut Defau
             let _ = client.reopen();
         }
         seen.take(read);
-        updates += 1;
+        updates += u32::from(seen.lost.is_none());
         if counted.elapsed() >= Duration::from_secs(1) {
             seen.rate_hz = f64::from(updates) / counted.elapsed().as_secs_f64();
             (counted, updates) = (Instant::now(), 0);

@@ -414,6 +414,10 @@ fn a_fault_and_a_lost_line_are_shown() {
     let lines = screen(&seen, 80, 24);
     assert_eq!(lines[23], "no answer of ID 1");
     assert!(lines[4].contains("supply low"), "the last state stays");
+    seen.take(Ok(State { fault: 1, ..pressed(0) }));
+    let lines = screen(&seen, 80, 24);
+    assert!(lines[4].contains("lost frames") && lines[23].contains("no new frame"), "{lines:?}");
+    assert_eq!(seen.past.len(), 1, "no time passed");
     // Any size will do.
     for (width, height) in [(1, 1), (20, 5), (41, 12), (79, 23), (300, 100)] {
         screen(&seen, width, height);

@@ -6,6 +6,7 @@ use super::params;
 use super::press::direction_confirmed;
 use crate::{Client, Error, numbers, table};
 use fingertip::measure::Task;
+use fingertip::params::Params;
 use serde_json::json;
 use solve::Value;
 use solve::modulus::Modulus;
@@ -78,6 +79,11 @@ impl Calibrate {
         if !fits {
             let [shown, goals] = [shown.len(), goals.len()];
             return Err(Error::NotUnderstood(format!("--shown-n has {shown} numbers for {goals} forces of --scale-n")));
+        }
+        let Params { contact_on_mn, force_max_mn, .. } = session.before.params;
+        let [least, most] = [contact_on_mn, force_max_mn].map(i64::from);
+        if let Some(goal) = goals.iter().find(|goal| !(least..=most).contains(*goal)) {
+            return Err(format!("{goal} mN cannot be held: give --scale-n forces of {least} to {most} mN").into());
         }
         Ok(goals)
     }

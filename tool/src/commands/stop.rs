@@ -1,7 +1,7 @@
 //! Commands at whose end the finger is at rest: [`Moving`] guards those that move it; `fingertip stop`, `recover` and `tare`
 //! begin or end there.
 
-use super::{Interrupt, TOUCHED, aside, no_fault_nor_motion, say, say_json, wait_for};
+use super::{Interrupt, TOUCHED, aside, no_fault, no_fault_nor_motion, say, say_json, wait_for};
 use crate::client::Reach;
 use crate::state::{Clock, State};
 use crate::{Client, Error, numbers, table};
@@ -327,11 +327,12 @@ pub(super) struct Tared {
     most: i64,
 }
 
-/// Error of a tare that ended in this `TARE_STATE`.
-pub(super) fn no_tare(state: i64) -> Error {
+/// Fails with the reason for which a tare ended in this `TARE_STATE`: a fault that came meanwhile, or something that touches.
+pub(super) fn no_tare<T>(state: i64, client: &mut Client) -> Result<T, Error> {
+    no_fault(client)?;
     let state = table::meaning(address::TARE_STATE, state);
     let next = "free the tip, and let the reading of its contact decay or `fingertip tare --force`";
-    format!("the tare came to nothing: {state}. Something seems to touch: {next}").into()
+    Err(format!("the tare came to nothing: {state}. Something seems to touch: {next}").into())
 }
 
 /// Measures the zeros, with torque off.
@@ -344,7 +345,7 @@ pub(super) fn measure_tare(request: i64, within: Duration, client: &mut Client) 
             let within_s = within.as_secs_f64();
             return Err(format!("the tare is still running after {within_s} s: do frames come in?").into());
         }
-        _ => return Err(no_tare(state)),
+        _ => return no_tare(state, client),
     }
     let touched = Limits(client.number(address::LIMITS)? as u16).has(Limits::TARED_TOUCHING);
     let codes = client.block(address::TARE_CODES, address::TARE_CODES)?.numbers(address::TARE_CODES);

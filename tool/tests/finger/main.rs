@@ -122,6 +122,12 @@ fn a_fault_is_told_and_cleared() {
     let again = finger.done(&["recover"]);
     assert!(again.starts_with("there was nothing to recover from"), "{again}");
     finger.done(&["press", "0.5", "--seconds", "0.1", "--within-s", "3600"]);
+    // The tare reads the array, and shows what is broken there.
+    finger.command("fault row-stuck");
+    finger.refuses(&["tare"], &["fault 3 (row stuck)", "`fingertip recover`"]);
+    finger.command("mend");
+    finger.done(&["recover"]);
+    finger.done(&["tare"]);
     // A fault that is cleared by its register leaves the bus watchdog tripped.
     finger.set(&[(address::TORQUE_ENABLE, 1), (address::BUS_WATCHDOG, 1)]);
     finger.until_alone("BusSilent");

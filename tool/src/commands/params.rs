@@ -96,17 +96,11 @@ pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Err
         }
         Command::Restore { file, save } => {
             let Backup { mut values, gains, origin } = read_backup(file)?;
-            let (path, [chip, version]) = (file.display(), read_origin(client)?);
-            if let [Some(other), _] = origin
-                && other != chip
-            {
-                let whose = format!("{path} is of the finger with {CHIP} {other}; this one has {chip}");
-                return Err(format!("{whose}. Where that is meant, take out the line `{CHIP}`").into());
-            }
-            if let [_, Some(other)] = origin
-                && other != version
-            {
-                aside(format_args!("warning: {path} is of {VERSION} {other}; this controller has {version}"));
+            for ((name, here), of) in read_origin(client)?.into_iter().zip(origin) {
+                if let Some(of) = of.filter(|of| *of != here) {
+                    let whose = format!("{} has {name} {of}, this controller {here}", file.display());
+                    return Err(format!("{whose}. Where that is meant, take out the line `{name}`").into());
+                }
             }
             // Who moves a device to another address or speed means it, and says so by `set`.
             values.retain(|(register, _)| !is_bus(register));
@@ -452,32 +446,33 @@ const PARAMETERS: &str = "parameters";
 const GAINS: &str = "gains";
 /// Number of entries: a file that was cut has fewer, or a last line without an end.
 const ENTRIES: &str = "entries";
-/// What a backup is of: the register, and the version of the control table.
-const CHIP: &str = "chip_id";
-const VERSION: &str = "table_version";
+/// Names of the lines that say what a backup is of: the controller, and the version of its control table.
+const ORIGIN: [&str; 2] = ["chip_id", "table_version"];
 
 struct Backup {
     /// Values of registers with a name.
     values: Vec<Value>,
     /// The taxels' gains, in rows; `None` if the file has none.
     gains: Option<Vec<Vec<u16>>>,
-    /// Numbers of [`CHIP`] and [`VERSION`], where the file has them.
+    /// Numbers of the lines [`ORIGIN`], where the file has them.
     origin: [Option<i64>; 2],
 }
 
-/// Reads [`CHIP`] and [`VERSION`].
-fn read_origin(client: &mut Client) -> Result<[i64; 2], Error> {
-    Ok([client.number(address::CHIP_ID)?, client.number(address::MODEL_INFORMATION)? >> 16])
+/// Reads the lines [`ORIGIN`] of this controller.
+fn read_origin(client: &mut Client) -> Result<[(&'static str, i64); 2], Error> {
+    let [chip, version] = ORIGIN;
+    Ok([(chip, client.number(address::CHIP_ID)?), (version, client.number(address::MODEL_INFORMATION)? >> 16)])
 }
 
 /// Writes it, whole or not at all.
 fn write_backup(path: &Path, force: bool, client: &mut Client, stored: &Stored) -> Result<(), Error> {
     let Stored { values, gains } = stored;
-    let [chip, version] = read_origin(client)?;
+    let origin = read_origin(client)?.map(|(name, number)| format!("{name} = {number}\n"));
     let mut text = format!(
         "# A fingertip's stored parameters, by `fingertip params backup`; `restore` sets them again.\n\
          # Units stand in the names; what is left out stays as it is.\n\
-         {CHIP} = {chip}\n{VERSION} = {version}\n{ENTRIES} = {}\n\n[{PARAMETERS}]\n",
+         {}{ENTRIES} = {}\n\n[{PARAMETERS}]\n",
+        origin.concat(),
         values.len() + gains.len()
     );
     for (register, value) in values {
@@ -539,7 +534,7 @@ fn read_backup(path: &Path) -> Result<Backup, Error> {
         }
         gains
     });
-    let origin = [CHIP, VERSION].map(number);
+    let origin = ORIGIN.map(number);
     if wrong.is_empty() {
         Ok(Backup { values, gains, origin })
     } else {

@@ -45,7 +45,8 @@ impl<'a> Moving<'a> {
             return Err("the bus watchdog has tripped: `fingertip recover` resets it".into());
         }
         client.set(address::BUS_WATCHDOG, WATCHDOG)?;
-        Ok(Self { client, watchdog: Some(watchdog) })
+        // A command that was killed left its own value: that is not put back.
+        Ok(Self { client, watchdog: Some(if watchdog == WATCHDOG { 0 } else { watchdog }) })
     }
 
     /// Stops the finger, whatever the command came to, and puts the watchdog back.

@@ -83,6 +83,8 @@ fn it_tares_presses_and_lets_go() {
     finger.until("object is at 5.00");
     let tared = finger.json(&["tare"]);
     assert_eq!((&tared["tared"], &tared["touched"]), (&true.into(), &false.into()));
+    // As a command leaves it that was killed before torque was on.
+    finger.set(&[(address::BUS_WATCHDOG, 25)]);
     let held = finger.json(&["press", "1.5", "--seconds", "0.3", "--within-s", "3600"]);
     let mean_mn = held["mean_mn"].as_f64().expect("a number");
     assert!((1_470.0..=1_530.0).contains(&mean_mn) && held["held_s"].as_f64() >= Some(0.3), "{held}");
@@ -105,6 +107,9 @@ fn it_tares_presses_and_lets_go() {
     assert_eq!((&report["reached"], &report["held"], &report["states"]), (&false.into(), &false.into(), &0.into()));
     assert!(report["mean_mn"].is_null(), "{report}");
     assert_eq!(finger.json(&["info"])["torque_enable"], 0, "torque is off all the same");
+    finger.set(&[(address::BUS_WATCHDOG, 50)]);
+    finger.refuses(&["press", "9"], &["force_max_mn"]);
+    assert_eq!(finger.json(&["info"])["bus_watchdog_ms"], 1_000, "another host's watchdog stays");
 }
 
 #[test]

@@ -12,7 +12,7 @@ pub mod stop;
 pub mod stream;
 pub mod view;
 
-use crate::client::{Pong, Reach};
+use crate::client::Pong;
 use crate::{Client, Error, table};
 use fingertip::link::packet::BROADCAST;
 use fingertip::measure::MeasureState;
@@ -78,22 +78,28 @@ fn say_json(value: &Value) {
     }
 }
 
-/// Runs a command for each ID of `--id`, also after an error of one. Before that, all of them get the values `first`, in one
-/// packet each, which no absent ID delays. Several answers in JSON are one array.
-pub fn each(reach: &Reach, titled: bool, first: &[(u16, i64)], command: impl Fn(&mut Client) -> Done) -> Done {
-    let mut client = Client::open(reach)?;
-    let mut ids = reach.ids.clone();
-    if ids.contains(&BROADCAST) {
-        let found = client.ping_all()?;
-        ids = found.into_iter().filter(Pong::is_fingertip).map(|pong| pong.id).collect();
-        if ids.is_empty() {
+/// Runs a command for each of these IDs, or for all fingertips, also after an error of one. Before that, all of them get the
+/// values `first`, in one packet each, which no absent ID delays. Several answers in JSON are one array.
+pub fn each(
+    client: &mut Client,
+    ids: &[u8],
+    titled: bool,
+    first: &[(u16, i64)],
+    command: impl Fn(&mut Client) -> Done,
+) -> Done {
+    let (all, mut ids) = (ids.contains(&BROADCAST), ids.to_vec());
+    if all {
+        let (fingers, others): (Vec<_>, Vec<_>) = client.ping_all()?.into_iter().partition(Pong::is_fingertip);
+        others.iter().for_each(|pong| aside(format_args!("ID {} is no fingertip: it is left out", pong.id)));
+        if fingers.is_empty() {
             return Err("no fingertip answers: is it powered, and is the baud rate right?".into());
         }
+        ids = fingers.iter().map(|pong| pong.id).collect();
     }
     first.iter().try_for_each(|(register, value)| client.set_each(&ids, *register, *value))?;
-    if let ([id], false) = (&ids[..], reach.ids.contains(&BROADCAST)) {
+    if let ([id], false) = (&ids[..], all) {
         client.id = *id;
-        return command(&mut client);
+        return command(client);
     }
     *answers() = Some(Vec::new());
     let mut failed = Vec::new();
@@ -102,7 +108,7 @@ pub fn each(reach: &Reach, titled: bool, first: &[(u16, i64)], command: impl Fn(
         if titled {
             say(format_args!("ID {id}:"));
         }
-        if let Err(why) = command(&mut client) {
+        if let Err(why) = command(client) {
             failed.push(format!("ID {id}: {why}"));
         }
     }

@@ -129,7 +129,9 @@ fn with_examples(command: clap::Command) -> clap::Command {
 fn run(cli: &Cli) -> Result<(), Error> {
     let connect = || Client::connect(&cli.reach);
     let for_each = |command: &dyn Fn(&mut Client) -> Result<(), Error>| {
-        each(&cli.reach, !cli.json, &[], |client| client.check().and_then(|()| command(client)))
+        each(&mut Client::open(&cli.reach)?, &cli.reach.ids, !cli.json, &[], |client| {
+            client.check().and_then(|()| command(client))
+        })
     };
     match &cli.command {
         Command::Scan(args) => device::scan(args, &cli.reach, cli.json),

@@ -5,7 +5,7 @@ use super::{Interrupt, TOUCHED, aside, no_fault, no_fault_nor_motion, say, say_j
 use crate::client::Reach;
 use crate::state::{Clock, State};
 use crate::{Client, Error, numbers, table};
-use fingertip::link::packet::StatusError;
+use fingertip::link::packet::{BROADCAST, StatusError};
 use fingertip::pipeline::Taring;
 use fingertip::shipped::address;
 use fingertip::state::{Limits, Mode};
@@ -152,40 +152,21 @@ pub const ALL_ANSWERED: i64 = 2;
 /// Turns torque off, which aborts measurements, sets the bus watchdog to 0, and reports what was found and changed. All
 /// fingers release at once, then each is stopped.
 fn stop_all(args: &Stop, reach: &Reach, json: bool) -> Result<(), Error> {
-    if !args.all {
-        let first = [(address::GOAL_FORCE_MN, 0), (address::STATUS_RETURN_LEVEL, ALL_ANSWERED)];
-        return super::each(reach, false, &first, |client| {
-            let stopped = stop(client, true, json)?;
-            if json {
-                say_json(&stopped);
-            }
-            Ok(())
-        });
-    }
     let mut client = Client::open(reach)?;
-    client.set_all(address::TORQUE_ENABLE, 0)?;
-    let found = client.ping_all()?;
-    if found.is_empty() {
-        return Err("torque off was sent to all IDs, but nothing answers: is the baud rate right?".into());
+    let answered = (address::STATUS_RETURN_LEVEL, ALL_ANSWERED);
+    let (mut ids, mut first) = (&reach.ids[..], &[(address::GOAL_FORCE_MN, 0), answered][..]);
+    if args.all {
+        client.set_all(address::TORQUE_ENABLE, 0)?;
+        aside("torque off was sent to all IDs");
+        (ids, first) = (&[BROADCAST], &first[1..]);
     }
-    let fingers: Vec<u8> = found.iter().filter(|pong| pong.is_fingertip()).map(|pong| pong.id).collect();
-    client.set_each(&fingers, address::STATUS_RETURN_LEVEL, ALL_ANSWERED)?;
-    let (mut all, mut failed) = (Vec::new(), Vec::new());
-    for pong in found {
-        client.id = pong.id;
-        if !pong.is_fingertip() {
-            super::aside(format_args!("ID {} is no fingertip: torque off was sent, not checked", pong.id));
-            continue;
+    super::each(&mut client, ids, false, first, |client| {
+        let stopped = stop(client, !args.all, json)?;
+        if json {
+            say_json(&stopped);
         }
-        match stop(&mut client, false, json) {
-            Ok(stopped) => all.push(stopped),
-            Err(why) => failed.push(why.to_string()),
-        }
-    }
-    if json {
-        say_json(&json!(all));
-    }
-    if failed.is_empty() { Ok(()) } else { Err(failed.join("; ").into()) }
+        Ok(())
+    })
 }
 
 /// Sets the bus watchdog of a finger with torque off. Where another client of `fingertip share` commands, it is that

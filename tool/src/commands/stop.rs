@@ -44,7 +44,7 @@ impl<'a> Moving<'a> {
         if watchdog < 0 {
             return Err("the bus watchdog has tripped: `fingertip recover` resets it".into());
         }
-        client.set(address::BUS_WATCHDOG, WATCHDOG)?;
+        client.again(|client| client.set(address::BUS_WATCHDOG, WATCHDOG))?;
         // A command that was killed left its own value: that is not put back.
         Ok(Self { client, watchdog: Some(if watchdog == WATCHDOG { 0 } else { watchdog }) })
     }

@@ -413,12 +413,13 @@ fn at_rest(finger: &Served, point: u64) -> String {
 fn a_press_whose_packets_are_lost_does_not_press_on() {
     let finger = Served::begin("wall");
     finger.done(&["tare"]);
-    for (packets, lost) in [(30, 1), (30, 2), (30, 3), (31, 5), (32, 6), (33, 40)] {
+    for (packets, lost) in [(5, 2), (30, 1), (30, 2), (30, 3), (31, 5), (32, 6), (33, 40)] {
         finger.command(&format!("deaf after {packets} for {lost}"));
         let press = ["--timeout-ms", "50", "press", "0.5", "--seconds", "1", "--within-s", "3600"];
         let (code, said) = ended(&finger.start(&press).wait_with_output().expect("it ends"));
         at_rest(&finger, lost);
-        assert!(code == Some(0) || said.contains("fingertip: "), "{said}");
+        // The sixth packet sets the bus watchdog, which would stay if only its answer was lost: it is sent again.
+        assert!(code == Some(0) || packets > 5 && said.contains("fingertip: "), "{said}");
         finger.command("deaf no more");
         finger.done(&["recover"]);
     }

@@ -7,6 +7,11 @@ pub fn seconds(text: &str) -> Result<f64, String> {
     within(text, &(0.0..=1e9))
 }
 
+/// Time under a weight, s: the solver needs 5 s of readings.
+pub fn creep_s(text: &str) -> Result<f64, String> {
+    within(text, &(6.0..=1e9))
+}
+
 /// A rate, Hz: from one state in a quarter of an hour to more states than there are frames.
 pub fn rate_hz(text: &str) -> Result<f64, String> {
     within(text, &(0.001..=1e6))

@@ -7,6 +7,7 @@ use super::press::direction_confirmed;
 use crate::{Client, Error, numbers, table};
 use fingertip::measure::Task;
 use fingertip::params::Params;
+use fingertip::shipped::address;
 use serde_json::json;
 use solve::Value;
 use solve::modulus::Modulus;
@@ -14,6 +15,9 @@ use std::time::Duration;
 
 /// Goals of the holds where none are given, N.
 const GOALS_N: [f64; 3] = [1.0, 2.5, 4.0];
+/// Temperature of a controller that does not measure it, mdegC, and what to do.
+const NO_CHIP_MC: i64 = -273_150;
+const NO_CHIP: &str = "the controller does not measure its temperature: leave --warm out";
 /// End of the name of a press after the controller became warmer, behind the name of the press at the same place.
 const WARM: &str = "-warm.fts";
 
@@ -37,7 +41,7 @@ pub struct Calibrate {
     #[arg(long, value_name = "NEWTONS", value_delimiter = ',', value_parser = numbers::shown_n, conflicts_with = "no_scale")]
     shown_n: Vec<f64>,
     /// Also measure creep, by a weight that lies on the tip for this time
-    #[arg(long, value_name = "SECONDS", value_parser = numbers::seconds)]
+    #[arg(long, value_name = "SECONDS", value_parser = numbers::creep_s)]
     creep_s: Option<f64>,
     /// Also measure the temperature coefficient, by one more press once the controller is 5 K warmer
     #[arg(long)]
@@ -93,6 +97,9 @@ impl Calibrate {
 pub fn calibrate(args: &Calibrate, client: &mut Client, json: bool) -> Result<(), Error> {
     args.how.check(json)?;
     direction_confirmed(client)?;
+    if args.warm && client.number(address::CHIP_MC)? == NO_CHIP_MC {
+        return Err(NO_CHIP.into());
+    }
     let mut procedure = Procedure::begin("calibrate", &args.options, json, client)?;
     let goals_mn = args.goals_mn(json, &procedure.session)?;
     procedure.press_all(args.presses, &args.how)?;
@@ -191,7 +198,7 @@ fn temperature(args: &Calibrate, procedure: &mut Procedure<'_>) -> Result<(), Er
     let cold = procedure.pressed(&cold)?;
     if !procedure.session.records.contains_key(&warm) {
         let chip_c = cold.steps.iter().find_map(|step| step.chip_c);
-        let chip_c = chip_c.ok_or("the controller does not measure its temperature: leave --warm out")?;
+        let chip_c = chip_c.ok_or(NO_CHIP)?;
         procedure.warm(chip_c + 5.0, Duration::from_secs_f64(args.warm_within_s))?;
     }
     let question = "the controller is warm: leave finger and plate where they were in the last press";

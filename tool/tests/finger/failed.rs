@@ -106,7 +106,7 @@ fn numbers_that_are_none_are_not_understood() {
         ("press", "nan|0|-1|151"),
         ("press 1", "--seconds nan|--within-s nan|--seconds=-1"),
         ("capture --out a.mcap", "--press 0"),
-        ("calibrate", "--within-s nan|--shown-n 200|--presses 0"),
+        ("calibrate", "--within-s nan|--shown-n 200|--presses 0|--creep-s 5"),
         ("commission", "--forward perhaps|--resistance-ohm nan"),
         ("params get", "nonsense|pressures"),
         ("latency", "--seconds nan"),

@@ -318,8 +318,13 @@ fn numbers_of_a_scale_belong_to_their_holds() {
     let session = finger.file("scale");
     let calibrate = [&QUICK[..], &["--presses", "1", "--session", &session]].concat();
     let run = |more: &[&str]| output(&finger, &[&calibrate[..], more].concat());
-    let (code, _, why) = run(&["--scale-n", "1,9", "--shown-n", "1.1,9.9"]);
-    assert!(code == Some(1) && why.contains("9000 mN cannot be held") && finger.heard() < 200, "before a press: {why}");
+    for (wrong, what) in [
+        (&["--scale-n", "1,9", "--shown-n", "1.1,9.9"][..], "9000 mN cannot be held"),
+        (&["--no-scale", "--warm"], "does not measure its temperature"),
+    ] {
+        let (code, _, why) = run(wrong);
+        assert!(code == Some(1) && why.contains(what) && finger.heard() < 200, "before a press: {why}");
+    }
     run(&["--scale-n", "1,2", "--shown-n", "1.1,2.2"]);
     let heard = finger.heard();
     for wrong in [["--scale-n", "1", "--shown-n", "1.1"], ["--scale-n", "2,1", "--shown-n", "2.2,1.1"]] {

@@ -96,7 +96,8 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
         let (within_s, travel_mm) = (args.within_s, held.last.travel_um as f64 * 1e-3);
         let state = format!("mode {mode}, {force_mn} mN, travel {travel_mm:.2} mm, limits: {limits}");
         let why = format!("{goal_mn} mN are not reached within {within_s} s: {state}");
-        return Err(format!("{why}. Is there something to press on?").into());
+        let ask = "Is there something to press on? A tip that is at the end of its travel is pushed back by hand";
+        return Err(format!("{why}. {ask}").into());
     }
     if outside > 0 {
         let band = format!("{goal_mn} +- {tolerance_mn:.0} mN (--tolerance-percent)");

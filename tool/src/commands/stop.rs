@@ -12,8 +12,9 @@ use fingertip::state::{Limits, Mode};
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 
-/// Bus watchdog while a command moves the finger: the controller stops the motor after this silence.
-const WATCHDOG_MS: i64 = 500;
+/// Bus watchdog while a command moves the finger: the controller stops the motor after this silence. No round number, so
+/// that it is not the value of somebody else.
+const WATCHDOG_MS: i64 = 520;
 /// Unit of the register `bus_watchdog`, ms.
 pub const WATCHDOG_UNIT_MS: i64 = 20;
 /// [`WATCHDOG_MS`] in this unit.

@@ -84,7 +84,7 @@ fn it_tares_presses_and_lets_go() {
     let tared = finger.json(&["tare"]);
     assert_eq!((&tared["tared"], &tared["touched"]), (&true.into(), &false.into()));
     // As a command leaves it that was killed before torque was on.
-    finger.set(&[(address::BUS_WATCHDOG, 25)]);
+    finger.set(&[(address::BUS_WATCHDOG, 26)]);
     let held = finger.json(&["press", "1.5", "--seconds", "0.3", "--within-s", "3600"]);
     let mean_mn = held["mean_mn"].as_f64().expect("a number");
     assert!((1_470.0..=1_530.0).contains(&mean_mn) && held["held_s"].as_f64() >= Some(0.3), "{held}");

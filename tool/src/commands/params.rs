@@ -95,13 +95,7 @@ pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Err
             Ok(())
         }
         Command::Restore { file, save } => {
-            let Backup { mut values, gains, origin } = read_backup(file)?;
-            for ((name, here), of) in read_origin(client)?.into_iter().zip(origin) {
-                if let Some(of) = of.filter(|of| *of != here) {
-                    let whose = format!("{} has {name} {of}, this controller {here}", file.display());
-                    return Err(format!("{whose}. Where that is meant, take out the line `{name}`").into());
-                }
-            }
+            let Backup { mut values, gains } = read_backup(file, &read_origin(client)?)?;
             // Who moves a device to another address or speed means it, and says so by `set`.
             values.retain(|(register, _)| !is_bus(register));
             conclude(&set(&values, gains, client)?, *save, client, json)
@@ -190,7 +184,7 @@ fn diff(file: Option<&Path>, client: &mut Client, json: bool) -> Result<(), Erro
     let Stored { values: now, gains: gains_now } = Stored::read(client)?;
     let (other, other_gains, what) = match file {
         Some(path) => {
-            let Backup { values, gains, .. } = read_backup(path)?;
+            let Backup { values, gains } = read_backup(path, &[])?;
             (values, gains, path.display().to_string())
         }
         None => {
@@ -446,22 +440,18 @@ const PARAMETERS: &str = "parameters";
 const GAINS: &str = "gains";
 /// Number of entries: a file that was cut has fewer, or a last line without an end.
 const ENTRIES: &str = "entries";
-/// Names of the lines that say what a backup is of: the controller, and the version of its control table.
-const ORIGIN: [&str; 2] = ["chip_id", "table_version"];
 
 struct Backup {
     /// Values of registers with a name.
     values: Vec<Value>,
     /// The taxels' gains, in rows; `None` if the file has none.
     gains: Option<Vec<Vec<u16>>>,
-    /// Numbers of the lines [`ORIGIN`], where the file has them.
-    origin: [Option<i64>; 2],
 }
 
-/// Reads the lines [`ORIGIN`] of this controller.
+/// Reads the lines that say what a backup is of: the controller, and the version of its control table.
 fn read_origin(client: &mut Client) -> Result<[(&'static str, i64); 2], Error> {
-    let [chip, version] = ORIGIN;
-    Ok([(chip, client.number(address::CHIP_ID)?), (version, client.number(address::MODEL_INFORMATION)? >> 16)])
+    let version = client.number(address::MODEL_INFORMATION)? >> 16;
+    Ok([("chip_id", client.number(address::CHIP_ID)?), ("table_version", version)])
 }
 
 /// Writes it, whole or not at all.
@@ -486,7 +476,8 @@ fn write_backup(path: &Path, force: bool, client: &mut Client, stored: &Stored) 
     whole::write(path, force, text.as_bytes())
 }
 
-fn read_backup(path: &Path) -> Result<Backup, Error> {
+/// Reads it. Fails where a line of its origin is there, and differs from these.
+fn read_backup(path: &Path, origin: &[(&str, i64)]) -> Result<Backup, Error> {
     let text = fs::read_to_string(path).map_err(|why| match why.kind() {
         ErrorKind::InvalidData => Error::file("read", path, "it is no text"),
         _ => Error::file("read", path, why),
@@ -496,7 +487,14 @@ fn read_backup(path: &Path) -> Result<Backup, Error> {
     let table = table.ok_or_else(|| Error::file("read", path, format_args!("it has no table [{PARAMETERS}]")))?;
     let rows = document.get(GAINS).and_then(|item| item.as_table());
     let entries = table.len() + rows.map_or(0, |rows| rows.len());
-    let number = |name| document.get(name).and_then(|item| item.as_integer());
+    let number = |name: &str| document.get(name).and_then(|item| item.as_integer());
+    for (name, here) in origin {
+        if let Some(of) = number(name).filter(|of| of != here) {
+            let why =
+                format!("its {name} is {of}, the controller's {here}. Where that is meant, take out the line `{name}`");
+            return Err(Error::file("read", path, why));
+        }
+    }
     if let Some(count) = number(ENTRIES)
         && (count != entries as i64 || !text.ends_with('\n'))
     {
@@ -534,12 +532,7 @@ fn read_backup(path: &Path) -> Result<Backup, Error> {
         }
         gains
     });
-    let origin = ORIGIN.map(number);
-    if wrong.is_empty() {
-        Ok(Backup { values, gains, origin })
-    } else {
-        Err(Error::file("read", path, wrong.join("; ")))
-    }
+    if wrong.is_empty() { Ok(Backup { values, gains }) } else { Err(Error::file("read", path, wrong.join("; "))) }
 }
 
 // The taxels' gains, which outlive a reset beside the parameters.

@@ -76,15 +76,10 @@ impl Plant {
         self.world.sense(0, bus_silent_ms)
     }
 
-    /// Mean pressure on a taxel.
+    /// Settled voltages of all columns while these rows are driven.
     ///
     /// # Panics
-    /// The row or the column is beyond the array, as in all methods below.
-    pub fn pressure_kpa(&mut self, row: usize, column: usize) -> f64 {
-        self.world.row_kpa(0, f64::INFINITY, row)[column]
-    }
-
-    /// Settled voltages of all columns while these rows are driven.
+    /// The row is beyond the array, as in all methods below.
     pub fn settled_volts(&mut self, driven: &[bool; ROWS]) -> [f64; COLUMNS] {
         let (array, faults) = (self.finger().setup.array, self.faults.array);
         if faults.saturated {

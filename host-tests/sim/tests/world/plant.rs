@@ -3,10 +3,9 @@
 use crate::*;
 use fingertip::config::newtons;
 use fingertip::shipped::{self, Frame};
-use sim::mechanics::decay;
 use sim::mechanics::pressures::Cell;
 use sim::mechanics::rotor::{Unreachable, profile};
-use sim::plant::{Plant, Row, Setup, Taxel};
+use sim::plant::{Plant, Setup};
 
 /// The step that the tests vouch for.
 const STEP_S: f64 = 10e-6;
@@ -117,33 +116,6 @@ fn means_agree_with_brute_force() {
 }
 
 #[test]
-fn the_picture_has_the_contacts_symmetry() {
-    let mut world = pressed(1.6);
-    for row in 0..ROWS {
-        for column in 0..COLUMNS {
-            let p = world.pressure_kpa(row, column);
-            for q in [world.pressure_kpa(ROWS - 1 - row, column), world.pressure_kpa(column, row)] {
-                assert!((p - q).abs() < 1e-5 * 40.0, "({row}, {column}): {p} and {q}");
-            }
-        }
-    }
-}
-
-#[test]
-fn rows_follow_the_indentation_the_wall_and_the_pitch() {
-    let felt_kpa = |d_mm: f64, centre_y_mm, pitch_mm| {
-        let mut setup = Setup::default();
-        (setup.wall.centre_y_mm, setup.array.pitch_mm) = (centre_y_mm, pitch_mm);
-        let mut plant = Plant::new(&setup);
-        plant.place(setup.wall.distance_mm + d_mm);
-        plant.pressure_kpa(3, 5)
-    };
-    let nearer = felt_kpa(1.1, -1.0, 1.5);
-    assert!(felt_kpa(1.0, 0.0, 1.5) < felt_kpa(1.1, 0.0, 1.5) && felt_kpa(1.1, 0.0, 1.5) < nearer);
-    assert!(felt_kpa(1.1, -1.0, 3.0) < nearer);
-}
-
-#[test]
 fn any_contact_inside_the_array_is_wholly_felt() {
     let mut rng = fastrand::Rng::with_seed(2003);
     for _ in 0..4_096 {
@@ -164,21 +136,6 @@ fn relative_error_of_sum(d: f64, x: f64, y: f64) -> f64 {
         sum_kpa += (0..COLUMNS).map(|column| Cell::of(&setup, row, column).mean_kpa(&tip)).sum::<f64>();
     }
     sum_kpa * 1e-3 * setup.array.pitch_mm * setup.array.pitch_mm / setup.tip.force_n(d) - 1.0
-}
-
-#[test]
-fn the_decay_factor_is_the_exponential() {
-    let mut worst = 0.0_f64;
-    for n in 0..=40_000 {
-        let x = f64::from(n) * 1e-3;
-        worst = worst.max((decay(x) / (-x).exp() - 1.0).abs());
-        if n == 12_000 {
-            assert!(worst < 1e-12, "{worst:e} up to 12");
-        }
-    }
-    assert!(worst < 1e-11, "{worst:e} up to 40");
-    assert_eq!(decay(1e6), 0.0);
-    assert_eq!(decay(0.0), 1.0);
 }
 
 #[test]
@@ -208,40 +165,6 @@ fn a_frame_holds_every_slot() {
     // The middle taxels' mean r^2 is 1.5 mm^2, where p is 23.3 kPa: 559 codes, 40 of preload, 0.4 % of sag, 372 of
     // ground.
     assert!((963..975).contains(&frame.code(5, 5)), "{}", frame.code(5, 5));
-}
-
-#[test]
-fn defects_show_where_they_are() {
-    let mut sound = pressed(1.0);
-    let code = |world: &mut Plant, row, column| f64::from(world.slot_codes(row)[column]);
-
-    let mut dead = pressed(1.0);
-    dead.faults.array.taxels[4][5] = Taxel::Dead;
-    assert_eq!(dead.slot_codes(4)[5], 372);
-    assert_eq!(dead.slot_codes(5)[5], sound.slot_codes(5)[5]);
-
-    let mut shorted = pressed(1.0);
-    shorted.faults.array.taxels[4][5] = Taxel::Shorted;
-    assert_eq!(shorted.slot_codes(4)[5], 4095);
-    // The row's switch carries 100 mS: R_on S = 3, so the others read a quarter.
-    let share = (code(&mut shorted, 4, 4) - 372.4) / (code(&mut sound, 4, 4) - 372.4);
-    assert!((0.24..0.26).contains(&share), "{share}");
-
-    let mut low = pressed(1.0);
-    low.faults.array.rows[4] = Row::StuckLow;
-    assert_eq!(low.slot_codes(4)[5], 372);
-    assert_eq!(low.slot_codes(5)[5], sound.slot_codes(5)[5]);
-
-    let mut high = pressed(1.0);
-    high.faults.array.rows[4] = Row::StuckHigh;
-    assert_eq!(high.slot_codes(4)[5], sound.slot_codes(4)[5]);
-    assert_eq!(high.slot_codes(ROWS)[5], sound.slot_codes(4)[5]);
-    let both = code(&mut sound, 4, 5) + code(&mut sound, 5, 5) - 372.4;
-    assert!((code(&mut high, 5, 5) - both).abs() < 2.0);
-
-    let mut saturated = pressed(1.0);
-    saturated.faults.array.saturated = true;
-    assert!((0..SLOTS).all(|slot| saturated.slot_codes(slot) == [4095; COLUMNS]));
 }
 
 // The motor against its data sheet, friction, encoder and supply; the time-optimal bound against closed forms and
@@ -309,29 +232,6 @@ fn the_encoder_counts_down_to_the_lower_edge() {
         world.place(travel);
         assert_eq!(world.encoder_counts(), (travel * counts_per_mm).floor() as i32, "at {travel} mm");
     }
-}
-
-#[test]
-fn a_frozen_encoder_stands_still_and_catches_up() {
-    let mut world = Plant::new(&free());
-    run(&mut world, 0.01, FULL);
-    let before = world.encoder_counts();
-    world.faults.encoder_frozen = true;
-    run(&mut world, 0.01, FULL);
-    assert_eq!(world.encoder_counts(), before);
-    world.faults.encoder_frozen = false;
-    run(&mut world, STEP_S, FULL);
-    assert!(world.encoder_counts() > before + 100);
-}
-
-#[test]
-fn a_supply_that_drops_is_sensed() {
-    let mut world = Plant::new(&free());
-    world.faults.supply_drop_v = 2.0;
-    world.advance(0.0, Bridge::Coast);
-    assert_eq!(world.finger().supply_v(), 4.0);
-    assert_eq!(world.sense(3).supply_mv, 4_000);
-    assert_eq!(world.sense(3).bus_silent_ms, 3);
 }
 
 const NO_LIMIT: f64 = f64::INFINITY;

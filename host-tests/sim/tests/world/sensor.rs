@@ -61,22 +61,6 @@ fn any_effect_and_all_together_change_any_input_alike_each_time() {
 }
 
 #[test]
-fn without_magnitude_no_bit_changes() {
-    let plain = scan(&mut (), 1000, 1);
-    assert_eq!(scan(&mut stages("", 1), 1000, 1), plain);
-    let all: String = effects::all().filter(|effect| names().contains(&effect.name)).map(sim::scene::zero).collect();
-    let mut zero = stages(&all, 1);
-    assert_eq!(scan(&mut zero, 1000, 1), plain);
-    // The chip's temperature is not part of a scan.
-    let costs: Vec<_> = zero.costs().filter(|cost| cost.evaluations > 0).collect();
-    for cost in &costs {
-        let a_frame = cost.evaluations as usize / 1000;
-        assert!(a_frame == ROWS || a_frame == SLOTS, "{} is called {a_frame} times a frame", cost.effect);
-    }
-    assert_eq!(costs.len(), names().len());
-}
-
-#[test]
 fn an_effects_numbers_are_its_own() {
     // Naming another effect without magnitude does not change the draws of the noise.
     let noise = "[effects.noise]\nrms_codes = 3\n";
@@ -152,17 +136,6 @@ fn creep_grows_by_its_rate_in_each_decade() {
             assert!(allowed.contains(&percent), "{percent} % in decade {number} from 1 ms");
         }
     }
-}
-
-#[test]
-fn creep_does_not_mind_how_often_it_is_asked() {
-    let ask = |times: u32| {
-        let mut effect = effect("creep", "rate_percent_per_decade = 5", 1);
-        reads(&mut effect, 0.0, 20.0);
-        (1..=times).map(|n| reads(&mut effect, f64::from(n) / f64::from(times), 20.0)).last().unwrap()
-    };
-    let (once, often) = (ask(1), ask(10_000));
-    assert!((once - often).abs() < 1e-9, "{once} and {often}");
 }
 
 #[test]

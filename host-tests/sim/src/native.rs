@@ -452,10 +452,6 @@ mod tests {
             of(|step| step.2.goal = Newtons::from_bits(1)),
             of(|step| step.2.measure_request = 1),
             of(|step| step.3 = Duty(1)),
-            of(|step| step.4.sequence = 1),
-            of(|step| step.4.contact.bad_taxels = 1),
-            of(|step| step.4.duty = Duty(1)),
-            of(|step| step.4.tare = fingertip::pipeline::Taring::Running),
             of(|step| step.4.taken.clear = 1),
         ];
         let steps = all.len();

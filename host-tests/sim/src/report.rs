@@ -384,26 +384,3 @@ impl Over {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn bound(metric: &str, held: bool) -> Verdict {
-        Verdict { metric: metric.into(), value: Some(2.0), min: None, max: Some(1.0), held }
-    }
-
-    #[test]
-    fn each_metric_is_in_one_group_and_broken_ones_come_first() {
-        let verdicts = [bound("peak_force_n", true), bound("finger1.energy_j", false), bound("energy_j", false)];
-        let groups = groups(&verdicts);
-        let mut names: Vec<_> = groups.iter().flat_map(|group| &group.metrics).map(|metric| metric.name).collect();
-        assert_eq!(names.len(), METRICS.len());
-        names.sort_unstable();
-        names.dedup();
-        assert_eq!(names.len(), METRICS.len());
-        assert_eq!((groups[0].title, groups[0].broken), ("Motor and energy", 2));
-        assert!(groups[1..].iter().all(|group| group.broken == 0));
-        assert_eq!(groups[1].title, "Force");
-    }
-}

@@ -198,6 +198,10 @@ fn what_is_broken_comes_first_and_the_rest_is_folded() {
     let groups: Vec<&str> = page.split("<details class=\"group\"").skip(1).collect();
     assert!(groups.len() > 4 && groups[0].starts_with(" open><summary>Motor and energy"), "{}", &groups[0][..80]);
     assert!(groups[1..].iter().all(|group| group.starts_with("><summary>")));
+    // Each metric is in one group.
+    for name in METRICS.iter().map(|metric| metric.name) {
+        assert_eq!(groups.concat().matches(&format!("<code>{name}</code>")).count(), 1, "{name}");
+    }
 }
 
 #[test]

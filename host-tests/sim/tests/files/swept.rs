@@ -48,12 +48,9 @@ fn shards_merged_are_the_whole_byte_for_byte() {
 
     // What cannot be merged is refused.
     let refused = |files: &[PathBuf]| merge(files, &folder("swept/refused")).unwrap_err().to_string();
-    assert!(refused(&parts[1..]).contains("3 of 12 runs are missing, run 4 the first"), "{}", refused(&parts[1..]));
-    assert!(refused(&[parts.clone(), vec![parts[0].clone()]].concat()).contains("there twice"));
     let other = folder("swept/other");
     sweep(&Plan { seeds: 1, ..plan(&other, Shard { number: 1, of: 2 }) }, &native::board).unwrap();
     assert!(refused(&[parts[0].clone(), other.join("runs-1-of-2.csv")]).contains("is of the sweep"));
-    assert!(refused(&[whole.join("summary.csv")]).contains("is no shard"));
 }
 
 fn runs_are_numbered_point_by_point_and_seed_by_seed(table: &Table) {

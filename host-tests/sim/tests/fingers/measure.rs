@@ -83,7 +83,7 @@ fn make_all(fingers: &[Finger], task: Task, place_mm: Option<Place>) -> Vec<Made
     })
 }
 
-sim::sizes!(valid_presses_complete, presses_complete(10), presses_complete(60));
+sim::sizes!(valid_presses_complete, presses_complete(6), presses_complete(60));
 
 /// Every press completes and gives a modulus: most within two reported sigmas, and with errors that are not smaller
 /// than noise allows.
@@ -108,7 +108,7 @@ fn presses_complete(count: usize) {
     errors_percent.sort_by(f64::total_cmp);
     let (median, worst) = (errors_percent[count / 2], errors_percent[count - 1]);
     assert!((0.1..4.0).contains(&median) && worst < 10.0, "errors of {median:.2} %, {worst:.2} % at most");
-    // A share of ten presses says little: 95 of 100 are expected.
+    // A share of a few presses says little: 95 of 100 are expected.
     assert!(count < 60 || 10 * within >= 9 * count, "{within} of {count} within two sigmas");
     let rms = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>().sqrt();
     let honest = rms(&sigmas_percent) / rms(&errors_percent);

@@ -135,23 +135,6 @@ fn a_goal_is_held_within_the_least_contact_and_the_largest_force() {
     assert!(status.limits.has(Limits::GOAL) && (6.9..=7.1).contains(&force_n), "{force_n} N");
 }
 
-/// An object that yields at 100 mm/s: the force falls by more than a quarter within a frame of a slow scan.
-#[test]
-fn a_slow_scan_follows_an_object_that_yields() {
-    let config = allowed(Params { settle_ns: 100_000, sample_cycles: 480, ..images::CONFIRMED });
-    let frame_s = f64::from(config.timing.frame_ns) * 1e-9;
-    let mut board = Bench::of(&Setup::default(), &config);
-    board.tare();
-    run(&mut board, 1_000, 1.0);
-    for frame in 1..=3 {
-        board.place_object(5.0 + 100.0 * frame_s * f64::from(frame));
-        board.step();
-    }
-    let (_, status) = run(&mut board, 1_000, 2.0);
-    let force_n = board.truth().force_n;
-    assert!(status.mode == Mode::Force && (force_n - 1.0).abs() < 0.02, "{force_n} N, {:?}", status.mode);
-}
-
 /// Speed of an object that is carried.
 const CARRIED_MM_PER_S: f64 = 5.0;
 

@@ -216,27 +216,6 @@ fn a_gain_scales_its_taxel_and_no_other() {
 }
 
 #[test]
-fn a_masked_taxel_reads_as_nothing_and_is_no_fault() {
-    let [mut pressed, blank] = frames();
-    let config = config();
-    let mut mask = [0; ROWS];
-    mask[4] = 1 << 5;
-    mask[7] = 0x3ff;
-    let array = |frame: &Frame| {
-        let mut array = tared(&Calibration::new(&GAINS, &mask).unwrap(), &blank, &config);
-        (*array.read(frame, &config), array.begin(frame, ROWS, &config).0)
-    };
-    let (sound, _) = array(&pressed);
-    assert_eq!((sound.taxels[4][5], sound.taxels[7], sound.bad, sound.bad_count), (0, [0; COLUMNS], mask, 0));
-    // One of them dies, and one that counts.
-    pressed.set_code(4, 5, 0);
-    pressed.set_code(4, 4, 4095);
-    let (dead, glanced) = array(&pressed);
-    assert_eq!((dead.taxels[4][4], dead.taxels[4][5]), (0, 0));
-    assert_eq!((dead.bad[4], dead.bad[7], dead.bad_count, glanced), (0b11_0000, 0x3ff, 1, 1));
-}
-
-#[test]
 fn what_cannot_be_is_refused_by_name() {
     for (value, row, column) in [(0, 0, 0), (GAIN_MAX + 1, 9, 9), (u16::MAX, 3, 7)] {
         let mut gains = GAINS;

@@ -26,12 +26,6 @@ fn load(nor: &Nor) -> Loaded {
 }
 
 #[test]
-fn an_erased_board_has_the_defaults_and_no_fault() {
-    assert_eq!(start_in(Sector::A, &[]), (Loaded { record: Record::DEFAULT, sound: true }, vec![]));
-    assert_eq!(load(&Nor::blank(0)), Loaded { record: Record::DEFAULT, sound: true });
-}
-
-#[test]
 fn garbage_is_a_fault_with_the_defaults_and_the_next_save_ends_it() {
     let garbage: Vec<u8> = (0..SIZE as u64).map(|place| bits(place) as u8).collect();
     for both in [false, true] {

@@ -312,30 +312,6 @@ fn a_force_counts_from_the_end_of_a_contact_on() {
 }
 
 #[test]
-fn a_goal_is_held_between_the_least_contact_and_the_largest_force() {
-    let (hand, held, travel) = Hand::pressing();
-    let most = CONFIG.force_max.min(CONFIG.force_seen);
-    let asks = |goal: Newtons| { hand }.frame_of(goal, &held, at(travel));
-    for goal in [CONFIG.contact_on, most, newtons(2_000)] {
-        assert_eq!(asks(goal).1 & Limits::GOAL, 0, "{goal:?}");
-    }
-    for (goal, held) in [
-        (Newtons::from_bits(CONFIG.contact_on.to_bits() - 1), CONFIG.contact_on),
-        (Newtons::from_bits(1), CONFIG.contact_on),
-        (Newtons::from_bits(most.to_bits() + 1), most),
-        (Newtons::from_bits(i32::MAX), most),
-    ] {
-        let (expected, flags) = asks(held);
-        assert_eq!(asks(goal), (expected, flags | Limits::GOAL));
-    }
-    // The converter may saturate below the allowed force.
-    let config = Box::leak(Box::new(Config { force_seen: newtons(1_500), ..config() }));
-    let blind = Hand { config, ..hand };
-    let (seen, flags) = { blind }.frame(1_500, &held, at(travel));
-    assert_eq!({ blind }.frame(1_501, &held, at(travel)), (seen, flags | Limits::GOAL));
-}
-
-#[test]
 fn no_distance_goes_beyond_the_end_of_the_travel() {
     let distance = CONFIG.tip.indentation(newtons(5_000));
     for (left, cut) in

@@ -51,16 +51,8 @@ fn the_finger_is_driven_with_addresses_below_256() {
 
 #[test]
 fn state_time_and_pressures_fit_one_read_of_255_bytes() {
-    let begin = address::PICTURE_TIME_US;
-    let length = address::PRESSURES + 2 * TAXELS as u16 - begin;
-    assert!(length <= 255 && 255 < READ_MAX, "{length}");
-    let mut bench = busy();
-    let data = bench.read(begin, length).expect("one read");
-    let pressures = bench.read(address::PRESSURES, 2 * TAXELS as u16).expect("the pressures");
-    assert_eq!(data[data.len() - 2 * TAXELS..], pressures);
-    let force = usize::from(address::PICTURE_FORCE_MN - begin);
-    assert_eq!(data[force..force + 4], 1_234i32.to_le_bytes());
-    assert!((begin..begin + length).all(owned), "no gap between");
+    let (begin, end) = (address::PICTURE_TIME_US, address::PRESSURES + 2 * TAXELS as u16);
+    assert!(end - begin <= 255 && 255 < READ_MAX && (begin..end).all(owned), "{}", end - begin);
 }
 
 /// Registers that drivers of X-series servos read and write under their own names.

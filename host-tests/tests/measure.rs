@@ -246,7 +246,7 @@ fn frames(task: Task) -> u32 {
     frames
 }
 
-sim::sizes!(a_motion_ends_at_any_moment_and_the_next_one_works, end_and_go_on: &[4], &[0, 1, 2, 3, 5, 6]);
+sim::sizes!(a_motion_ends_at_any_moment_and_the_next_one_works, end_and_go_on: &[1], &[0, 2, 3, 4, 5, 6]);
 
 fn end_and_go_on(parts: &[u32]) {
     for task in [Task::Jog, Task::Strokes, Task::Press] {
@@ -488,7 +488,8 @@ fn a_request_during_a_motion_is_answered_by_its_end() {
             }
             finger.ends().measure
         };
-        assert_eq!(end(&[]), end(&[Task::Jog, Task::Strokes, Task::Press]));
-        assert_eq!(end(&[]).state, MeasureState::Done);
+        let alone = end(&[]);
+        assert_eq!(end(&[Task::Jog, Task::Strokes, Task::Press]), alone);
+        assert_eq!(alone.state, MeasureState::Done);
     }
 }

@@ -133,7 +133,7 @@ fn the_python_example_touches_holds_and_lets_go() {
     assert_eq!(Path::new(&board.name), link);
 
     // As patient as it takes on the slowest machine: two hours mean that the board hangs.
-    let said = example("force.py", &link, &["--newtons", "1.5", "--readings", "50", "--patience-ms", "7200000"]);
+    let said = example("force.py", &link, &["--newtons", "1.5", "--readings", "10", "--patience-ms", "7200000"]);
     // The letters FT.
     assert!(said.starts_with("model 21574\ntared, force 0 mN\n"), "{said}");
     let held = said.lines().find_map(|line| line.strip_prefix("holding ")).expect(&said);

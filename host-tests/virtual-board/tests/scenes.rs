@@ -2,10 +2,9 @@
 
 use crate::common::image;
 use sim::cores;
-use sim::demo::{draw, missed, table};
+use sim::demo::{missed, table};
 use sim::scene::{self, Scene, read};
 use sim::watch::{Agreement, BEYOND_MM, BEYOND_N, Controller, Step, Summary, Watch};
-use std::path::Path;
 use virtual_board::demo;
 use virtual_board::scene::simulate;
 
@@ -183,7 +182,7 @@ fn every_other_scene() {
 // The demonstration on the flash image.
 
 #[test]
-fn every_bound_holds_and_the_pictures_are_drawn() {
+fn every_bound_of_the_demonstration_holds() {
     let (figures, run) = demo::run(&image(), true).expect("the demonstration runs");
     assert_eq!(missed(&figures.checks), 0, "\n{}", table(&figures.checks, &figures.forces));
     assert_eq!(figures.forces.steps.len(), 4);
@@ -197,13 +196,4 @@ fn every_bound_holds_and_the_pictures_are_drawn() {
         let sum_n: f64 = picture.pressures_kpa.iter().flatten().sum::<f64>() * 1.5 * 1.5 * 1e-3;
         assert!((sum_n - picture.goal_n).abs() < 0.03 * picture.goal_n, "{sum_n} N in {picture:?}");
     }
-
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("pictures");
-    let drawn = draw(&run, &figures.forces, &folder).expect("the pictures are drawn");
-    for path in &drawn {
-        let svg = std::fs::read_to_string(path).expect("it was written");
-        assert!(svg.starts_with("<svg") && !svg.contains("NaN"), "{}", path.display());
-    }
-    assert_eq!(drawn.len(), 3);
-    std::fs::remove_dir_all(&folder).expect("it was there");
 }

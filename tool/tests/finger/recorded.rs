@@ -150,30 +150,6 @@ fn readable(bytes: &[u8]) -> (Vec<(u32, Vec<u8>)>, bool) {
 }
 
 #[test]
-fn a_recording_that_was_cut_anywhere_is_read_up_to_its_last_whole_chunk() {
-    let finger = Served::begin("wall");
-    let file = finger.file("cut.mcap");
-    finger.done(&["record", "--seconds", "1.5", "--pressures", &file]);
-    let bytes = fs::read(&file).expect("it was written");
-    let all = readable(&bytes).0;
-    let chunks = Summary::read(&bytes).expect("MCAP").expect("a summary").chunk_indexes;
-    assert!(chunks.len() > 2, "{} chunks", chunks.len());
-    let ends: Vec<usize> =
-        chunks.iter().map(|chunk| (chunk.chunk_start_offset + chunk.chunk_length) as usize).collect();
-    for (place, end) in ends.iter().enumerate() {
-        let (messages, whole) = readable(&bytes[..*end]);
-        assert!(whole && messages.len() * ends.len() > place, "chunk {place}: {} messages", messages.len());
-    }
-    for point in 1..=20 {
-        let cut = bytes.len() * point / 21;
-        let messages = readable(&bytes[..cut]).0;
-        let chunk = ends.iter().rfind(|end| **end <= cut).map_or(0, |end| readable(&bytes[..*end]).0.len());
-        assert!(messages.len() >= chunk, "cut at {cut}: {} of {chunk} messages", messages.len());
-        assert_eq!(messages, all[..messages.len()], "cut at {cut}");
-    }
-}
-
-#[test]
 fn a_killed_recording_is_kept_and_can_be_read() {
     let finger = Served::begin("wall");
     for name in ["killed.mcap", "killed.csv"] {

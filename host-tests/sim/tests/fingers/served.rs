@@ -99,6 +99,7 @@ fn what_breaks_is_a_fault_until_it_is_mended_and_cleared() {
     host.wait(MODE, Mode::Approach as u8);
     host.frames(1_000);
     host.0.command("put").expect("a command");
+    assert_eq!(host.0.truths()[0].0.force_n, 0.0);
     host.wait(MODE, Mode::Force as u8);
     for (kind, fault) in breaks {
         host.0.command(&format!("fault {kind}")).expect("a command");

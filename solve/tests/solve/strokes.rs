@@ -156,8 +156,8 @@ fn a_refusal_states_its_reason_and_the_number_behind_it() {
     assert!(matches!(refused(&changed(|count| if count > 60 { count + 50 } else { count })), NoDrive::Astray(_)));
     // A memory that was full before the motions ended: the strokes in it count, but for the last.
     let full = record::Ended { reason: Reason::Full, value: 5_000 };
-    let cut = Record { strokes: record.strokes[..9].to_vec(), ended: Some(full), ..record.clone() };
-    let whole = Record { strokes: record.strokes[..8].to_vec(), ..record.clone() };
+    let cut = Record { strokes: record.strokes[..25].to_vec(), ended: Some(full), ..record.clone() };
+    let whole = Record { strokes: record.strokes[..24].to_vec(), ..record.clone() };
     let found = solve(&cut);
     assert!(found.is_ok() && found == solve(&whole), "{found:?}");
     assert_eq!(refused(&Record { strokes: record.strokes[..4].to_vec(), ..record.clone() }), NoDrive::Few(2));

@@ -55,7 +55,7 @@ pub fn put(image: &Image, probe: Option<&str>, console: &mut Console) -> Result<
         u32::from_str_radix(text.trim(), 16).with_context(|| format!("probe-rs reads {text:?}, not a word"))
     };
     // First, because this refuses another device.
-    if set_brown_out_level(read, |user| write_options(user, probe))? {
+    if set_brown_out_level(read, |options| write_options(options, probe))? {
         console.say("Programmed brown-out level 3 into the option bytes.");
     }
     let mut download = command("download");
@@ -65,7 +65,7 @@ pub fn put(image: &Image, probe: Option<&str>, console: &mut Console) -> Result<
 }
 
 // The option bytes (RM0390 3.6, 3.8). A write that a reset or a power loss cuts short can leave the device at read protection
-// level 1, and leaving level 1 erases the whole flash. The image's watchdogs reset a halted core too: so OpenOCD writes behind
+// level 1, and leaving level 1 erases the whole flash. The image's watchdogs reset a halted core too: so OpenOCD writes after
 // a reset that halts the core before its first instruction, with the watchdogs stopped.
 
 /// Device identifier in its lowest twelve bits (RM0390 33.6.1).
@@ -79,10 +79,15 @@ const RDP: u32 = 0xff << 8;
 const RDP_LEVEL_0: u32 = 0xaa << 8;
 /// One while only software starts the independent watchdog; zero starts it at reset, and 0.5 s later it resets.
 const WDG_SW: u32 = 1 << 5;
-/// The bits that OpenOCD takes; it keeps the protection of reads and sectors.
+/// The bits that OpenOCD takes. It keeps the protection of reads and writes, but not [`SPRMOD`].
 const USER: u32 = 0xfc;
+/// One where the sectors are protected from reads instead of writes; the factory leaves it zero.
+const SPRMOD: u32 = 1 << 31;
 /// All bits of the register that are option bytes.
 const OPTIONS: u32 = 0x80ff_ffec;
+/// Flash status register, and its bit that is set while the flash writes.
+const FLASH_SR: u32 = 0x4002_3c0c;
+const BSY: u32 = 1 << 16;
 
 /// Programs brown-out level 3, without which the image refuses torque; all other option bytes stay. False if it is set.
 fn set_brown_out_level(read: impl Fn(u32) -> Result<u32>, write: impl FnOnce(u32) -> Result<()>) -> Result<bool> {
@@ -93,10 +98,11 @@ fn set_brown_out_level(read: impl Fn(u32) -> Result<u32>, write: impl FnOnce(u32
         return Ok(false);
     }
     ensure!(
-        options & (RDP | WDG_SW) == RDP_LEVEL_0 | WDG_SW,
-        "the option bytes are {options:#010x}: set read protection level 0 and a software watchdog with STM32CubeProgrammer"
+        options & (RDP | WDG_SW | SPRMOD) == RDP_LEVEL_0 | WDG_SW,
+        "the option bytes are {options:#010x}: set read protection level 0, no PCROP and a software watchdog with \
+         STM32CubeProgrammer"
     );
-    write(options & USER & !BOR_LEV)?;
+    write(options)?;
     let written = read(OPTCR)?;
     ensure!(
         written & OPTIONS == options & OPTIONS & !BOR_LEV,
@@ -105,23 +111,47 @@ fn set_brown_out_level(read: impl Fn(u32) -> Result<u32>, write: impl FnOnce(u32
     Ok(true)
 }
 
-fn write_options(user: u32, probe: Option<&str>) -> Result<()> {
+/// Writes brown-out level 3 by OpenOCD to the device that has these option bytes.
+fn write_options(options: u32, probe: Option<&str>) -> Result<()> {
     if host::find_program("openocd").is_none() {
         bail!(
             "the board needs brown-out level 3 once, which OpenOCD programs, and it is not in PATH.\n\
              Install it (`apt install openocd`), or set BOR level 3 with STM32CubeProgrammer; then try again."
         );
     }
-    let mut command = Command::new("openocd");
-    command.args(["-f", "board/st_nucleo_f4.cfg"]);
-    if let Some(serial) = probe.and_then(|probe| probe.splitn(3, ':').nth(2)) {
-        command.arg("-c").arg(format!("adapter serial {serial}"));
-    }
-    let write = format!("init; reset halt; stm32f2x options_write 0 {user:#04x}; reset halt; shutdown");
-    console::output(command.arg("-c").arg(write)).map(drop).context(
+    let serial = match probe.map(|probe| probe.splitn(3, ':').nth(2)) {
+        Some(None) => bail!("give --probe as VID:PID:serial: by that OpenOCD finds the same board"),
+        serial => serial.flatten(),
+    };
+    let openocd = |script: &str| {
+        let mut command = Command::new("openocd");
+        command.args(["-f", "board/st_nucleo_f4.cfg"]);
+        command.args(serial.iter().flat_map(|serial| ["-c".into(), format!("adapter serial {serial}")]));
+        console::output(command.args(["-c", script])).map(drop)
+    };
+    let [check, write] = scripts(options);
+    openocd(&format!("{check}; shutdown")).context(
+        "No option byte was changed. OpenOCD needs an ST-LINK, and version 0.12 or newer; or set BOR level 3 with \
+         STM32CubeProgrammer.",
+    )?;
+    openocd(&format!("{check}; {write}; shutdown")).context(
         "OpenOCD did not end well: the flash may still be writing, and an interrupted write can lock the device.\n\
          Do not press reset, and leave the board powered for 2 s more. Then try again.",
     )
+}
+
+/// What OpenOCD does: a check that it is the same device, halted; and the write, whose end it awaits before it resets.
+fn scripts(options: u32) -> [String; 2] {
+    let (other, user) = (options & OPTIONS, options & USER & !BOR_LEV);
+    [
+        format!(
+            "init; reset halt; if {{([mrw {DBGMCU_IDCODE:#x}] & 0xfff) != {STM32F446:#x} || \
+             ([mrw {OPTCR:#x}] & {OPTIONS:#x}) != {other:#x}}} {{error {{another board}}}}"
+        ),
+        format!(
+            "stm32f2x options_write 0 {user:#04x}; while {{[mrw {FLASH_SR:#x}] & {BSY:#x}}} {{sleep 10}}; reset halt"
+        ),
+    ]
 }
 
 pub const BRINGUP: &str = "bringup";
@@ -238,30 +268,44 @@ mod tests {
     /// Factory setting: brown-out reset off, read protection off, no sector protected, software watchdog.
     const FACTORY: u32 = 0x0fff_aaed;
 
-    /// Tries it on a device whose options become `after` by a write: what was written, and the result.
-    fn tried(device: u32, before: u32, after: u32) -> (Option<u32>, Result<bool>) {
-        let (options, user) = (Cell::new(before), Cell::new(None));
+    /// Tries it on a device whose options become `after` by a write: the script of the write, and the result.
+    fn tried(device: u32, before: u32, after: u32) -> (Option<String>, Result<bool>) {
+        let (options, mut script) = (Cell::new(before), None);
         let read = |address| Ok(if address == DBGMCU_IDCODE { device } else { options.get() });
-        let write = |value| {
-            user.set(Some(value));
+        let result = set_brown_out_level(read, |found| {
+            script = Some(scripts(found).concat());
             options.set(after);
             Ok(())
-        };
-        let result = set_brown_out_level(read, write);
-        (user.get(), result)
+        });
+        (script, result)
+    }
+
+    /// Programs brown-out level 3 in place of these options; the script has these words in this order.
+    fn programs(before: u32, words: [&str; 6]) {
+        let (script, result) = tried(0x1000_6421, before, before & !BOR_LEV & !1);
+        let script = script.expect("a script");
+        let mut rest = &script[..];
+        for word in words {
+            rest = rest.split_once(word).unwrap_or_else(|| panic!("{word} is not where it belongs: {script}")).1;
+        }
+        assert!(result.is_ok_and(|written| written));
     }
 
     #[test]
     fn only_the_brown_out_level_changes() {
-        let device = 0x1000_6421;
-        let (user, result) = tried(device, FACTORY, FACTORY & !BOR_LEV);
-        assert!(result.is_ok_and(|written| written) && user == Some(0xe0), "{user:x?}");
+        const AWAITED: &str = "[mrw 0x40023c0c] & 0x10000";
+        programs(
+            FACTORY,
+            ["reset halt", "!= 0xffaaec", "another board", "options_write 0 0xe0;", AWAITED, "reset halt"],
+        );
         // Sectors 1 and 2 protected, no reset in stop mode; the lock bit is no option.
         let protected = 0x0ff9_aaac;
-        let (user, result) = tried(device, protected, protected & !BOR_LEV & !1);
-        assert!(result.is_ok_and(|written| written) && user == Some(0xa0), "{user:x?}");
-        let (user, result) = tried(device, FACTORY & !BOR_LEV, 0);
-        assert!(result.is_ok_and(|written| !written) && user.is_none());
+        programs(
+            protected,
+            ["reset halt", "!= 0xf9aaac", "another board", "options_write 0 0xa0;", AWAITED, "reset halt"],
+        );
+        let (script, result) = tried(0x1000_6421, FACTORY & !BOR_LEV, 0);
+        assert!(result.is_ok_and(|written| !written) && script.is_none());
     }
 
     #[test]
@@ -270,10 +314,11 @@ mod tests {
             (0x2003_6411, FACTORY, "an STM32F446 has 0x421"),
             (0x421, FACTORY & !RDP, "set read protection level 0"),
             (0x421, FACTORY & !WDG_SW, "a software watchdog"),
+            (0x421, FACTORY | SPRMOD, "no PCROP"),
         ] {
-            let (user, result) = tried(device, options, options);
+            let (script, result) = tried(device, options, options);
             let error = result.expect_err("refused").to_string();
-            assert!(user.is_none() && error.contains(expected), "{error}");
+            assert!(script.is_none() && error.contains(expected), "{error}");
         }
     }
 

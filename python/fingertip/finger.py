@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 MODEL = 21574  # the letters FT
 PATIENCE_S = 10.0
-_TARING, _TARED = 1, 2
+_TARING, _TARED, _REFUSED = 1, 2, 3
 _SAME, _CHANGED = 0, 1
 _PARAMETERS = [
     register
@@ -106,7 +106,8 @@ class Finger(Device):
         state = self.wait(reg.TARE_STATE, _TARING)
         if state != _TARED:
             fault = Fault(self.read(reg.FAULT))
-            why = fault.name if fault else "something seems to touch the tip: free it, and let the reading decay"
+            touches = "something seems to touch the tip: free it, and let the reading decay"
+            why = fault.name if fault else touches if state == _REFUSED else "the controller restarted"
             raise FingertipError(f"the tare came to nothing: {why}")
         if self.read(reg.LIMITS) & Limits.TARED_TOUCHING:
             raise FingertipError("something seemed to touch the tip while it was tared: free it and tare again")

@@ -311,7 +311,10 @@ impl fmt::Display for Ended {
                 write!(f, "the tip did not come to rest: it still went {value} counts; hold the finger fast")
             }
             Reason::NoContact => {
-                write!(f, "nothing touched within {thousandths:.2} mm: bring the plate nearer, or push the tip back")
+                write!(
+                    f,
+                    "the tip met nothing within {thousandths:.2} mm: bring the plate nearer, or push the tip back"
+                )
             }
             Reason::Stalled => write!(
                 f,

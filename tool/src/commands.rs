@@ -90,7 +90,9 @@ pub fn each(
     let (all, mut ids) = (ids.contains(&BROADCAST), ids.to_vec());
     if all {
         let (fingers, others): (Vec<_>, Vec<_>) = client.ping_all()?.into_iter().partition(Pong::is_fingertip);
-        others.iter().for_each(|pong| aside(format_args!("ID {} is no fingertip: it is left out", pong.id)));
+        others
+            .iter()
+            .for_each(|pong| aside(format_args!("ID {} is no fingertip: nothing more is done with it", pong.id)));
         if fingers.is_empty() {
             return Err("no fingertip answers: is it powered, and is the baud rate right?".into());
         }

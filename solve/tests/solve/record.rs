@@ -138,7 +138,7 @@ fn every_fault_of_a_series_is_named() {
     let refused = modulus(&[press(&sealed(&head, body), PARAMS).expect("a press")]).expect_err("no modulus");
     assert_eq!(
         refused.to_string(),
-        "the press was ended early: nothing touched within 3.00 mm: bring the plate nearer, or push the tip back"
+        "the press was ended early: the tip met nothing within 3.00 mm: bring the plate nearer, or push the tip back"
     );
 }
 

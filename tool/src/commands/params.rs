@@ -95,7 +95,7 @@ pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Err
             Ok(())
         }
         Command::Restore { file, save } => {
-            let Backup { mut values, gains } = read_backup(file, &read_origin(client)?)?;
+            let Backup { mut values, gains } = read_backup(file, Some(client.number(address::CHIP_ID)?))?;
             // Who moves a device to another address or speed means it, and says so by `set`.
             values.retain(|(register, _)| !is_bus(register));
             conclude(&set(&values, gains, client)?, *save, client, json)
@@ -184,7 +184,7 @@ fn diff(file: Option<&Path>, client: &mut Client, json: bool) -> Result<(), Erro
     let Stored { values: now, gains: gains_now } = Stored::read(client)?;
     let (other, other_gains, what) = match file {
         Some(path) => {
-            let Backup { values, gains } = read_backup(path, &[])?;
+            let Backup { values, gains } = read_backup(path, None)?;
             (values, gains, path.display().to_string())
         }
         None => {
@@ -440,6 +440,8 @@ const PARAMETERS: &str = "parameters";
 const GAINS: &str = "gains";
 /// Number of entries: a file that was cut has fewer, or a last line without an end.
 const ENTRIES: &str = "entries";
+/// Number of the controller that a backup is of.
+const CHIP: &str = "chip_id";
 
 struct Backup {
     /// Values of registers with a name.
@@ -448,21 +450,14 @@ struct Backup {
     gains: Option<Vec<Vec<u16>>>,
 }
 
-/// Reads the lines that say what a backup is of: the controller, and the version of its control table.
-fn read_origin(client: &mut Client) -> Result<[(&'static str, i64); 2], Error> {
-    let version = client.number(address::MODEL_INFORMATION)? >> 16;
-    Ok([("chip_id", client.number(address::CHIP_ID)?), ("table_version", version)])
-}
-
 /// Writes it, whole or not at all.
 fn write_backup(path: &Path, force: bool, client: &mut Client, stored: &Stored) -> Result<(), Error> {
     let Stored { values, gains } = stored;
-    let origin = read_origin(client)?.map(|(name, number)| format!("{name} = {number}\n"));
+    let chip = client.number(address::CHIP_ID)?;
     let mut text = format!(
         "# A fingertip's stored parameters, by `fingertip params backup`; `restore` sets them again.\n\
          # Units stand in the names; what is left out stays as it is.\n\
-         {}{ENTRIES} = {}\n\n[{PARAMETERS}]\n",
-        origin.concat(),
+         {CHIP} = {chip}\n{ENTRIES} = {}\n\n[{PARAMETERS}]\n",
         values.len() + gains.len()
     );
     for (register, value) in values {
@@ -476,8 +471,8 @@ fn write_backup(path: &Path, force: bool, client: &mut Client, stored: &Stored) 
     whole::write(path, force, text.as_bytes())
 }
 
-/// Reads it. Fails where a line of its origin is there, and differs from these.
-fn read_backup(path: &Path, origin: &[(&str, i64)]) -> Result<Backup, Error> {
+/// Reads it. With the number of a controller, it fails where the backup is of another one.
+fn read_backup(path: &Path, chip: Option<i64>) -> Result<Backup, Error> {
     let text = fs::read_to_string(path).map_err(|why| match why.kind() {
         ErrorKind::InvalidData => Error::file("read", path, "it is no text"),
         _ => Error::file("read", path, why),
@@ -488,12 +483,13 @@ fn read_backup(path: &Path, origin: &[(&str, i64)]) -> Result<Backup, Error> {
     let rows = document.get(GAINS).and_then(|item| item.as_table());
     let entries = table.len() + rows.map_or(0, |rows| rows.len());
     let number = |name: &str| document.get(name).and_then(|item| item.as_integer());
-    for (name, here) in origin {
-        if let Some(of) = number(name).filter(|of| of != here) {
-            let why =
-                format!("its {name} is {of}, the controller's {here}. Where that is meant, take out the line `{name}`");
-            return Err(Error::file("read", path, why));
-        }
+    if let (Some(of), Some(chip)) = (number(CHIP), chip)
+        && of != chip
+    {
+        let why = format!(
+            "it is of the controller {CHIP} {of}, and this one has {chip}. Where that is meant, take out the line `{CHIP}`"
+        );
+        return Err(Error::file("read", path, why));
     }
     if let Some(count) = number(ENTRIES)
         && (count != entries as i64 || !text.ends_with('\n'))

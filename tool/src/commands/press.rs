@@ -96,7 +96,7 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
         let (within_s, travel_mm) = (args.within_s, held.last.travel_um as f64 * 1e-3);
         let state = format!("mode {mode}, {force_mn} mN, travel {travel_mm:.2} mm, limits: {limits}");
         let why = format!("{goal_mn} mN are not reached within {within_s} s: {state}");
-        let ask = "Is there something to press on? A tip that is at the end of its travel is pushed back by hand";
+        let ask = "Is there something to press on? If the tip is at the end of its travel, push it back by hand";
         return Err(format!("{why}. {ask}").into());
     }
     if outside > 0 {

@@ -12,8 +12,8 @@ use fingertip::state::{Limits, Mode};
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 
-/// Bus watchdog while a command moves the finger: the controller stops the motor after this silence. No round number, so
-/// that it is not the value of somebody else.
+/// Bus watchdog while a command moves the finger: the controller stops the motor after this silence. An
+/// unusual value: a watchdog that another host set is not mistaken for it.
 const WATCHDOG_MS: i64 = 520;
 /// Unit of the register `bus_watchdog`, ms.
 pub const WATCHDOG_UNIT_MS: i64 = 20;
@@ -208,7 +208,7 @@ fn stop(client: &mut Client, releases: bool, json: bool) -> Result<Value, Error>
         }
     }
     if speed.abs() >= REST_UM_PER_S {
-        return Err(format!("ID {id}: torque is off, but the tip still moves at {speed} um/s").into());
+        return Err(format!("torque is off, but the tip still moves at {speed} um/s").into());
     }
     Ok(json!({
         "id": id, "mode_before": before.mode_name(), "force_before_mn": before.force_mn, "mode": after.mode_name(),
@@ -299,7 +299,14 @@ pub fn tare(args: &Tare, client: &mut Client, json: bool) -> Result<(), Error> {
     } else {
         say(format_args!("tared: zeros of {least} to {most} codes"));
     }
-    if touched && !args.force { Err(TOUCHED.into()) } else { Ok(()) }
+    if !touched {
+        return Ok(());
+    }
+    if !args.force {
+        return Err(TOUCHED.into());
+    }
+    aside("what touched is taken as zero: a force that presses now is missing in what is read from here on");
+    Ok(())
 }
 
 pub(super) struct Tared {
@@ -310,12 +317,16 @@ pub(super) struct Tared {
     most: i64,
 }
 
-/// Fails with the reason for which a tare ended in this `TARE_STATE`: a fault that came meanwhile, or something that touches.
+/// Fails with the reason for which a tare ended in this `TARE_STATE`: a fault, a restart, or something that touches.
 pub(super) fn no_tare<T>(state: i64, client: &mut Client) -> Result<T, Error> {
     no_fault(client)?;
-    let state = table::meaning(address::TARE_STATE, state);
-    let next = "free the tip, and let the reading of its contact decay or `fingertip tare --force`";
-    Err(format!("the tare came to nothing: {state}. Something seems to touch: {next}").into())
+    let why = if state == Taring::Refused as i64 {
+        "refused. Something seems to touch: free the tip; then wait until the reading has decayed, or use \
+         `fingertip tare --force`"
+    } else {
+        "the controller restarted meanwhile"
+    };
+    Err(format!("the tare came to nothing: {why}").into())
 }
 
 /// Measures the zeros, with torque off.

@@ -43,7 +43,7 @@ def setUpModule():
     driver = sync_playwright().start()
     unittest.addModuleCleanup(driver.stop)
     # What the browser would leave in the user's home goes to the folder.
-    home = {**os.environ, "HOME": str(FOLDER)}
+    home = {**os.environ, "HOME": str(FOLDER), "XDG_CONFIG_HOME": str(FOLDER), "XDG_CACHE_HOME": str(FOLDER)}
     program = os.environ["FINGERTIP_CHROMIUM"]
     browser = driver.chromium.launch(executable_path=program, args=["--no-sandbox"], env=home, timeout=HUNG_MS)
     unittest.addModuleCleanup(browser.close)
@@ -88,8 +88,9 @@ class Page:
 
     def until(self, holds):
         """Waits until an expression holds, evaluated with each frame that the page draws."""
-        look = f"{holds} ? kept() : left-- > 0 ? requestAnimationFrame(look) : broken('it never holds')"
-        self.evaluate(f"let left = {FRAMES}; new Promise((kept, broken) => {{ const look = () => {look}; look(); }})")
+        look = f"({holds}) ? kept() : left-- > 0 ? requestAnimationFrame(look) : broken('it never holds')"
+        caught = f"() => {{ try {{ {look}; }} catch (error) {{ broken(error); }} }}"
+        self.evaluate(f"let left = {FRAMES}; new Promise((kept, broken) => {{ const look = {caught}; look(); }})")
 
     def state(self):
         return self.evaluate(SAID)

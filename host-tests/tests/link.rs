@@ -45,6 +45,26 @@ fn published_packets_are_understood_and_made_alike() {
     }
 }
 
+#[test]
+fn a_header_inside_is_stuffed() {
+    for (params, stuffed) in [
+        ("FF FF FD", "FF FF FD FD"),
+        ("FF FF FD 00 01", "FF FF FD FD 00 01"),
+        ("FF FF FD FD", "FF FF FD FD FD"),
+        ("FF FF FF FD", "FF FF FF FD FD"),
+        ("FF FF FD FF FF FD", "FF FF FD FD FF FF FD FD"),
+        ("FF FD FD", "FF FD FD"),
+    ] {
+        let (params, stuffed) = (hex(params), hex(stuffed));
+        let bytes = packet(1, 3, &params);
+        let (body, crc) = bytes.split_at(bytes.len() - 2);
+        assert_eq!(body[8..], stuffed);
+        assert_eq!(update_crc(CRC_START, body).to_le_bytes(), crc, "the CRC covers the stuffed bytes");
+        assert_eq!(usize::from(u16::from_le_bytes([bytes[5], bytes[6]])), stuffed.len() + 3);
+        assert_eq!(receive(&mut Receiver::new(), &bytes), (vec![(1, 3, params)], vec![]));
+    }
+}
+
 /// What is cut short, and what has an impossible ID or length, costs one event and not the packet behind it.
 #[test]
 fn what_is_no_packet_costs_no_other() {

@@ -336,7 +336,8 @@ pub fn front(front: &Front<'_>) -> Result<String, PlotError> {
     let (y_low, y_high) = range(positive(|dot| dot.y))?;
     let has_zero = dots.iter().any(|dot| dot.y <= 0.0);
     let y_low = if has_zero { y_low / 10.0 } else { y_low };
-    picture((WIDTH_PX, FRONT_HEIGHT_PX), |area| {
+    let names_px = 60 + NAME_PX as u32 * dots.len() as u32;
+    picture((WIDTH_PX, FRONT_HEIGHT_PX.max(names_px)), |area| {
         let (left, right) = area.split_horizontally(WIDTH_PX - NAMES_PX);
         let mut chart = ChartBuilder::on(&left)
             .margin(10)
@@ -396,7 +397,7 @@ fn stairs(dots: &[Dot], place: impl Fn(&Dot) -> (f64, f64)) -> Vec<(f64, f64)> {
 
 type Pixel = (i32, i32);
 
-/// Points with their numbers, each number where no other one and no other point is, if there is room.
+/// Draws the points. Each number goes to a side where it covers no other number or point, if there is one.
 fn draw_dots(area: &Area<'_>, dots: &[Dot], places: &[Pixel]) -> Result<(), PlotError> {
     let mut taken = places.to_vec();
     for (n, &(x, y)) in places.iter().enumerate() {

@@ -14,7 +14,7 @@ const READ: u64 = 40;
 #[derive(Debug, Default)]
 pub struct Log {
     block: Option<u64>,
-    /// Number of messages: each ends with a zero, which it does not contain.
+    /// Number of messages: each ends with a zero byte, and no other byte of it is zero.
     pub messages: usize,
 }
 

@@ -165,7 +165,8 @@ fn damaged_parameters_are_a_fault_that_the_bus_tells(rig: &mut Rig, sound: usize
     assert!(rig.bridge_edges().expect("it runs").iter().all(|edge| edge.at_ns < from_ns || !edge.on));
 }
 
-/// Lets the board start with these bytes in its first sector. Returns the number of messages in its log.
+/// Lets the board start with these bytes in its first sector. Returns the number of messages in its log, whose text is not
+/// checked.
 fn messages_of_a_start(rig: &mut Rig, stored: Vec<u8>) -> usize {
     let messages = |stand: &mut Stand<'_>| {
         stand.bench.log.drain(stand.host);

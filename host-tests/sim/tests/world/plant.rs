@@ -3,6 +3,7 @@
 use crate::*;
 use fingertip::config::newtons;
 use fingertip::shipped::{self, Frame};
+use sim::mechanics::decay;
 use sim::mechanics::pressures::Cell;
 use sim::mechanics::rotor::{Unreachable, profile};
 use sim::plant::{Plant, Setup};
@@ -136,6 +137,21 @@ fn relative_error_of_sum(d: f64, x: f64, y: f64) -> f64 {
         sum_kpa += (0..COLUMNS).map(|column| Cell::of(&setup, row, column).mean_kpa(&tip)).sum::<f64>();
     }
     sum_kpa * 1e-3 * setup.array.pitch_mm * setup.array.pitch_mm / setup.tip.force_n(d) - 1.0
+}
+
+#[test]
+fn the_decay_factor_is_the_exponential() {
+    let mut worst = 0.0_f64;
+    for n in 0..=40_000 {
+        let x = f64::from(n) * 1e-3;
+        worst = worst.max((decay(x) / (-x).exp() - 1.0).abs());
+        if n == 12_000 {
+            assert!(worst < 1e-12, "{worst:e} up to 12");
+        }
+    }
+    assert!(worst < 1e-11, "{worst:e} up to 40");
+    assert_eq!(decay(1e6), 0.0);
+    assert_eq!(decay(0.0), 1.0);
 }
 
 #[test]

@@ -194,7 +194,7 @@ control_table! {
     /// bus watchdog, turns torque off, sets the goal to 0, clears the
     /// fault. Result error unless recover_hindrance is 0. Reads 0.
     396 RECOVER: U8 ReadWrite in 0..=1 = 0, |_, _| 0, Staged::set_recover;
-    /// Obstacle to recover: 0 none, 1 the supply is below supply_min_mv, 2 it is above
+    /// Obstacle to recover: 0 none, 1 the supply is below supply_min_mv, 2 the supply is above
     /// supply_max_mv, 3 more taxels are bad than bad_taxels_max, 4 a save waits.
     397 RECOVER_HINDRANCE: U8 ReadOnly in 0..=4, |view, _| view.hindrance();
     /// FLASH_OPTCR: the option bytes as loaded by the last reset.

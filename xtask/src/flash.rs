@@ -72,7 +72,7 @@ pub fn put(image: &Image, probe: Option<&str>, console: &mut Console) -> Result<
 const DBGMCU_IDCODE: u32 = 0xe004_2000;
 const STM32F446: u32 = 0x421;
 const OPTCR: u32 = 0x4002_3c14;
-/// Zero is level 3, the highest threshold. The factory leaves brown-out reset off.
+/// Brown-out level: zero is level 3, the highest threshold. Parts leave the factory with brown-out reset off.
 const BOR_LEV: u32 = 0b11 << 2;
 /// Read protection, and its level 0. Any other byte but 0xCC is level 1; 0xCC is level 2, for ever.
 const RDP: u32 = 0xff << 8;
@@ -142,11 +142,11 @@ fn write_options(options: u32, probe: Option<&str>) -> Result<()> {
 
 /// What OpenOCD does: a check that it is the same device, halted; and the write, whose end it awaits before it resets.
 fn scripts(options: u32) -> [String; 2] {
-    let (other, user) = (options & OPTIONS, options & USER & !BOR_LEV);
+    let (known, user) = (options & OPTIONS, options & USER & !BOR_LEV);
     [
         format!(
             "init; reset halt; if {{([mrw {DBGMCU_IDCODE:#x}] & 0xfff) != {STM32F446:#x} || \
-             ([mrw {OPTCR:#x}] & {OPTIONS:#x}) != {other:#x}}} {{error {{another board}}}}"
+             ([mrw {OPTCR:#x}] & {OPTIONS:#x}) != {known:#x}}} {{error {{another board}}}}"
         ),
         format!(
             "stm32f2x options_write 0 {user:#04x}; while {{[mrw {FLASH_SR:#x}] & {BSY:#x}}} {{sleep 10}}; reset halt"
@@ -298,7 +298,7 @@ mod tests {
             FACTORY,
             ["reset halt", "!= 0xffaaec", "another board", "options_write 0 0xe0;", AWAITED, "reset halt"],
         );
-        // Sectors 1 and 2 protected, no reset in stop mode; the lock bit is no option.
+        // Sectors 1 and 2 are write-protected, and the bit for stop mode is cleared; bit 0 locks the register and is no option byte.
         let protected = 0x0ff9_aaac;
         programs(
             protected,

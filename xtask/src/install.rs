@@ -150,15 +150,17 @@ const PLAYWRIGHT: Environment = Environment {
     does: "the test that opens reports drives the browser with it",
 };
 
-/// Finds or installs a browser, with fonts, without which a page has no letters. Returns the interpreter that drives it,
-/// and the browser.
-pub fn browser(console: &mut Console) -> Result<[PathBuf; 2]> {
+/// Finds or installs a browser, with fonts, without which a page has no letters. Returns the command that opens reports in
+/// it.
+pub fn browser_test(console: &mut Console) -> Result<Command> {
     let find = || BROWSERS.into_iter().find_map(host::find_program);
     if find().is_none() {
         packages(&["chromium", "fonts-dejavu-core"], "the test that opens reports in a browser", console)?;
     }
     let program = find().context("Debian's package `chromium` is installed, but no `chromium` is in PATH")?;
-    Ok([environment(&PLAYWRIGHT, console)?, program])
+    let mut command = script(&PLAYWRIGHT, "browser/test_report.py", console)?;
+    command.env("FINGERTIP_CHROMIUM", program);
+    Ok(command)
 }
 
 /// A virtual environment in the build folder.
@@ -221,16 +223,21 @@ const LEAST_SQUARES: Environment = Environment {
     does: "`cargo xtask sensor` solves its least squares with them",
 };
 
-/// Returns the command that starts a script of the fit, in an environment with what it imports.
-pub fn script(name: &str, console: &mut Console) -> Result<Command> {
-    let mut command = Command::new(environment(&LEAST_SQUARES, console)?);
+/// Returns the command that starts a script of the folder `host-tests`, in an environment with what it imports.
+fn script(needs: &Environment, path: &str, console: &mut Console) -> Result<Command> {
+    let mut command = Command::new(environment(needs, console)?);
     // With -B Python writes no compiled files beside the sources.
-    command.arg("-B").arg(host::root().join("host-tests/sensor").join(name));
+    command.arg("-B").arg(host::root().join("host-tests").join(path));
     Ok(command)
 }
 
+/// Returns the command that tests the fit of a sensor.
+pub fn sensor_test(console: &mut Console) -> Result<Command> {
+    script(&LEAST_SQUARES, "sensor/test_fit.py", console)
+}
+
 pub fn sensor(args: &sim::Args, console: &mut Console) -> Result<()> {
-    sim::start(script("fit.py", console)?.args(&args.arguments))
+    sim::start(script(&LEAST_SQUARES, "sensor/fit.py", console)?.args(&args.arguments))
 }
 
 #[cfg(test)]

@@ -27,7 +27,7 @@ pub fn run(args: &Args) -> Result<()> {
     }
     stages.stage("core and host tests", |console| host::test(&mut host::tests(&["--no-fail-fast"]), console));
     stages.stage("fit of a sensor to recordings", |console| {
-        let mut command = install::script("test_fit.py", console)?;
+        let mut command = install::sensor_test(console)?;
         console.run(&mut command)
     });
     let image = stages.stage("flash image", |console| {
@@ -57,11 +57,9 @@ pub fn run(args: &Args) -> Result<()> {
         host::test(command.env("FINGERTIP_PYTHON", &python), console)
     });
     stages.stage("reports in a browser", |console| {
-        let [python, chromium] = install::browser(console)?;
+        let mut command = install::browser_test(console)?;
         let sim = host::Program::sim("sim").build(console)?;
-        let mut command = Command::new(python);
-        command.arg("-B").arg(host::root().join("host-tests/browser/test_report.py"));
-        command.env("FINGERTIP_CHROMIUM", chromium).env("FINGERTIP_SIM", sim.get_program());
+        command.env("FINGERTIP_SIM", sim.get_program());
         console.run(command.env("FINGERTIP_REPORTS", host::made("tmp")?.join("report")))
     });
     stages.finish("test")

@@ -100,6 +100,9 @@ pub enum NoDrift {
     Fit,
 }
 
+/// Least time for which a weight must be recorded to solve creep, s.
+pub const CREEP_LEAST_S: f64 = 5.0;
+
 /// Creep by a hold.
 ///
 /// The chip knows one term: under a force F the reading goes to F (1 + k) with a time constant tau (`src/control.rs`).
@@ -111,7 +114,7 @@ pub fn creep(series: &HeldSeries) -> Result<Creep, NoDrift> {
     }
     let begin_s = readings[0][0];
     let long_s = readings[readings.len() - 1][0] - begin_s;
-    if long_s < 5.0 {
+    if long_s < CREEP_LEAST_S {
         return Err(NoDrift::Short(long_s));
     }
     let first_n = readings[0][1];

@@ -7,9 +7,9 @@ pub fn seconds(text: &str) -> Result<f64, String> {
     within(text, &(0.0..=1e9))
 }
 
-/// Time under a weight, s: the solver needs 5 s of readings.
+/// Time under a weight, s: what the solver needs, and a second until the first reading counts.
 pub fn creep_s(text: &str) -> Result<f64, String> {
-    within(text, &(6.0..=1e9))
+    within(text, &(solve::scale::CREEP_LEAST_S + 1.0..=1e9))
 }
 
 /// A rate, Hz: from one state in a quarter of an hour to more states than there are frames.

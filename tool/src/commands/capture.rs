@@ -145,7 +145,7 @@ fn keep(args: &Args, client: &mut Client, interrupt: &Interrupt, json: bool) -> 
         let state = client.again(|client| client.number(address::TARE_STATE))?;
         if state == Taring::Refused as i64 {
             client.again(|client| client.set(address::CAPTURE, 0))?;
-            return no_tare(state, client);
+            return Err(no_tare(state, client));
         }
     };
     // Without a new tare a press would use the old zero. After a signal torque stays off.

@@ -440,7 +440,7 @@ const PARAMETERS: &str = "parameters";
 const GAINS: &str = "gains";
 /// Number of entries: a file that was cut has fewer, or a last line without an end.
 const ENTRIES: &str = "entries";
-/// Number of the controller that a backup is of.
+/// Key of the `chip_id` of the controller that the backup was read from.
 const CHIP: &str = "chip_id";
 
 struct Backup {

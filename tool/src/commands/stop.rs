@@ -12,8 +12,8 @@ use fingertip::state::{Limits, Mode};
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 
-/// Bus watchdog while a command moves the finger: the controller stops the motor after this silence. An
-/// unusual value: a watchdog that another host set is not mistaken for it.
+/// Bus watchdog while a command moves the finger: the controller stops the motor after this silence. The
+/// value is unusual on purpose, so that a watchdog set by another host can be told apart from it.
 const WATCHDOG_MS: i64 = 520;
 /// Unit of the register `bus_watchdog`, ms.
 pub const WATCHDOG_UNIT_MS: i64 = 20;
@@ -155,12 +155,13 @@ pub const ALL_ANSWERED: i64 = 2;
 fn stop_all(args: &Stop, reach: &Reach, json: bool) -> Result<(), Error> {
     let mut client = Client::open(reach)?;
     let answered = (address::STATUS_RETURN_LEVEL, ALL_ANSWERED);
-    let (mut ids, mut first) = (&reach.ids[..], &[(address::GOAL_FORCE_MN, 0), answered][..]);
-    if args.all {
+    let (ids, first): (&[u8], &[(u16, i64)]) = if args.all {
         client.set_all(address::TORQUE_ENABLE, 0)?;
         aside("torque off was sent to all IDs");
-        (ids, first) = (&[BROADCAST], &first[1..]);
-    }
+        (&[BROADCAST], &[answered])
+    } else {
+        (&reach.ids, &[(address::GOAL_FORCE_MN, 0), answered])
+    };
     super::each(&mut client, ids, false, first, |client| {
         let stopped = stop(client, !args.all, json)?;
         if json {
@@ -317,16 +318,18 @@ pub(super) struct Tared {
     most: i64,
 }
 
-/// Fails with the reason for which a tare ended in this `TARE_STATE`: a fault, a restart, or something that touches.
-pub(super) fn no_tare<T>(state: i64, client: &mut Client) -> Result<T, Error> {
-    no_fault(client)?;
+/// Reason for which a tare ended in this `TARE_STATE`: a fault, a restart, or something that touches.
+pub(super) fn no_tare(state: i64, client: &mut Client) -> Error {
+    if let Err(fault) = no_fault(client) {
+        return fault;
+    }
     let why = if state == Taring::Refused as i64 {
         "refused. Something seems to touch: free the tip; then wait until the reading has decayed, or use \
          `fingertip tare --force`"
     } else {
         "the controller restarted meanwhile"
     };
-    Err(format!("the tare came to nothing: {why}").into())
+    format!("the tare came to nothing: {why}").into()
 }
 
 /// Measures the zeros, with torque off.
@@ -339,7 +342,7 @@ pub(super) fn measure_tare(request: i64, within: Duration, client: &mut Client) 
             let within_s = within.as_secs_f64();
             return Err(format!("the tare is still running after {within_s} s: do frames come in?").into());
         }
-        _ => return no_tare(state, client),
+        _ => return Err(no_tare(state, client)),
     }
     let touched = Limits(client.number(address::LIMITS)? as u16).has(Limits::TARED_TOUCHING);
     let codes = client.block(address::TARE_CODES, address::TARE_CODES)?.numbers(address::TARE_CODES);

@@ -1,4 +1,4 @@
-//! Filters and integrators over any number of steps.
+//! Filters and integrators of the loop in the long run, for any number of steps.
 //!
 //! Each is a machine with finitely many states. Under an input that repeats it must come to a state that it was in
 //! before, and from then on it repeats itself for ever: finding that cycle proves what any number of steps would show.
@@ -179,7 +179,7 @@ const CALM_TRAVEL_SWING: i64 = 12;
 const SPEED_SWING: i64 = 131;
 const DISTURBANCE_SWING: i64 = 1_024;
 
-/// All machines, the winding with its usual or its longest lags.
+/// Runs all filters and integrators. With `longest` the winding has its longest time constants, else its usual ones.
 pub fn all(longest: bool) -> Vec<Outcome> {
     let mut runs: Vec<Run> = Vec::new();
     for (scan, settle_ns, sample_cycles) in SCANS {

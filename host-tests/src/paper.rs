@@ -1,8 +1,8 @@
 //! The paper's equations that the loop does not compute, in double precision. [`fingertip::model`] names the paper.
 //!
 //! Lengths are in mm, areas in mm^2, forces in N, pressures in kPa and angles in rad; `a` is the tip's radius, `d` its
-//! indentation. The touching angle `theta` of a point of the contact is seen from the hemisphere's centre, `a - d` above
-//! the plane. Compression counts as positive, the other way round than in the paper's equation 10.
+//! indentation. The touching angle `theta` of a point lies at the hemisphere's centre, between the axis and the line to
+//! the point; the centre is `a - d` above the plane. Compression counts as positive, the other way round than in the paper's equation 10.
 
 /// Touching angle at the contact's rim: `theta_max = atan(r_c / (a - d))` (eq. 5).
 pub fn touching_angle_max(a: f64, d: f64) -> f64 {
@@ -35,7 +35,7 @@ pub fn distance_slope(a: f64, d: f64, theta: f64) -> f64 {
     (a - d) / theta.cos().powi(2)
 }
 
-/// The area element for each dtheta dphi: `dS = r dr dphi = (a - d)^2 sin(theta) / cos^3(theta) dtheta dphi` (eq. 8).
+/// Area element per dtheta and dphi: `dS = r dr dphi = (a - d)^2 sin(theta) / cos^3(theta) dtheta dphi` (eq. 8).
 pub fn area_density(a: f64, d: f64, theta: f64) -> f64 {
     distance_at(a, d, theta) * distance_slope(a, d, theta)
 }

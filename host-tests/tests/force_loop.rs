@@ -1,5 +1,5 @@
 //! The loop natively: steps, limits, release. The same bounds hold for the flash image on the virtual board. At the end
-//! filters and integrators of the loop over any number of steps, by their cycles.
+//! the filters and integrators of the loop, under inputs that repeat, until a state comes again.
 
 use crate::common::*;
 use fingertip::control::Observer;

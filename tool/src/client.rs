@@ -225,7 +225,18 @@ impl Client {
 
     /// Sends a packet unchanged. Returns the bytes received until this number of status packets arrived, or until the
     /// time-out. Of a packet for one device, `from`, only answers of that device count.
-    pub fn pass(&mut self, packet: &[u8], from: Option<u8>, mut answers: usize) -> Result<Vec<u8>, Error> {
+    pub fn pass(&mut self, packet: &[u8], from: Option<u8>, answers: usize) -> Result<Vec<u8>, Error> {
+        self.exchange(packet, from, |_| true, answers)
+    }
+
+    /// The same; undamaged answers count only if their parameters fit.
+    fn exchange(
+        &mut self,
+        packet: &[u8],
+        from: Option<u8>,
+        fits: impl Fn(&[u8]) -> bool,
+        mut answers: usize,
+    ) -> Result<Vec<u8>, Error> {
         self.transmit(packet)?;
         let all = answers == usize::MAX;
         let until = Instant::now() + self.timeout + if all { self.ping_slots() } else { Duration::ZERO };
@@ -238,9 +249,10 @@ impl Client {
                 let event = receiver.push(*byte);
                 let packet = receiver.packet();
                 let awaited = packet.instruction == instruction::STATUS && from.is_none_or(|id| id == packet.id);
-                damaged |= event == Some(Event::BadCrc) && awaited;
-                let whole = matches!(event, Some(Event::Packet | Event::BadCrc));
-                answers = answers.saturating_sub(usize::from(whole && awaited));
+                let bad = event == Some(Event::BadCrc) && awaited;
+                let good = event == Some(Event::Packet) && awaited && fits(packet.params);
+                damaged |= bad;
+                answers = answers.saturating_sub(usize::from(bad || good));
             }
             heard.extend(bytes);
         }
@@ -253,10 +265,12 @@ impl Client {
         Duration::from_secs_f64(f64::from(u32::from(BROADCAST) * PING_BITS) / f64::from(self.baud))
     }
 
-    /// Sends an instruction and waits for its answer: `length` bytes behind the error.
+    /// Sends an instruction and waits for its answer: `length` bytes behind the error, or the error alone. One of another
+    /// length answers what a killed program asked before.
     fn ask(&mut self, doing: &str, instruction: u8, params: &[u8], length: usize) -> Result<Vec<u8>, Error> {
-        let (id, mut receiver) = (self.id, Receiver::new());
-        let heard = self.pass(&packet(id, instruction, params), Some(id), 1)?;
+        let (id, mut receiver, mut other_length) = (self.id, Receiver::new(), false);
+        let fits = |answer: &[u8]| matches!(answer, [error, data @ ..] if data.len() == length || error & !ALERT != 0);
+        let heard = self.exchange(&packet(id, instruction, params), Some(id), fits, 1)?;
         let mut damaged = |what| {
             // The right answer may come yet.
             self.owed = true;
@@ -271,21 +285,25 @@ impl Client {
                 continue;
             }
             match event {
-                Some(Event::Packet) => {}
+                Some(Event::Packet) if fits(packet.params) => {}
+                Some(Event::Packet) => {
+                    other_length = true;
+                    continue;
+                }
                 Some(Event::BadCrc) => return damaged("its check sum is wrong"),
                 _ => continue,
             }
-            let Some((&error, data)) = packet.params.split_first() else { return damaged("it is empty") };
+            let Some((&error, data)) = packet.params.split_first() else { continue };
             let number = error & !ALERT;
             if number != 0 {
                 let meaning = table::meaning_of_error(number);
                 let text = format!("{doing}: refused by ID {id} with error {number}: {meaning}");
                 return Err(Error::Refused(text, number));
             }
-            if data.len() != length {
-                return damaged("it has another length than what was asked for");
-            }
             return Ok(data.to_vec());
+        }
+        if other_length {
+            return damaged("it has another length than what was asked for");
         }
         let (port, baud, waited_ms) = (&self.port, self.baud, self.timeout.as_millis());
         Err(Error::Silent(format!(

@@ -3,11 +3,14 @@
 
 use crate::served::{Served, fails, line_with, program};
 use fingertip::link::packet::instruction::REBOOT;
+use fingertip::shipped::address;
+use fingertip_cli::{Client, Error};
 use serde_json::Value;
 use std::fs;
 use std::io::Read as _;
 use std::os::fd::OwnedFd;
 use std::os::unix::fs::FileTypeExt as _;
+use std::time::Duration;
 
 /// Runs each example of the table. Code 3 needs an object that goes away meanwhile, code 130 Ctrl-C.
 #[test]
@@ -59,6 +62,25 @@ fn errors_in_json_are_the_last_line_of_standard_error() {
         let error: Value = serde_json::from_str(text.lines().last().unwrap_or_default()).expect(&text);
         assert_eq!((output.status.code(), error["exit_code"].as_i64()), (Some(code), Some(code.into())), "{text}");
         assert!(error["error"].as_str().is_some_and(|error| error.contains(words)), "{text}");
+    }
+}
+
+#[test]
+fn an_answer_to_a_killed_program_is_taken_by_none() {
+    let finger = Served::begin("wall");
+    let ask: [fn(&mut Client) -> Result<(), Error>; 2] =
+        [|client| client.ping().map(drop), |client| client.read(address::FIRMWARE_VERSION, 40).map(drop)];
+    for asks in ask {
+        finger.command("stall");
+        let mut killed = finger.client();
+        killed.timeout = Duration::from_millis(1);
+        assert!(matches!(asks(&mut killed), Err(Error::Silent(_))));
+        drop(killed);
+        let next = finger.start(&["info"]);
+        Served::wait_for(|| finger.command("held") == "2");
+        finger.command("go on");
+        let next = next.wait_with_output().expect("it ends");
+        assert!(next.status.success(), "{next:?}");
     }
 }
 

@@ -92,7 +92,7 @@ fn a_killed_session_resumes_where_it_was() {
     let listed = || fs::read_to_string(finger.file("killed/session.json")).is_ok_and(|text| text.contains("press-1"));
     let mut child = finger.start(&[&calibrate[..], &["--json"]].concat());
     Served::wait_for(listed);
-    finger.kill(&mut child);
+    Served::kill(&mut child);
     finger.done(&["stop"]);
     finger.done(&["recover"]);
     let bytes = fs::read(&record).expect("it was kept");
@@ -131,7 +131,7 @@ fn a_session_of_a_finger_is_refused_for_another_one_at_its_id() {
     let begun = fingers.file("first/session.json");
     let mut child = fingers.start(&calibrate);
     Served::wait_for(|| fs::exists(&begun).unwrap_or(false));
-    fingers.kill(&mut child);
+    Served::kill(&mut child);
     fingers.done(&["stop"]);
     for (id, other) in [("1", "3"), ("2", "1")] {
         fingers.done(&["--id", id, "params", "set", &format!("id={other}")]);

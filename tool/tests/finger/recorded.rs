@@ -156,7 +156,7 @@ fn a_killed_recording_is_kept_and_can_be_read() {
         let (file, part) = (finger.file(name), finger.file(&format!("{name}.part")));
         let mut child = finger.start(&["record", "--rate-hz", "0", &file]);
         Served::wait_for(|| fs::metadata(&part).is_ok_and(|part| part.len() > 300_000));
-        finger.kill(&mut child);
+        Served::kill(&mut child);
         let bytes = fs::read(&part).expect("it is there");
         if name.ends_with(".mcap") {
             let messages = readable(&bytes).0;

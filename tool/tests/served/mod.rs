@@ -88,6 +88,7 @@ impl Told {
             ["now"] => return Some(Ok(self.native.now_s().to_string())),
             ["heard"] => return Some(Ok(line.heard.to_string())),
             ["stalled"] => return Some(Ok(line.stalled.is_some().to_string())),
+            ["held"] => return Some(Ok(line.stalled.as_ref().map_or(0, Vec::len).to_string())),
             ["restarted"] => return Some(Ok(line.restart.is_none().to_string())),
             ["unheard"] => return Some(Ok(line.ears.map_or(0, |(.., unheard)| unheard).to_string())),
             _ => return None,
@@ -107,7 +108,7 @@ impl serve::Finger for Told {
         while let Ok((command, answer)) = self.commands.try_recv() {
             let done = self.told(&command).unwrap_or_else(|| self.native.command(&command));
             // What was broken or mended acts on the next frames; whoever asks then finds it so.
-            if !["look", "now", "heard", "stalled"].contains(&command.as_str()) {
+            if !["look", "now", "heard", "stalled", "held"].contains(&command.as_str()) {
                 (0..20).for_each(|_| self.native.0.frame());
             }
             answer.send(done).expect("somebody waits for it");
@@ -257,11 +258,9 @@ impl Served {
         killed
     }
 
-    /// Kills a command. The answer to its last request goes by before the next command would take it for its own.
-    pub fn kill(&self, child: &mut Child) {
+    pub fn kill(child: &mut Child) {
         child.kill().expect("it runs");
         child.wait().expect("it ends");
-        (0..3).for_each(|_| drop(self.command("state")));
     }
 
     pub fn start(&self, arguments: &[&str]) -> Child {

@@ -306,9 +306,14 @@ impl Client {
             return damaged("it has another length than what was asked for");
         }
         let (port, baud, waited_ms) = (&self.port, self.baud, self.timeout.as_millis());
+        // A ping is answered at every level.
+        let level = match instruction {
+            instruction::PING => "",
+            _ => "; if scan finds it, its status_return_level is too low, and `fingertip stop` raises it",
+        };
         Err(Error::Silent(format!(
             "{doing}: no answer of ID {id} on {port} at {baud} baud within {waited_ms} ms; `fingertip scan` looks for it, \
-             --timeout-ms waits longer"
+             --timeout-ms waits longer{level}"
         )))
     }
 

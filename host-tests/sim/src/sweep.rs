@@ -46,6 +46,11 @@ const MOST: usize = 1_000_000;
 /// Runs the sweep or the shard and writes its files. Returns their folder too. A sweep that was stopped continues.
 pub fn sweep(plan: &Plan, board: Run) -> Result<(Table, PathBuf), RunError> {
     let seeds = usize::try_from(plan.seeds).unwrap_or(usize::MAX);
+    let mut keys: Vec<&str> = plan.vary.iter().map(|vary| vary.key.as_str()).collect();
+    keys.sort_unstable();
+    if let Some([key, _]) = keys.array_windows().find(|[key, next]| key == next) {
+        return Err(format!("--vary {key} is given twice").into());
+    }
     let mut counts = plan.vary.iter().map(|vary| vary.values.len());
     let all = counts.try_fold(seeds, usize::checked_mul).filter(|all| *all <= MOST);
     let all = all.ok_or_else(|| format!("more than {MOST} runs: vary fewer keys, or give fewer values or seeds"))?;

@@ -1,5 +1,5 @@
 //! Jog, strokes and a press over the bus, on the flash image: each completes, and its record is read and parsed by the
-//! host's solver. At the usual size strokes and press are stopped on their way.
+//! host's solver. At the usual size there is no jog, and strokes and press are stopped on their way.
 
 use crate::common::*;
 use fingertip::capture::{CaptureState, Ended, Head};
@@ -64,8 +64,10 @@ fn recorded(rig: &mut Rig, task: Task, whole: bool) -> Vec<u8> {
 fn motions(whole: bool) {
     let setup = away(2.0);
     let mut rig = running(&setup, &fast_bus(0));
-    tare(&mut rig);
-    measure(&mut rig, Task::Jog);
+    if whole {
+        tare(&mut rig);
+        measure(&mut rig, Task::Jog);
+    }
     write_param(&mut rig, "direction_confirmed", 1);
     let strokes = record::strokes(&recorded(&mut rig, Task::Strokes, whole), &Params::DEFAULT).expect("strokes");
     rig.world(|world| world.place(1.9)).expect("it runs");

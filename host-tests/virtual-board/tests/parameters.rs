@@ -72,15 +72,18 @@ fn words_and_erases(rig: &mut Rig) -> (u64, u64) {
     rig.with(|stand| (stand.bench.flash.words, stand.bench.flash.erases)).expect("it runs")
 }
 
-#[test]
-fn stored_parameters_outlive_long_times_full_sectors_and_damage() {
+sim::sizes!(stored_parameters_outlive_long_times_full_sectors_and_damage, outlive(false), outlive(true));
+
+fn outlive(full_sectors: bool) {
     let mut rig = start();
     a_parameter_and_torque_in_one_packet_both_act(&mut rig);
     a_save_with_the_longest_times_is_no_fault_and_no_reset(&mut rig);
     let sound = messages_of_a_start(&mut rig, encode(&record(1_700), 1).to_vec());
     after_a_save_cut_short_the_old_values_count_and_fault_8_says_so(&mut rig, sound);
     damaged_parameters_are_a_fault_that_the_bus_tells(&mut rig, sound);
-    nearly_full_sectors_take_turns(&mut rig);
+    if full_sectors {
+        nearly_full_sectors_take_turns(&mut rig);
+    }
 }
 
 /// The parameter comes first: it would stop what torque began.

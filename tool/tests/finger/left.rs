@@ -1,7 +1,7 @@
 //! A commander of `fingertip share` leaves or is silent, or `share` ends: the fingers are stopped.
 
 use crate::served::Served;
-use crate::shared::{Shared, sync_write};
+use crate::shared::{Asker, Shared, sync_write};
 use fingertip::link::packet::instruction;
 use fingertip::shipped::address;
 use fingertip::state::Mode;
@@ -10,26 +10,22 @@ use fingertip_cli::client::packet;
 use std::io::Read as _;
 use std::time::Duration;
 
-/// Time after which a client takes an answer for lost; a broker with a time-out of 300 ms does after 100 ms.
-const LOST: Duration = Duration::from_millis(150);
-
 /// Reads the mode until it is off, with at most this number of packets.
 fn reads_until_off(finger: &Served, reader: &mut Client, packets: u64) {
-    let (begun, patience) = (finger.heard(), std::mem::replace(&mut reader.timeout, LOST));
+    let begun = finger.heard();
     while !matches!(reader.number(address::PRESENT_MODE), Ok(mode) if mode == Mode::Off as i64) {
         assert!(finger.heard() - begun < packets, "{}", finger.command("look"));
     }
-    reader.timeout = patience;
 }
 
 /// A broker with a time-out of 300 ms, in front of tared fingers.
 fn tared(finger: Served, ids: std::ops::RangeInclusive<u8>) -> Shared {
     ids.for_each(|id| drop(finger.tared(id)));
-    Shared::within("300", finger)
+    Shared::within(300, finger)
 }
 
 /// Turns torque on and sets a goal of 1 N.
-fn presses(commander: &mut Client) {
+fn presses(commander: &mut Asker) {
     commander.set(address::TORQUE_ENABLE, 1).expect("it obeys");
     commander.set(address::GOAL_FORCE_MN, 1_000).expect("it obeys");
 }
@@ -113,7 +109,7 @@ fn the_other_fingers_of_a_stopped_commander_are_stopped_once_it_has_left() {
 #[test]
 fn once_a_commander_has_left_the_next_client_writes() {
     let shared = Shared::begin("wall");
-    let mut clients: Vec<Client> = std::iter::repeat_with(|| shared.client()).take(100).collect();
+    let mut clients: Vec<Asker> = std::iter::repeat_with(|| shared.client()).take(100).collect();
     for client in &mut clients {
         client.ping().expect("it answers");
     }
@@ -149,7 +145,7 @@ fn absent_fingers_of_who_left_keep_nobody_from_the_bus() {
 #[test]
 fn the_end_feeds_all_fingers_and_asks_many_ids_by_one_ping() {
     for (last, packets) in [(9, 8..60), (9 + 80, 2..8)] {
-        let mut shared = Shared::within("900", Served::patient("wall"));
+        let mut shared = Shared::within(900, Served::patient("wall"));
         let mut client = shared.client();
         let steps: Vec<u8> = (9..=last).flat_map(|id| [id, 25]).collect();
         sync_write(&mut client, address::BUS_WATCHDOG, 1, &steps);
@@ -184,12 +180,16 @@ fn a_finger_is_stopped_once_the_line_is_back_unless_another_client_commands_it()
     }
 }
 
+sim::sizes!(
+    a_silent_commander_is_stopped_whoever_set_the_watchdog,
+    stopped(&[("before", true), ("later", false)]),
+    stopped(&[("before", false), ("since", false), ("indirect", false)])
+);
+
 /// Another program has set the bus watchdog, before `share` began or since, or the commander sets it in a packet that does not
 /// name its register; and the commander may write in group packets only.
-#[test]
-fn a_silent_commander_is_stopped_whoever_set_the_watchdog() {
-    for (way, groups) in [("before", false), ("before", true), ("since", false), ("later", false), ("indirect", false)]
-    {
+fn stopped(ways: &[(&str, bool)]) {
+    for &(way, groups) in ways {
         let finger = Served::patient("wall");
         if way == "before" {
             finger.set(&[(address::BUS_WATCHDOG, 25)]);
@@ -208,8 +208,7 @@ fn a_silent_commander_is_stopped_whoever_set_the_watchdog() {
         let [low, high] = address::BUS_WATCHDOG.to_le_bytes();
         if way == "later" {
             for (number, params) in [(instruction::REG_WRITE, &[low, high, 25][..]), (instruction::ACTION, &[])] {
-                let answer = commander.pass(&packet(1, number, params), Some(1), 1).expect("it answers");
-                assert_eq!(answer[8], 0);
+                while commander.pass(&packet(1, number, params), Some(1), 1).expect("it listens").is_empty() {}
             }
         }
         if way == "indirect" {
@@ -262,7 +261,12 @@ fn a_finger_that_answers_nothing_is_stopped_and_a_client_cannot_make_it_so() {
     let finger = Served::patient("wall");
     drop(finger.tared(1));
     finger.set(&[(address::STATUS_RETURN_LEVEL, 0)]);
-    let shared = Shared::within("300", finger);
+    let mut client = finger.client();
+    client.timeout = Duration::from_millis(1);
+    let why = client.number(address::FAULT).expect_err("it answers pings only").to_string();
+    assert!(why.contains("status_return_level") && why.contains("fingertip stop"), "{why}");
+    drop(client);
+    let shared = Shared::within(300, finger);
     let mut commander = shared.client();
     sync_write(&mut commander, address::TORQUE_ENABLE, 1, &[1, 1]);
     sync_write(&mut commander, address::GOAL_FORCE_MN, 4, &[1, 0xE8, 3, 0, 0]);

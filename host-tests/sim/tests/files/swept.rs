@@ -77,6 +77,9 @@ fn what_cannot_be_run_is_told() {
     let out = folder("swept/wrong");
     let plan = Plan { vary: vec!["tip.radius_mm=10..1000:2".parse().unwrap()], ..plan(&out, Shard::WHOLE) };
     assert!(sweep(&plan, &native::board).unwrap_err().to_string().contains("radius_mm"));
+    let twice = vec!["tip.radius_mm=9..10:2".parse().unwrap(); 2];
+    let plan = Plan { vary: twice, ..plan };
+    assert!(sweep(&plan, &native::board).unwrap_err().to_string().contains("twice"));
     let failing = sweep(&self::plan(&out, Shard::WHOLE), &|_, _| Err("the board burns".into()));
     assert!(failing.unwrap_err().to_string().contains("the board burns"));
 }

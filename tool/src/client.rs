@@ -6,7 +6,7 @@ use fingertip::link::packet::{BROADCAST, Event, Packet, REPLY_MAX, Receiver, Sen
 use rustix::fs::{FlockOperation, flock};
 use serial2::SerialPort;
 use std::io::{self, ErrorKind, Read as _, Write as _};
-use std::net::TcpStream;
+use std::net::{Shutdown, TcpStream};
 use std::time::{Duration, Instant};
 
 /// The alert's bit of a status packet's error.
@@ -382,6 +382,8 @@ pub fn packet(id: u8, instruction: u8, params: &[u8]) -> Reply {
 /// Prefix of a TCP port's name: `tcp:127.0.0.1:7000`.
 const TCP: &str = "tcp:";
 const BUFFER: usize = 1024;
+/// Longest wait for the other end of a TCP port to close it.
+const LEAVING: Duration = Duration::from_secs(1);
 /// Error of the system for a file that is not a terminal.
 const NO_TERMINAL: i32 = rustix::io::Errno::NOTTY.raw_os_error();
 /// Beginning of a served finger's message to a second client.
@@ -475,9 +477,16 @@ impl Line {
 
 impl Drop for Line {
     fn drop(&mut self) {
-        if let Self::Serial(port) = self {
-            // A lock lasts as long as any copy of its file: a process that another thread starts just now has one.
-            let _ = flock(port, FlockOperation::Unlock);
+        match self {
+            Self::Serial(port) => {
+                // A lock lasts as long as any copy of its file: a process that another thread starts just now has one.
+                let _ = flock(port, FlockOperation::Unlock);
+            }
+            Self::Tcp(stream) => {
+                // Until the other end has closed it too, the next program would be a second client.
+                let _ = stream.shutdown(Shutdown::Write).and_then(|()| stream.set_read_timeout(Some(LEAVING)));
+                while matches!(stream.read(&mut [0; BUFFER]), Ok(1..)) {}
+            }
         }
     }
 }

@@ -10,8 +10,6 @@ use crate::client::{self, ID_MAX, Reach};
 use crate::{Client, Error, table};
 use fingertip::link::packet::{BROADCAST, Event, HEADER, Packet, Receiver, StatusError, instruction};
 use fingertip::shipped::address;
-use rustix::io::Errno;
-use rustix::net::{RecvFlags, recv};
 use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{Read as _, Write as _};
@@ -88,15 +86,6 @@ struct Connection {
     judged: Option<Instant>,
     /// True once another client stopped one of its fingers: it writes no more.
     stopped: bool,
-    stream: Option<TcpStream>,
-}
-
-impl Connection {
-    /// True once the client has left and its last packet was read, also before its thread has noticed it.
-    fn left(&self) -> bool {
-        let next = |stream| recv(stream, &mut [0], RecvFlags::PEEK | RecvFlags::DONTWAIT);
-        self.stream.as_ref().is_some_and(|stream| matches!(next(stream), Ok((0, _)) | Err(Errno::CONNRESET)))
-    }
 }
 
 /// Serves until Ctrl-C, then stops what is still commanded.
@@ -198,7 +187,6 @@ fn converse(mut stream: TcpStream, bus: &Mutex<Bus>, lost: &Outbox<Error>) {
     let Ok(from) = stream.peer_addr() else { return };
     let _ = stream.set_nodelay(true).and_then(|()| stream.set_write_timeout(Some(SLOW)));
     let (mut receiver, mut raw, mut buffer) = (Receiver::new(), Vec::new(), [0; JUNK]);
-    lock(bus).connections.entry(from).or_default().stream = stream.try_clone().ok();
     // `gone` is true once an answer could not be delivered. Of the packets received before, only stops are passed then.
     let (mut commands, mut gone) = (false, false);
     'client: while let Ok(count @ 1..) = stream.read(&mut buffer) {
@@ -246,13 +234,11 @@ fn converse(mut stream: TcpStream, bus: &Mutex<Bus>, lost: &Outbox<Error>) {
 }
 
 impl Bus {
-    /// Ends the command of clients that left or are silent, except the one whose packet is next.
+    /// Ends the command of clients that are silent, except the one whose packet is next.
     fn end_commands(&mut self, next: Option<SocketAddr>) {
         let others = self.connections.iter().filter(|(from, one)| Some(**from) != next && !one.ids.is_empty());
         for from in others.map(|(from, _)| *from).collect::<Vec<_>>() {
-            if self.connections[&from].left() {
-                self.end_command(from, LEFT);
-            } else if self.is_silent(from) {
+            if self.is_silent(from) {
                 self.end_command(from, SILENT);
             }
         }

@@ -16,17 +16,17 @@ macro_rules! named {
         /// Named effects of the family.
         #[derive(Default)]
         pub struct Named {
-            $(pub(crate) $list: Vec<Metered<$effect>>),*
+            $(pub $list: Stage<$effect>),*
         }
 
         impl Named {
             pub fn any(&self) -> bool {
-                $(!self.$list.is_empty())||*
+                $(self.$list.any())||*
             }
 
             /// Cost of each effect so far.
             pub fn costs(&self) -> impl Iterator<Item = Cost> {
-                core::iter::empty()$(.chain(self.$list.iter().map(Metered::cost)))*
+                core::iter::empty()$(.chain(self.$list.0.iter().map(Metered::cost)))*
             }
         }
     };
@@ -91,13 +91,13 @@ pub fn stream(seed: u64, name: &str, finger: usize) -> u64 {
 const TIMED: u64 = 256;
 
 /// Effect with a meter of its cost. The measurement never reaches the run.
-pub(crate) struct Metered<T: ?Sized> {
+pub struct Metered<T: ?Sized> {
     name: &'static str,
     calls: u64,
     timed_calls: u64,
     timed: Duration,
     /// Number of calls that were skipped because their results are known.
-    pub repeated: i64,
+    repeated: i64,
     part: Box<T>,
 }
 
@@ -106,7 +106,7 @@ impl<T: ?Sized> Metered<T> {
         Self { name, calls: 0, timed_calls: 0, timed: Duration::ZERO, repeated: 0, part }
     }
 
-    pub fn call<R>(&mut self, f: impl FnOnce(&mut T) -> R) -> R {
+    fn call<R>(&mut self, f: impl FnOnce(&mut T) -> R) -> R {
         self.calls += 1;
         if self.calls % TIMED != 1 {
             return f(&mut self.part);
@@ -118,14 +118,50 @@ impl<T: ?Sized> Metered<T> {
         result
     }
 
-    pub fn part(&self) -> &T {
-        &self.part
-    }
-
-    pub fn cost(&self) -> Cost {
+    fn cost(&self) -> Cost {
         let share = self.calls as f64 / self.timed_calls.max(1) as f64;
         let evaluations = self.calls.saturating_add_signed(self.repeated);
         Cost { effect: self.name, evaluations, seconds: self.timed.as_secs_f64() * share }
+    }
+}
+
+/// Named effects of a stage, in the order in which they act.
+pub struct Stage<T: ?Sized>(Vec<Metered<T>>);
+
+impl<T: ?Sized> Default for Stage<T> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
+impl<T: ?Sized> Stage<T> {
+    pub(crate) fn push(&mut self, effect: Metered<T>) {
+        self.0.push(effect);
+    }
+
+    pub fn any(&self) -> bool {
+        !self.0.is_empty()
+    }
+
+    /// Calls each effect.
+    #[inline]
+    pub fn each(&mut self, mut f: impl FnMut(&mut T)) {
+        self.0.iter_mut().for_each(|effect| effect.call(&mut f));
+    }
+
+    /// Calls each effect and returns the results.
+    pub fn map<R>(&mut self, mut f: impl FnMut(&mut T) -> R) -> impl DoubleEndedIterator<Item = R> {
+        self.0.iter_mut().map(move |effect| effect.call(&mut f))
+    }
+
+    /// Returns the effects without counting a call.
+    pub fn parts(&self) -> impl Iterator<Item = &T> {
+        self.0.iter().map(|effect| &*effect.part)
+    }
+
+    /// Counts calls that were skipped because their results are known; negative for an extra call.
+    pub(crate) fn repeat(&mut self, calls: i64) {
+        self.0.iter_mut().for_each(|effect| effect.repeated += calls);
     }
 }
 

@@ -110,7 +110,7 @@ impl Finger {
     pub fn new(setup: &Setup, mut drive: drive::Named, contact: Named) -> Self {
         let mm_per_rad = setup.transmission.drum_radius_mm / setup.transmission.ratio;
         let rotor = Rotor {
-            inertia_kg_m2: setup.motor.inertia_kg_m2 + drive.inertia_kg_m2(mm_per_rad * 1e-3),
+            inertia_kg_m2: setup.motor.inertia_kg_m2 + drive.inertia.map(|part| part(mm_per_rad * 1e-3)).sum::<f64>(),
             torque_nm_per_a: setup.motor.torque_nm_per_a,
             rounds: ROUNDS,
             tolerance: TOLERANCE,
@@ -156,9 +156,9 @@ impl Finger {
         }
         self.friction = Friction::default();
         if self.drive.any() {
-            self.drive.circuit(&mut self.now.circuit);
+            self.drive.electric.each(|part| part.apply(&mut self.now.circuit));
             let middle = self.now.shaft.speed_rad_per_s + 0.5 * dt_s * self.now.rad_per_s2;
-            self.drive.friction(middle, &mut self.friction);
+            self.drive.resist.each(|part| part(middle, &mut self.friction));
         }
         self.rotor.torque_nm_per_a = self.now.circuit.torque_nm_per_a;
     }
@@ -194,8 +194,8 @@ impl Finger {
         self.stop_at_ends();
         self.now.tip_mm = self.flank_mm();
         if self.drive.any() {
-            self.drive.heated(self.now.dt_s, &self.now.circuit, end.square_a2_s);
-            self.now.tip_mm = self.drive.tip_mm(self.now.tip_mm, surface_mm);
+            self.drive.electric.each(|part| part.after(self.now.dt_s, &self.now.circuit, end.square_a2_s));
+            self.drive.play.each(|part| self.now.tip_mm = part(self.now.tip_mm, surface_mm));
         }
     }
 
@@ -255,8 +255,8 @@ impl Finger {
     /// Count of the encoder at a time after the last step, at constant acceleration.
     pub fn count_ahead(&mut self, ahead_s: f64) -> i32 {
         let turns = self.angle_ahead_rad(ahead_s) / TAU;
-        let count = (turns * self.setup.motor.encoder_counts_per_turn).floor() as i32;
-        let count = self.drive.count(count + self.slipped_counts);
+        let mut count = (turns * self.setup.motor.encoder_counts_per_turn).floor() as i32 + self.slipped_counts;
+        self.drive.encoder.each(|part| count = part(count));
         if !self.faults.encoder_frozen {
             self.counts = if self.faults.encoder_reversed { -count } else { count };
         }
@@ -285,6 +285,7 @@ impl Finger {
         let speed = self.now.shaft.speed_rad_per_s;
         let winding_j = 0.5 * self.now.circuit.henry * self.now.winding_a * self.now.winding_a;
         let turning_j = 0.5 * self.rotor.inertia_kg_m2 * speed * speed;
-        1e3 * (turning_j + winding_j + self.drive.potential_j(self.now.shaft.angle_rad))
+        let potential_j: f64 = self.drive.potential.parts().map(|part| part.energy_j(self.now.shaft.angle_rad)).sum();
+        1e3 * (turning_j + winding_j + potential_j)
     }
 }

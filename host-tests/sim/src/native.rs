@@ -8,7 +8,7 @@ pub mod bench;
 pub mod calibrated;
 pub mod served;
 
-use crate::effects::sensor::{self, Readout, Stages as _};
+use crate::effects::sensor::{self, Readout};
 use crate::effects::{Parts, link};
 use crate::host::{Host, Reading};
 use crate::mechanics::Bridge;

@@ -1,5 +1,6 @@
 //! World of a scene: fingers and their object, moved by steps, with weight, floor, shaking and the lifting hand.
 
+use crate::effects::drive::Cogging;
 use crate::effects::{contact, drive};
 use crate::events::{Event, Happened};
 use crate::mechanics::contact::{Contact, Place};
@@ -47,7 +48,8 @@ impl World {
     pub fn new(setup: &Setup, around: &Surroundings, effects: Vec<(drive::Named, contact::Named)>) -> Self {
         let mut fingers: Vec<Finger> =
             effects.into_iter().map(|(drive, contact)| Finger::new(setup, drive, contact)).collect();
-        let mass_kg = fingers[0].contact.effects.mass_kg().filter(|kg| *kg > 0.0);
+        let mass_kg =
+            fingers[0].contact.effects.body.map(|kg| *kg).reduce(|all, more| all + more).filter(|kg| *kg > 0.0);
         let body = Body::default();
         let bare = fingers.iter().all(|finger| !finger.contact.effects.any());
         Self {
@@ -68,7 +70,8 @@ impl World {
             let n_per_mm = finger.contact.steepest_n_per_mm(Tip::DEEPEST * finger.setup.tip.radius_mm);
             // An object between two fingers is pushed back by both.
             let lightness = 1.0 / finger.mass_kg() + self.mass_kg.map_or(0.0, |kg| 2.0 / kg);
-            let potential = finger.drive.steepest_nm_per_rad() / finger.inertia_kg_m2();
+            let potential =
+                finger.drive.potential.parts().map(Cogging::steepest_nm_per_rad).sum::<f64>() / finger.inertia_kg_m2();
             let allowed_s = STEP_RAD / (n_per_mm * 1e3 * lightness + potential).sqrt();
             if step_s > allowed_s {
                 let (step_us, allowed_us, mass_g) = (step_s * 1e6, allowed_s * 1e6, 1e3 / lightness);
@@ -269,8 +272,8 @@ impl World {
             friction_n: finger.friction_n(),
             ..Truth::default()
         };
-        finger.drive.tell(&mut truth);
-        finger.contact.effects.tell(&mut truth);
+        finger.drive.electric.parts().for_each(|part| part.tell(&mut truth));
+        truth.broken = finger.contact.effects.strength.parts().any(|part| part.broken);
         if pressures {
             truth.pressures_kpa = core::array::from_fn(|row| self.row_kpa(index, f64::INFINITY, row));
         }

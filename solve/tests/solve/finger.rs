@@ -56,13 +56,12 @@ impl Draw {
 
     /// Factor of each taxel's reading; 0 for a dead one.
     pub fn gains(&self) -> Vec<f64> {
-        use sim::effects::sensor::Stages;
         let alone = Self { creep_percent: 0.0, hysteresis_percent: 0.0, extra: String::new(), ..self.clone() };
         let mut sensor = Parts::of(&alone.scene(&Place::default()), 0).sensor;
         let mut gains = Vec::new();
         for row in 0..ROWS {
             let mut kpa = [100.0; COLUMNS];
-            sensor.pressure(row, 0.0, &mut kpa);
+            sensor.pressure.each(|part| part(row, 0.0, &mut kpa));
             gains.extend(kpa.map(|kpa| kpa / 100.0));
         }
         self.dead.iter().for_each(|[row, column]| gains[row * COLUMNS + column] = 0.0);

@@ -6,10 +6,10 @@
 //! plane without friction: d = x, F = pi Y d^2. All forces of a step are the mean slope of one energy, so a step
 //! creates no energy.
 
-use crate::effects::{Build, Description, Metered, Parts, normal_within_3};
+use crate::effects::{Build, Description, Metered, Parts, Stage, normal_within_3};
 use crate::mechanics::decay;
 use crate::scene::tables::Key;
-use crate::watch::{Cost, Truth};
+use crate::watch::Cost;
 
 /// Height of the surface towards the tip above the plane from which indentations count, mm; negative where the surface
 /// falls away. The arguments are x along the columns of the array and y along its rows, from the axis of the tip, and the
@@ -57,72 +57,26 @@ pub struct Grip {
 named! {
     shape: Surface,
     memory: Relaxation,
+    // Compliance of the object behind its surface, mm/N.
     series: f64,
     strength: BreakableObject,
     tangent: Grip,
+    // Mass of the object, kg; none if it is fixed.
     body: f64,
 }
 
 impl Named {
     /// True if the surface is not a plane.
     pub fn shaped(&self) -> bool {
-        self.shape.iter().any(|effect| !effect.part().plain)
+        self.shape.parts().any(|surface| !surface.plain)
     }
 
     pub fn height_mm(&self, x_mm: f64, y_mm: f64, radius_mm: f64) -> f64 {
-        self.shape.iter().map(|effect| (effect.part().height_mm)(x_mm, y_mm, radius_mm)).sum()
-    }
-
-    /// Counts the construction of the tables of the shape as a call of its effects.
-    pub fn shape_built(&mut self) {
-        self.shape.iter_mut().for_each(|effect| effect.call(|_| ()));
-    }
-
-    pub fn forgets(&self) -> bool {
-        !self.memory.is_empty()
-    }
-
-    /// Returns the force to subtract from the elastic force.
-    pub fn forgotten_n(&mut self) -> f64 {
-        self.memory.iter_mut().map(|effect| effect.call(|part| part.forgotten_n())).sum()
-    }
-
-    /// Advances in time at a constant elastic force; none while the tip touches nothing.
-    pub fn relax(&mut self, dt_s: f64, elastic_n: Option<f64>) {
-        self.memory.iter_mut().for_each(|effect| effect.call(|part| part.relax(dt_s, elastic_n)));
-    }
-
-    /// Moves the memory of the tip here from the effects of another scene.
-    pub fn remember(&mut self, before: &mut Self) {
-        self.memory = core::mem::take(&mut before.memory);
-    }
-
-    /// Compliance of the object behind its surface.
-    pub fn mm_per_n(&mut self) -> f64 {
-        self.series.iter_mut().map(|effect| effect.call(|part| *part)).sum()
-    }
-
-    pub fn breaks(&self) -> bool {
-        !self.strength.is_empty()
-    }
-
-    /// Returns the share of a force that remains after the object was loaded by it.
-    pub fn left(&mut self, force_n: f64) -> f64 {
-        self.strength.iter_mut().map(|effect| effect.call(|part| part.left(force_n))).product()
+        self.shape.parts().map(|surface| (surface.height_mm)(x_mm, y_mm, radius_mm)).sum()
     }
 
     pub fn grip(&mut self) -> Option<Grip> {
-        self.tangent.iter_mut().map(|effect| effect.call(|part| *part)).last()
-    }
-
-    /// Mass of the object; none if it is fixed.
-    pub fn mass_kg(&mut self) -> Option<f64> {
-        self.body.iter_mut().map(|effect| effect.call(|part| *part)).reduce(|all, more| all + more)
-    }
-
-    #[inline]
-    pub fn tell(&self, truth: &mut Truth) {
-        self.strength.iter().for_each(|effect| truth.broken |= effect.part().broken);
+        self.tangent.map(|grip| *grip).last()
     }
 }
 
@@ -314,11 +268,13 @@ pub struct Relaxation {
 }
 
 impl Relaxation {
-    fn forgotten_n(&mut self) -> f64 {
+    /// Force to subtract from the elastic force.
+    pub fn forgotten_n(&self) -> f64 {
         self.share * self.remembered_n
     }
 
-    fn relax(&mut self, dt_s: f64, elastic_n: Option<f64>) {
+    /// Advances in time at a constant elastic force; none while the tip touches nothing.
+    pub fn relax(&mut self, dt_s: f64, elastic_n: Option<f64>) {
         if dt_s != self.last_s {
             self.last_s = dt_s;
             self.left = [1.0, 1.0 - self.share].map(|rate| decay(dt_s / self.tau_s * rate));
@@ -335,11 +291,12 @@ impl Relaxation {
 pub struct BreakableObject {
     force_n: f64,
     left: f64,
-    broken: bool,
+    pub broken: bool,
 }
 
 impl BreakableObject {
-    fn left(&mut self, force_n: f64) -> f64 {
+    /// Returns the share of a force that remains after the object was loaded by it.
+    pub fn left(&mut self, force_n: f64) -> f64 {
         self.broken |= force_n > self.force_n;
         if self.broken { self.left } else { 1.0 }
     }

@@ -6,7 +6,7 @@
 //! gear follow. The count of the encoder is computed where it is read. Without effects the drive has a rotor without
 //! friction, a winding that is a resistance, an ideal source, and a rigid transmission.
 
-use crate::effects::{Description, Metered};
+use crate::effects::{Description, Metered, Stage};
 use crate::mechanics::decay;
 use crate::scene::tables::Key;
 use crate::setup::Setup;
@@ -93,60 +93,6 @@ named! {
     potential: Cogging,
     play: Play,
     encoder: Encoder,
-}
-
-/// Stages as the finger calls them.
-impl Named {
-    /// Sum of [`Inertia`].
-    pub fn inertia_kg_m2(&mut self, m_per_rad: f64) -> f64 {
-        self.inertia.iter_mut().map(|effect| effect.call(|part| part(m_per_rad))).sum()
-    }
-
-    /// See [`Electric::apply`].
-    pub fn circuit(&mut self, circuit: &mut Circuit) {
-        self.electric.iter_mut().for_each(|effect| effect.call(|part| part.apply(circuit)));
-    }
-
-    /// See [`Electric::after`].
-    pub fn heated(&mut self, dt_s: f64, circuit: &Circuit, square_a2_s: f64) {
-        self.electric.iter_mut().for_each(|effect| effect.call(|part| part.after(dt_s, circuit, square_a2_s)));
-    }
-
-    /// See [`Resist`].
-    pub fn friction(&mut self, speed_rad_per_s: f64, friction: &mut Friction) {
-        self.resist.iter_mut().for_each(|effect| effect.call(|part| part(speed_rad_per_s, friction)));
-    }
-
-    /// Mean torque of what stores energy between two angles: the difference in energy over the distance.
-    pub fn potential_nm(&mut self, from_rad: f64, to_rad: f64) -> f64 {
-        self.potential.iter_mut().map(|effect| effect.call(|part| part.mean_nm(from_rad, to_rad))).sum()
-    }
-
-    pub fn potential_j(&self, angle_rad: f64) -> f64 {
-        self.potential.iter().map(|effect| effect.part().energy_j(angle_rad)).sum()
-    }
-
-    /// Largest slope of that torque.
-    pub fn steepest_nm_per_rad(&self) -> f64 {
-        self.potential.iter().map(|effect| effect.part().steepest_nm_per_rad()).sum()
-    }
-
-    /// See [`Play`].
-    pub fn tip_mm(&mut self, flank_mm: f64, surface_mm: f64) -> f64 {
-        let plays = self.play.iter_mut();
-        plays.fold(flank_mm, |tip_mm, effect| effect.call(|part| part(tip_mm, surface_mm)))
-    }
-
-    /// See [`Encoder`].
-    pub fn count(&mut self, count: i32) -> i32 {
-        self.encoder.iter_mut().fold(count, |count, effect| effect.call(|part| part(count)))
-    }
-
-    /// Adds the state of the effects to the truth.
-    #[inline]
-    pub fn tell(&self, truth: &mut Truth) {
-        self.electric.iter().for_each(|effect| effect.part().tell(truth));
-    }
 }
 
 /// Effects of this family, in the order in which they act within a stage.
@@ -401,20 +347,20 @@ pub struct Cogging {
 }
 
 impl Cogging {
-    fn energy_j(&self, angle_rad: f64) -> f64 {
+    pub fn energy_j(&self, angle_rad: f64) -> f64 {
         // 1 - cos x = 2 sin^2 (x / 2) without cancellation near 0.
         let half = libm::sin(0.5 * self.teeth * angle_rad);
         2.0 * self.torque_nm / self.teeth * half * half
     }
 
     /// Mean torque against the motion between two angles: the difference in energy over the distance.
-    fn mean_nm(&self, from_rad: f64, to_rad: f64) -> f64 {
+    pub fn mean_nm(&self, from_rad: f64, to_rad: f64) -> f64 {
         let half = 0.5 * self.teeth * (to_rad - from_rad);
         let spread = if half.abs() < 1e-4 { 1.0 - half * half / 6.0 } else { libm::sin(half) / half };
         self.torque_nm * libm::sin(0.5 * self.teeth * (from_rad + to_rad)) * spread
     }
 
-    fn steepest_nm_per_rad(&self) -> f64 {
+    pub fn steepest_nm_per_rad(&self) -> f64 {
         self.torque_nm * self.teeth
     }
 }

@@ -1,6 +1,6 @@
 //! Effects on the clock of the controller, interference, and packets of the host.
 
-use crate::effects::{Description, Metered, normal, waiting_s};
+use crate::effects::{Description, Metered, Stage, normal, waiting_s};
 use crate::scene::tables::{Key, Kind};
 use crate::watch::Cost;
 use fingertip::link::packet::{CRC_START, HEADER, instruction, update_crc};
@@ -17,12 +17,12 @@ impl Named {
     /// Duration of a second of the controller in the world.
     #[inline]
     pub fn second_s(&mut self) -> f64 {
-        self.clock.iter_mut().map(|effect| effect.call(|part| *part)).product()
+        self.clock.map(|part| *part).product()
     }
 
     /// Time of arrival of a packet; none if it is lost.
     pub fn pass(&mut self, sent_s: f64) -> Option<f64> {
-        self.packets.iter_mut().try_fold(sent_s, |sent_s, effect| effect.call(|part| part(sent_s)))
+        self.packets.0.iter_mut().try_fold(sent_s, |sent_s, effect| effect.call(|part| part(sent_s)))
     }
 }
 

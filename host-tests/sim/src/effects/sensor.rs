@@ -6,7 +6,7 @@
 
 mod floating;
 
-use crate::effects::{Description, Metered, NamedEffect, family_of, normal_within_3, normals};
+use crate::effects::{Description, Metered, NamedEffect, Stage, family_of, normal_within_3, normals};
 use crate::events::ArrayEvents;
 use crate::mechanics::decay;
 use crate::plant::{self, ArrayFaults};
@@ -40,28 +40,6 @@ pub type Volts = dyn FnMut(usize, f64, &mut Row) + Send;
 /// Effect on the codes of the converter before rounding: slot, time and codes as in [`Volts`].
 pub type Codes = dyn FnMut(usize, f64, &mut Row) + Send;
 
-/// Stages as the readout calls them: of the named effects, or none: `()`.
-pub trait Stages {
-    /// True if no stage has an effect: the readout is then ideal and calls none.
-    fn none(&self) -> bool {
-        true
-    }
-    /// Temperature of the microcontroller, degrees Celsius, if an effect has one.
-    fn chip_c(&self, _time_s: f64) -> Option<f64> {
-        None
-    }
-    /// Calls the effects of the stage, in order, as the methods below do for theirs.
-    fn pressure(&mut self, _row: usize, _time_s: f64, _kpa: &mut Row) {}
-    fn conductance(&mut self, _row: usize, _time_s: f64, _siemens: &mut Row) {}
-    fn network(&mut self, _row: usize, _array: &[Row; ROWS], _seen: &mut Row) {}
-    fn volts(&mut self, _slot: usize, _time_s: f64, _volts: &mut Row) {}
-    fn codes(&mut self, _slot: usize, _time_s: f64, _codes: &mut Row) {}
-    /// Counts calls that were skipped because their results are known; negative for an extra call.
-    fn repeat(&mut self, _rows: i64, _slots: i64) {}
-}
-
-impl Stages for () {}
-
 /// True if an effect gives the same codes in each scan of a contact at rest, and remembers the last slot at most.
 pub fn repeats(named: &NamedEffect) -> bool {
     match named.effect.name {
@@ -81,41 +59,19 @@ named! {
     codes: Codes,
 }
 
-impl Stages for Named {
-    fn none(&self) -> bool {
-        !self.any()
+impl Named {
+    /// Temperature of the microcontroller, degrees Celsius, if an effect has one.
+    pub fn chip_c(&self, time_s: f64) -> Option<f64> {
+        self.chip.parts().next().map(|chip_c| chip_c(time_s))
     }
 
-    fn chip_c(&self, time_s: f64) -> Option<f64> {
-        self.chip.first().map(|effect| effect.part()(time_s))
-    }
-
-    fn pressure(&mut self, row: usize, time_s: f64, kpa: &mut Row) {
-        self.pressure.iter_mut().for_each(|effect| effect.call(|part| part(row, time_s, kpa)));
-    }
-
-    fn conductance(&mut self, row: usize, time_s: f64, siemens: &mut Row) {
-        self.conductance.iter_mut().for_each(|effect| effect.call(|part| part(row, time_s, siemens)));
-    }
-
-    fn network(&mut self, row: usize, array: &[Row; ROWS], seen: &mut Row) {
-        self.network.iter_mut().for_each(|effect| effect.call(|part| part(row, array, seen)));
-    }
-
-    fn volts(&mut self, slot: usize, time_s: f64, volts: &mut Row) {
-        self.volts.iter_mut().for_each(|effect| effect.call(|part| part(slot, time_s, volts)));
-    }
-
-    fn codes(&mut self, slot: usize, time_s: f64, codes: &mut Row) {
-        self.codes.iter_mut().for_each(|effect| effect.call(|part| part(slot, time_s, codes)));
-    }
-
-    fn repeat(&mut self, rows: i64, slots: i64) {
-        self.pressure.iter_mut().for_each(|effect| effect.repeated += rows);
-        self.conductance.iter_mut().for_each(|effect| effect.repeated += rows);
-        self.network.iter_mut().for_each(|effect| effect.repeated += rows);
-        self.volts.iter_mut().for_each(|effect| effect.repeated += slots);
-        self.codes.iter_mut().for_each(|effect| effect.repeated += slots);
+    /// Counts calls that were skipped because their results are known; negative for an extra call.
+    pub(crate) fn repeat(&mut self, rows: i64, slots: i64) {
+        self.pressure.repeat(rows);
+        self.conductance.repeat(rows);
+        self.network.repeat(rows);
+        self.volts.repeat(slots);
+        self.codes.repeat(slots);
     }
 }
 
@@ -150,43 +106,44 @@ impl Readout {
     }
 
     /// Returns the codes of a slot sampled at a time, for the pressures on its row (unused where no row is driven).
-    #[inline]
-    pub fn codes(&mut self, stages: &mut impl Stages, slot: usize, time_s: f64, kpa: &Row) -> [u16; COLUMNS] {
-        // Without effects a row stays in registers through all stages.
-        let mut codes = if stages.none() {
-            self.through(&mut (), slot, time_s, kpa)
-        } else {
-            self.through(stages, slot, time_s, kpa)
-        };
+    pub fn codes(&mut self, stages: &mut Named, slot: usize, time_s: f64, kpa: &Row) -> [u16; COLUMNS] {
+        let mut codes =
+            if stages.any() { self.through(stages, slot, time_s, kpa) } else { self.ideal(slot, time_s, kpa) };
         if let Some(events) = &mut self.events {
             events.change(slot, time_s, &mut codes);
         }
         codes
     }
 
+    /// Without effects a row stays in registers through all stages.
     #[inline(never)]
-    fn through(&mut self, stages: &mut impl Stages, slot: usize, time_s: f64, kpa: &Row) -> [u16; COLUMNS] {
+    fn ideal(&mut self, slot: usize, time_s: f64, kpa: &Row) -> [u16; COLUMNS] {
+        self.through(&mut Named::default(), slot, time_s, kpa)
+    }
+
+    #[inline(always)]
+    fn through(&mut self, stages: &mut Named, slot: usize, time_s: f64, kpa: &Row) -> [u16; COLUMNS] {
         let mut volts = [self.array.ground_v; COLUMNS];
         if slot < ROWS {
             self.add_row(stages, slot, time_s, kpa, &mut volts);
         }
-        stages.volts(slot, time_s, &mut volts);
+        stages.volts.each(|part| part(slot, time_s, &mut volts));
         let mut codes = volts.map(|volts| volts * self.codes_per_volt);
-        stages.codes(slot, time_s, &mut codes);
+        stages.codes.each(|part| part(slot, time_s, &mut codes));
         // The conversion to an integer rounds down, and negative values become 0.
         codes.map(|code| (code as u16).min(Array::CODES as u16 - 1))
     }
 
     /// Adds the voltages of a driven row under these pressures.
     #[inline(always)]
-    pub fn add_row(&mut self, stages: &mut impl Stages, row: usize, time_s: f64, kpa: &Row, volts: &mut Row) {
+    pub fn add_row(&mut self, stages: &mut Named, row: usize, time_s: f64, kpa: &Row, volts: &mut Row) {
         let (array, mut kpa) = (&self.array, *kpa);
-        stages.pressure(row, time_s, &mut kpa);
+        stages.pressure.each(|part| part(row, time_s, &mut kpa));
         self.siemens[row] = core::array::from_fn(|column| {
             let loaded = array.preload_siemens + array.siemens_per_kpa * kpa[column];
             if loaded > 0.0 { loaded } else { 0.0 }
         });
-        stages.conductance(row, time_s, &mut self.siemens[row]);
+        stages.conductance.each(|part| part(row, time_s, &mut self.siemens[row]));
         if let Some(faults) = &self.faults {
             for (siemens, taxel) in self.siemens[row].iter_mut().zip(faults.taxels[row]) {
                 *siemens = match taxel {
@@ -197,7 +154,7 @@ impl Readout {
             }
         }
         let mut seen = self.siemens[row];
-        stages.network(row, &self.siemens, &mut seen);
+        stages.network.each(|part| part(row, &self.siemens, &mut seen));
         for (volts, siemens) in volts.iter_mut().zip(seen) {
             *volts += siemens * self.volts_per_siemens;
         }

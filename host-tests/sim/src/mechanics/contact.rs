@@ -48,7 +48,8 @@ pub struct Along {
 
 impl Contact {
     pub fn new(setup: &Setup, mut effects: Named) -> Self {
-        effects.shape_built();
+        // The tables of the shape count as a call of its effects.
+        effects.shape.each(|_| ());
         let (elastic, centres) = if effects.shaped() {
             shaped(&effects, &setup.tip)
         } else {
@@ -56,7 +57,13 @@ impl Contact {
         };
         let centre_mm = [setup.wall.centre_x_mm, setup.wall.centre_y_mm];
         let pressures = Pressures::new(setup.tip, setup.array.pitch_mm, centre_mm);
-        let law = Law { elastic, forgotten_n: 0.0, free_mm: 0.0, mm_per_n: effects.mm_per_n(), left: 1.0 };
+        let law = Law {
+            elastic,
+            forgotten_n: 0.0,
+            free_mm: 0.0,
+            mm_per_n: effects.series.map(|part| *part).sum(),
+            left: 1.0,
+        };
         let n_per_mm_along = effects.grip().map_or(0.0, |grip| grip.n_per_mm);
         let rows = [(Place::NOWHERE, [0.0; COLUMNS]); ROWS];
         Self { n_per_mm_along, effects, along: Along::default(), law, centres, pressures, rows }
@@ -70,18 +77,20 @@ impl Contact {
     /// Lets the tip relax for a time at an overlap.
     pub fn relax(&mut self, dt_s: f64, x_mm: f64) {
         let law = &mut self.law;
-        if self.effects.forgets() {
+        if self.effects.memory.any() {
             let elastic_n = law.elastic.force_n(law.depth_mm(x_mm));
-            self.effects.relax(dt_s, (elastic_n >= law.forgotten_n).then_some(elastic_n));
-            law.forgotten_n = self.effects.forgotten_n();
+            let elastic_n = (elastic_n >= law.forgotten_n).then_some(elastic_n);
+            self.effects.memory.each(|part| part.relax(dt_s, elastic_n));
+            law.forgotten_n = self.effects.memory.map(|part| part.forgotten_n()).sum();
             law.free_mm = law.elastic.depth_mm(law.forgotten_n);
         }
     }
 
     /// Loads the object with the force of an overlap.
     pub fn bear(&mut self, x_mm: f64) {
-        if self.effects.breaks() {
-            self.law.left = self.effects.left(self.law.force_n(x_mm) / self.law.left);
+        if self.effects.strength.any() {
+            let force_n = self.law.force_n(x_mm) / self.law.left;
+            self.law.left = self.effects.strength.map(|part| part.left(force_n)).product();
         }
     }
 

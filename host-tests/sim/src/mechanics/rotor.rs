@@ -225,7 +225,9 @@ impl<L: Fn(f64, f64) -> f64> Acting for Acts<'_, L> {
         let load_n = (self.load_n)(from_rad * self.mm_per_rad, to_rad * self.mm_per_rad);
         let load_nm = self.mm_per_rad * 1e-3 * load_n;
         let shared = self.friction.load_share * load_nm;
-        let potential_nm = if self.alone { 0.0 } else { self.drive.potential_nm(from_rad, to_rad) };
+        let potential = &mut self.drive.potential;
+        let potential_nm =
+            if self.alone { 0.0 } else { potential.map(|part| part.mean_nm(from_rad, to_rad)).sum::<f64>() };
         Resistance {
             load_nm: load_nm + potential_nm,
             sliding_nm: self.friction.sliding_nm + shared,

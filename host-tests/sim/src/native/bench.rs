@@ -41,7 +41,7 @@ impl Bench {
         let finger = &mut now.world.fingers[0];
         let finger_before = &mut before.world.fingers[0];
         (finger.now, finger.faults) = (finger_before.now, finger_before.faults);
-        finger.contact.effects.remember(&mut finger_before.contact.effects);
+        finger.contact.effects.memory = core::mem::take(&mut finger_before.contact.effects.memory);
         if let (Some(now), Some(before)) = (now.units.first_mut(), before.units.into_iter().next()) {
             (now.pipeline, now.frame, now.command) = (before.pipeline, before.frame, before.command);
             (now.sensor, now.next, now.repeats) = (before.sensor, before.next, before.repeats);
@@ -133,7 +133,7 @@ impl Bench {
     /// Lets time pass over a finger that touches nothing, with few frames. Torque must be off.
     pub fn rest(&mut self, seconds: f64) {
         for _ in 0..(seconds / REST_STEP_S).ceil() as usize {
-            self.finger_mut().contact.effects.relax(REST_STEP_S, None);
+            self.finger_mut().contact.effects.memory.each(|part| part.relax(REST_STEP_S, None));
             self.board.clock.go_on(REST_STEP_S);
             self.step();
         }

@@ -74,7 +74,7 @@ fn stribeck_friction_breaks_away_higher_than_it_slides() {
     let mut drive = parts("[effects.stribeck]\ntorque_mnm = 0.06\nspeed_rad_per_s = 5.0\n", 1).drive;
     for (speed, share) in [(0.0, 1.0), (5.0, 0.5), (-5.0, 0.5), (50.0, 1.0 / 101.0)] {
         let mut friction = Friction::default();
-        drive.friction(speed, &mut friction);
+        drive.resist.each(|part| part(speed, &mut friction));
         close(friction.sliding_nm, 0.06e-3 * share, 1e-12);
     }
 }
@@ -135,8 +135,8 @@ fn the_winding_warms_up_like_its_closed_form() {
         let current_a = 0.4_f64;
         for _ in 0..(15.0 / step_s) as u32 {
             let mut circuit = cold;
-            drive.circuit(&mut circuit);
-            drive.heated(step_s, &circuit, current_a * current_a * step_s);
+            drive.electric.each(|part| part.apply(&mut circuit));
+            drive.electric.each(|part| part.after(step_s, &circuit, current_a * current_a * step_s));
         }
         let time_s = f64::from((15.0 / step_s) as u32) * step_s;
         // tau dT/dt = K (1 + 0.0039 (T - 25)) - (T - 30), K = i^2 R R_th.
@@ -144,10 +144,10 @@ fn the_winding_warms_up_like_its_closed_form() {
         let rate = (1.0 - 0.0039 * k) / 10.0;
         let end = (k * (1.0 - 0.0039 * 25.0) + 30.0) / (1.0 - 0.0039 * k);
         let mut truth = Truth::default();
-        drive.tell(&mut truth);
+        drive.electric.parts().for_each(|part| part.tell(&mut truth));
         close(truth.winding_c, end + (30.0 - end) * (-rate * time_s).exp(), 1e-8);
         let mut circuit = cold;
-        drive.circuit(&mut circuit);
+        drive.electric.each(|part| part.apply(&mut circuit));
         close(circuit.winding_ohm, 2.83 * (1.0 + 0.0039 * (truth.winding_c - 25.0)), 1e-12);
         close(circuit.torque_nm_per_a, 5.35e-3 * (1.0 - 0.001 * (truth.winding_c - 25.0)), 1e-12);
     }

@@ -1,7 +1,7 @@
 //! Each effect of clock, bus and host against its closed form, the host that repeats its command, and virtual time.
 
 use crate::*;
-use sim::effects::{sensor::Stages as _, stream};
+use sim::effects::stream;
 use sim::host::Host;
 use sim::native::Clock;
 
@@ -64,7 +64,7 @@ fn bursts_come_and_last_as_asked() {
     let steps = 2_000_000;
     for step in 0..steps {
         let mut codes = [1000.0; COLUMNS];
-        burst.codes(step % SLOTS, step as f64 * 1e-4, &mut codes);
+        burst.codes.each(|part| part(step % SLOTS, step as f64 * 1e-4, &mut codes));
         let is = codes != [1000.0; COLUMNS];
         assert!(codes.iter().all(|code| (code - 1000.0).abs() <= 100.0));
         noisy += usize::from(is);

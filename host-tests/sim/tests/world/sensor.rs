@@ -2,7 +2,7 @@
 //! closed forms.
 
 use crate::*;
-use sim::effects::sensor::{self, Readout, Row, Stages as _};
+use sim::effects::sensor::{self, Readout, Row};
 use sim::setup::Array;
 
 /// The readout with an effect of these keys.
@@ -26,7 +26,7 @@ fn names() -> Vec<&'static str> {
 }
 
 /// Scans frames of a random world.
-fn scan(stages: &mut impl sensor::Stages, frames: usize, seed: u64) -> Vec<[u16; COLUMNS]> {
+fn scan(stages: &mut sensor::Named, frames: usize, seed: u64) -> Vec<[u16; COLUMNS]> {
     let mut rng = fastrand::Rng::with_seed(seed);
     let mut readout = Readout::new(&Array::default());
     let mut codes = Vec::new();
@@ -44,7 +44,7 @@ fn scan(stages: &mut impl sensor::Stages, frames: usize, seed: u64) -> Vec<[u16;
 
 #[test]
 fn any_effect_and_all_together_change_any_input_alike_each_time() {
-    let plain = scan(&mut (), 1000, 1);
+    let plain = scan(&mut sensor::Named::default(), 1000, 1);
     let table = |name| match name {
         "broken_taxels" => "[effects.broken_taxels]\ndead = [[1, 1]]\n".into(),
         name => format!("[effects.{name}]\n"),
@@ -71,7 +71,7 @@ fn an_effects_numbers_are_its_own() {
 
 fn reads(effect: &mut sensor::Named, time_s: f64, kpa: f64) -> f64 {
     let mut row = all(kpa);
-    effect.pressure(3, time_s, &mut row);
+    effect.pressure.each(|part| part(3, time_s, &mut row));
     assert!(row.iter().all(|column| *column == row[0]));
     row[0]
 }
@@ -145,7 +145,7 @@ fn gains_spread_as_asked_and_by_the_seed() {
         (0..ROWS)
             .flat_map(|row| {
                 let mut kpa = all(1.0);
-                effect.pressure(row, 0.0, &mut kpa);
+                effect.pressure.each(|part| part(row, 0.0, &mut kpa));
                 kpa
             })
             .collect::<Vec<_>>()
@@ -183,7 +183,7 @@ fn broken_taxels_conduct_as_broken() {
     let mut effect = effect("broken_taxels", taxels, 1);
     let mut see = |row: usize, time_s: f64, siemens: f64| {
         let mut array = all(siemens);
-        effect.conductance(row, time_s, &mut array);
+        effect.conductance.each(|part| part(row, time_s, &mut array));
         array
     };
     assert_eq!(see(3, 0.4, 1e-5), all(1e-5));
@@ -198,7 +198,7 @@ fn broken_taxels_conduct_as_broken() {
 
 fn ghosted(hold_ohm: f64, row: usize, array: &[Row; ROWS]) -> Row {
     let mut seen = array[row];
-    effect("ghosting", &format!("hold_ohm = {hold_ohm}"), 1).network(row, array, &mut seen);
+    effect("ghosting", &format!("hold_ohm = {hold_ohm}"), 1).network.each(|part| part(row, array, &mut seen));
     seen
 }
 
@@ -258,7 +258,7 @@ fn a_row_sags_by_its_switch() {
     for (switch_ohm, ohm, percent) in [(70.0, 1e3, 41.2), (5.0, 1e3, 4.76), (70.0, 1e4, 6.54), (5.0, 1e4, 0.498)] {
         let array = [all(1.0 / ohm); ROWS];
         let mut seen = array[2];
-        effect("row_sag", &format!("switch_ohm = {switch_ohm}"), 1).network(2, &array, &mut seen);
+        effect("row_sag", &format!("switch_ohm = {switch_ohm}"), 1).network.each(|part| part(2, &array, &mut seen));
         for siemens in seen {
             let sag = 100.0 * (1.0 - siemens * ohm);
             let exact = 100.0 * (1.0 - 1.0 / (1.0 + switch_ohm * 10.0 / ohm));
@@ -273,7 +273,7 @@ fn a_column_settles_with_the_exponential() {
         let mut effect = effect("settling", &format!("tau_us = {tau_us}\nafter_us = {after_us}"), 1);
         let mut sample = |slot: usize, time_us: f64, v: f64| {
             let mut volts = all(v);
-            effect.volts(slot, time_us * 1e-6, &mut volts);
+            effect.volts.each(|part| part(slot, time_us * 1e-6, &mut volts));
             volts[0]
         };
         // A step from 0.3 V, settled, to 2.3 V, and on to 1.3 V 9 us later, before it has settled.
@@ -291,7 +291,7 @@ fn an_amplifier_ends_at_its_rail() {
     let mut row = all(0.0);
     row[1] = 3.19;
     row[2] = 3.21;
-    effect.volts(0, 0.0, &mut row);
+    effect.volts.each(|part| part(0, 0.0, &mut row));
     assert_eq!(row[..2], [0.0, 3.19]);
     assert!((row[2] - 3.2).abs() < 1e-12);
 }
@@ -302,7 +302,7 @@ fn noise_has_its_deviation_and_no_bias() {
     let mut draws = Vec::new();
     for n in 0..10_000 {
         let mut row = all(0.0);
-        effect.codes(n % SLOTS, 0.0, &mut row);
+        effect.codes.each(|part| part(n % SLOTS, 0.0, &mut row));
         draws.extend(row);
     }
     let count = draws.len() as f64;
@@ -325,7 +325,7 @@ fn offsets_stay_as_they_were_drawn() {
         (0..SLOTS)
             .flat_map(|slot| {
                 let mut row = all(100.0);
-                effect.codes(slot, 0.0, &mut row);
+                effect.codes.each(|part| part(slot, 0.0, &mut row));
                 row
             })
             .collect::<Vec<_>>()
@@ -344,7 +344,7 @@ fn a_coarse_converter_rounds_down_to_its_steps() {
         let mut effect = effect("converter", &format!("bits = {bits}"), 1);
         for code in (0..4096).step_by(7) {
             let mut row = all(f64::from(code) + 0.25);
-            effect.codes(0, 0.0, &mut row);
+            effect.codes.each(|part| part(0, 0.0, &mut row));
             assert_eq!(row[0], f64::from(code / step * step));
         }
     }
@@ -352,7 +352,7 @@ fn a_coarse_converter_rounds_down_to_its_steps() {
     let mut effect = effect("converter", "bits = 12\ninl_codes = 3", 1);
     for (code, more) in [(0.0, 0.0), (1024.0, 2.25), (2048.0, 3.0), (3072.0, 2.25)] {
         let mut row = all(code);
-        effect.codes(0, 0.0, &mut row);
+        effect.codes.each(|part| part(0, 0.0, &mut row));
         assert_eq!(row[0], code + f64::floor(more));
     }
 }

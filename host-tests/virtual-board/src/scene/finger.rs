@@ -6,7 +6,7 @@ use fingertip::frame::Sense;
 use fingertip::shipped::{COLUMNS, Frame, ROWS, SLOTS};
 use sim::SimError;
 use sim::effects::Parts;
-use sim::effects::sensor::{self, Readout, Stages as _};
+use sim::effects::sensor::{self, Readout};
 use sim::mechanics::Bridge;
 use sim::scene::Scene;
 use sim::setup::Array;

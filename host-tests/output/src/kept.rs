@@ -83,17 +83,12 @@ impl Lock {
 
     /// Replaces a file that belongs to it, and that nobody writes without this lock.
     pub fn write_with(&self, path: &Path, bytes: impl AsRef<[u8]>) -> io::Result<()> {
-        let new = beside(path, "new");
-        let written = File::create(&new).and_then(|mut file| {
-            file.write_all(bytes.as_ref())?;
-            if let Ok(old) = fs::metadata(path) {
-                file.set_permissions(old.permissions())?;
-            }
-            file.sync_all()
-        });
-        written.and_then(|()| put(&new, path)).inspect_err(|_| {
-            let _ = fs::remove_file(&new);
-        })
+        let mut whole = Whole::begin(path, None)?;
+        whole.write_all(bytes.as_ref())?;
+        if let Ok(old) = fs::metadata(path) {
+            whole.file.set_permissions(old.permissions())?;
+        }
+        whole.finish()
     }
 }
 
@@ -119,8 +114,10 @@ fn holder(file: &mut File) -> String {
 pub struct Whole {
     file: File,
     new: PathBuf,
-    lock: Lock,
+    path: PathBuf,
     finished: bool,
+    /// Dropped last; none where the writer holds it.
+    _lock: Option<Lock>,
 }
 
 impl Whole {
@@ -129,16 +126,22 @@ impl Whole {
     /// # Errors
     /// The file cannot be written, or another process writes it.
     pub fn create(path: &Path) -> io::Result<Self> {
-        let lock = Lock::take(path)?;
+        Self::begin(path, Some(Lock::take(path)?))
+    }
+
+    fn begin(path: &Path, lock: Option<Lock>) -> io::Result<Self> {
         let new = beside(path, "new");
-        Ok(Self { file: File::create(&new)?, new, lock, finished: false })
+        Ok(Self { file: File::create(&new)?, new, path: path.into(), finished: false, _lock: lock })
     }
 
     /// Puts it in its place.
     pub fn finish(mut self) -> io::Result<()> {
         self.file.sync_all()?;
-        put(&self.new, self.lock.path())?;
+        fs::rename(&self.new, &self.path)?;
         self.finished = true;
+        // The folder holds the name. Not every system lets a folder be brought to the disk.
+        let folder = self.path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let _ = File::open(folder).and_then(|folder| folder.sync_all());
         Ok(())
     }
 }
@@ -178,14 +181,6 @@ pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> io::Result<()> {
         Ok(known) => OpenOptions::new().write(true).open(known)?.write_all(bytes.as_ref()),
         Err(_) => Lock::wait(path)?.write(bytes),
     }
-}
-
-fn put(new: &Path, path: &Path) -> io::Result<()> {
-    fs::rename(new, path)?;
-    // The folder holds the name. Not every system lets a folder be brought to the disk.
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let _ = File::open(folder).and_then(|folder| folder.sync_all());
-    Ok(())
 }
 
 /// `NAME.kind` beside `NAME`.

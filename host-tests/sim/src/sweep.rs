@@ -24,17 +24,25 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::{fmt, fs};
 
-#[derive(Clone, Debug)]
+/// Arguments of a sweep.
+#[derive(Clone, Debug, clap::Args)]
 pub struct Plan {
-    /// Path of a scene, or its name in the library.
+    /// The scene: a file, or a name out of the library
     pub scene: String,
-    /// `TABLE.KEY=VALUE` for all runs.
-    pub set: Vec<String>,
+    /// Varies a key over N values (5 where N is not given); may be given many times: all combinations are run
+    #[arg(long, value_name = "TABLE.KEY=LO..HI[:N]", value_parser = Vary::from_str)]
     pub vary: Vec<Vary>,
-    /// Number of seeds at each point, counted from the seed of the scene.
+    /// Replaces a value of the scene, in every run
+    #[arg(long, value_name = "TABLE.KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Seeds at each point, counted on from the scene's
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
     pub seeds: u64,
+    /// Runs only the I-th of N shares, for merging
+    #[arg(long, value_name = "I/N", default_value_t = Shard::WHOLE, hide_default_value = true)]
     pub shard: Shard,
-    /// Folder of the results; none for its own folder in [`FOLDER`].
+    /// Folder for the results; by default a folder in target/sweep that is named after the sweep
+    #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }
 

@@ -4,10 +4,9 @@ use clap::{Parser, Subcommand};
 use output::say;
 use sim::cli::verdict;
 use sim::native;
-use sim::sweep::{Plan, Shard, Vary, merge, sweep};
+use sim::sweep::{Plan, merge, sweep};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::str::FromStr;
 use std::time::Instant;
 
 /// Runs a scene many times: over values of its keys and over seeds, on all cores. Writes runs.csv, summary.csv and
@@ -27,24 +26,8 @@ use std::time::Instant;
 struct Args {
     #[command(subcommand)]
     merge: Option<Merge>,
-    /// The scene: a file, or a name out of the library
-    #[arg(required = true)]
-    scene: Option<String>,
-    /// Varies a key over N values (5 where N is not given); may be given many times: all combinations are run
-    #[arg(long, value_name = "TABLE.KEY=LO..HI[:N]", value_parser = Vary::from_str)]
-    vary: Vec<Vary>,
-    /// Replaces a value of the scene, in every run
-    #[arg(long, value_name = "TABLE.KEY=VALUE")]
-    set: Vec<String>,
-    /// Seeds at each point, counted on from the scene's
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
-    seeds: u64,
-    /// Runs only the I-th of N shares, for merging
-    #[arg(long, value_name = "I/N")]
-    shard: Option<Shard>,
-    /// Folder for the results; by default a folder in target/sweep that is named after the sweep
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
+    #[command(flatten)]
+    plan: Option<Plan>,
 }
 
 #[derive(Subcommand)]
@@ -61,15 +44,13 @@ enum Merge {
 }
 
 fn main() -> ExitCode {
-    let Args { merge: merged, scene, vary, set, seeds, shard, out } = Args::parse();
+    let Args { merge: merged, plan } = Args::parse();
     let started = Instant::now();
-    let (done, whole) = match merged {
-        Some(Merge::Merge { files, out }) => (merge(&files, &out).map(|table| (table, out)), true),
-        None => {
-            let plan =
-                Plan { scene: scene.unwrap_or_default(), set, vary, seeds, shard: shard.unwrap_or(Shard::WHOLE), out };
-            (sweep(&plan, &native::board), plan.shard.is_whole())
-        }
+    let whole = plan.as_ref().is_none_or(|plan| plan.shard.is_whole());
+    let done = match (merged, plan) {
+        (Some(Merge::Merge { files, out }), _) => merge(&files, &out).map(|table| (table, out)),
+        (None, Some(plan)) => sweep(&plan, &native::board),
+        (None, None) => Err("a sweep needs a scene".into()),
     };
     verdict(done.map(|(table, out)| {
         if whole {

@@ -26,30 +26,15 @@ pub struct WholeLoop {
     levels: Vec<[Errors; 2]>,
     /// By frame rate: settle time of a row in ns, longest settling in ms, duty at rest in %, errors, and number of holds
     /// without a fault.
-    rates: Vec<(f64, f64, f64, Errors, f64)>,
-    fingers: f64,
+    rates: Vec<(u32, f64, f64, Errors, u32)>,
+    fingers: u32,
 }
 
 impl WholeLoop {
-    /// Reads the lines of the program.
+    /// Reads the output of the program.
     pub fn read(text: &str) -> Result<Self, String> {
-        let mut all = Self::default();
-        for line in text.lines() {
-            let mut words = line.split(' ');
-            let name = words.next().unwrap_or_default();
-            let numbers: Result<Vec<f64>, _> = words.map(str::parse).collect();
-            let numbers = numbers.map_err(|error| format!("{line}: {error}"))?;
-            match (name, &numbers[..]) {
-                ("level", [_, a, b, c, d, e, f, g, h]) => all.levels.push([[*a, *b, *c, *d], [*e, *f, *g, *h]]),
-                ("rate", [ns, ms, percent, a, b, c, d, holds]) => {
-                    all.rates.push((*ns, *ms, *percent, [*a, *b, *c, *d], *holds));
-                }
-                ("fingers", [fingers]) => all.fingers = *fingers,
-                ("goals", [0.5, 1.0, 2.0, 5.0]) => {}
-                _ => return Err(format!("`{line}` is not a line of `budget --whole-loop`")),
-            }
-        }
-        Ok(all)
+        let read = serde_json::from_str(text).map_err(|error| format!("the output of `budget --whole-loop`: {error}"));
+        read.map(|(levels, rates, fingers)| Self { levels, rates, fingers })
     }
 
     /// Returns the section that opens the page.

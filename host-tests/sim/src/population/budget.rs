@@ -178,20 +178,14 @@ const SETTLE_NS: [u32; 4] = [2_400, 11_500, 38_800, 84_200];
 /// The whole loop: error of the true force against the work per frame, and settling against the frame rate.
 ///
 /// Fingers of the budget hold its forces at each fit level, as they come and calibrated. The demonstration's finger and
-/// the same population show what other frame rates change. Returns lines of words: `level L` with the errors of fingers
-/// as they come and calibrated, mN rms; `rate NS` with settling in ms, duty at rest in %, errors and the number of holds
-/// without a fault.
+/// the same population show what other frame rates change. Returns JSON: an array of the levels, the rates and the
+/// number of fingers.
 pub fn whole_loop(fingers: usize) -> Result<String, RunError> {
-    let mut text = String::new();
-    levels(fingers, &mut text)?;
-    rates(fingers, &mut text)?;
-    let _ = writeln!(text, "fingers {fingers}");
-    let _ = writeln!(text, "goals {}", GOALS_N.map(|goal_n| goal_n.to_string()).join(" "));
-    Ok(text)
+    Ok(serde_json::to_string(&(levels(fingers)?, rates(fingers)?, fingers))? + "\n")
 }
 
-/// Runs the fingers at each fit level, as they come and calibrated.
-fn levels(fingers: usize, text: &mut String) -> Result<(), RunError> {
+/// Runs the fingers at each fit level. Returns the errors of fingers as they come and calibrated, mN rms.
+fn levels(fingers: usize) -> Result<Vec<[Errors; 2]>, RunError> {
     let made = each(fingers, |scene| {
         let calibrated = Calibrated::of(scene)?;
         let board = |scene: &Scene, watch: &mut dyn Watch| Ok(simulate_calibrated(scene, &calibrated.gains, watch)?);
@@ -203,30 +197,31 @@ fn levels(fingers: usize, text: &mut String) -> Result<(), RunError> {
         };
         FitLevel::ALL.iter().map(at).collect::<Result<Vec<_>, RunError>>()
     })?;
-    for level in FitLevel::ALL {
-        let of = |which: usize| words(&made.iter().map(|finger| finger[level as usize][which]).collect());
-        let _ = writeln!(text, "level {} {} {}", level as u8, of(0), of(1));
-    }
-    Ok(())
+    let of = |level: usize, which: usize| rms_mn(&made.iter().map(|finger| finger[level][which]).collect());
+    Ok((0..FitLevel::ALL.len()).map(|level| [of(level, 0), of(level, 1)]).collect())
 }
 
+/// Settle time of a row, ns; settling, ms, and duty at rest, %, of the demonstration; errors of the fingers, mN rms, and
+/// the number of their holds without a fault.
+type Rate = (u32, f64, f64, Errors, usize);
+
 /// Runs the demonstration and the fingers, at fit level 2, at each frame rate.
-fn rates(fingers: usize, text: &mut String) -> Result<(), RunError> {
+fn rates(fingers: usize) -> Result<Vec<Rate>, RunError> {
     let demo = crate::cli::load("demo", &[], None)?;
-    for settle_ns in SETTLE_NS {
+    let rate = |settle_ns: u32| {
         let change = [("controller.settle_ns", settle_ns.to_string())];
         let measured = run(&changed(&demo, &change)?, &native::board, &mut [])?.measured;
         let off = each(fingers, |scene| holds(&changed(scene, &change)?, &native::board))?;
-        let [settling_ms, rest_duty_percent] =
-            ["settling_ms", "rest_duty_percent"].map(|metric| measured.get(metric).unwrap_or(f64::NAN));
+        let of = |metric: &str| measured.get(metric).ok_or_else(|| format!("at {settle_ns} ns: no {metric}"));
         let count = off.iter().flatten().flatten().count();
-        let _ = writeln!(text, "rate {settle_ns} {settling_ms:.1} {rest_duty_percent:.2} {} {count}", words(&off));
-    }
-    Ok(())
+        Ok((settle_ns, of("settling_ms")?, of("rest_duty_percent")?, rms_mn(&off), count))
+    };
+    SETTLE_NS.into_iter().map(rate).collect()
 }
 
-fn words(off: &Off) -> String {
-    rms(off).map(|error_n| format!("{:.1}", 1e3 * error_n)).join(" ")
+/// Root mean squares, mN, to a tenth.
+fn rms_mn(off: &Off) -> Errors {
+    rms(off).map(|error_n| (1e4 * error_n).round() / 10.0)
 }
 
 fn each<T: Send>(fingers: usize, of: impl Fn(&Scene) -> Result<T, RunError> + Sync) -> Result<Vec<T>, RunError> {

@@ -118,16 +118,6 @@ fn driven_in(slot: usize) -> [bool; ROWS] {
     core::array::from_fn(|row| row == slot)
 }
 
-impl Clone for Plant {
-    fn clone(&self) -> Self {
-        let (mut plant, finger) = (Self::new(&self.finger().setup), self.finger());
-        plant.faults = self.faults;
-        plant.finger_mut().now = finger.now;
-        plant.finger_mut().counts = finger.counts;
-        plant
-    }
-}
-
 impl core::fmt::Debug for Plant {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.debug_struct("Plant").field("faults", &self.faults).finish_non_exhaustive()

@@ -194,16 +194,19 @@ fn the_motor_has_the_figures_of_its_data_sheet() {
     // A stiff supply and no bridge, as on the motor's test bench.
     let mut setup = free();
     (setup.supply.source_ohm, setup.supply.bridge_ohm) = (0.0, 0.0);
-    let mut world = Plant::new(&setup);
-    world.advance(0.0, FULL);
+    let started = || {
+        let mut world = Plant::new(&setup);
+        world.advance(0.0, FULL);
+        world
+    };
+    let mut world = started();
     let torque = (world.finger().current_a() * setup.motor.torque_nm_per_a - setup.motor.friction_nm) * 1e3;
     assert!((11.15..11.25).contains(&torque), "{torque} mNm for 11.20");
-    let start = world.clone();
     run(&mut world, 0.2, FULL);
     let (speed, current) = (world.finger().now.shaft.speed_rad_per_s, world.finger().current_a());
     assert!((10_550.0..10_650.0).contains(&(speed * RPM)), "{} rpm for 10,600", speed * RPM);
     assert!((0.0215..0.0225).contains(&current), "{current} A for 0.0220");
-    let (mut world, mut time_s) = (start, 0.0);
+    let (mut world, mut time_s) = (started(), 0.0);
     while world.finger().now.shaft.speed_rad_per_s < speed * (1.0 - (-1.0f64).exp()) {
         world.advance(STEP_S, FULL);
         time_s += STEP_S;
@@ -232,7 +235,7 @@ fn friction_holds_inside_its_band_and_not_outside() {
                 let ohms = setup.supply.circuit_ohm(&setup.motor, duty);
                 duty = current * ohms / setup.supply.source_v;
             }
-            let mut world = world.clone();
+            let mut world = pressed(d);
             let angle = world.finger().now.shaft.angle_rad;
             run(&mut world, 0.01, Bridge::Driven { duty });
             assert_eq!(world.finger().now.shaft.angle_rad == angle, holds, "d {d} mm, {torque} N m");

@@ -294,32 +294,3 @@ fn what_is_not_touched_or_does_not_rise_has_no_figures() {
     assert_eq!(names.map(|name| pressed(1_000, 100, |_| 0.0).get(name)), [None; 4]);
     assert_eq!(pressed(2_000, 300, |_| 1.0).get("rise_ms"), None);
 }
-
-/// Whatever the force does: after the settling time it is inside the band, and just before it was outside.
-#[test]
-fn settling_is_the_last_entry_into_the_band() {
-    let mut rng = fastrand::Rng::with_seed(2003);
-    let mut settled = 0;
-    for length in 0..2_000 {
-        let errors: Vec<f64> = (0..20 + length % 180).map(|_| 0.2 * rng.f64() - 0.1).collect();
-        let quiet = rng.usize(..errors.len());
-        let force = |ms: f64| match ms as usize {
-            0 => 1.0,
-            at if at < quiet => 2.0 + errors[at],
-            at => 2.0 + 0.1 * errors[at],
-        };
-        let measured = pressed(2_000, errors.len(), force);
-        let outside = |ms: usize| (force(ms as f64) - 2.0).abs() > 0.02;
-        match measured.get("settling_ms") {
-            None => assert!(outside(errors.len() - 1)),
-            Some(ms) => {
-                let at = ms.round() as usize;
-                assert!(!(at..errors.len()).any(outside) && outside(at - 1), "{at} of {}", errors.len());
-                settled += 1;
-            }
-        }
-        let highest_n = (0..errors.len()).map(|ms| force(ms as f64)).fold(2.0, f64::max);
-        close(&measured, "overshoot_percent", 100.0 * (highest_n - 2.0));
-    }
-    assert!(settled > 1_000, "{settled}");
-}

@@ -93,30 +93,6 @@ fn hysteresis_encloses_its_area() {
 }
 
 #[test]
-fn hysteresis_gives_no_energy_on_any_closed_way() {
-    // Pressure times reading: a cycle never yields energy.
-    let mut rng = fastrand::Rng::with_seed(5);
-    let mut effect = effect("hysteresis", "width_percent = 20", 1);
-    let mut cycle = |way: &[f64]| {
-        let mut before = (way[0], reads(&mut effect, 0.0, way[0]));
-        let mut area = 0.0;
-        for kpa in way.iter().skip(1) {
-            let now = (*kpa, reads(&mut effect, 0.0, *kpa));
-            area -= (now.0 - before.0) * 0.5 * (now.1 + before.1);
-            before = now;
-        }
-        area
-    };
-    for _ in 0..1000 {
-        let turns: Vec<f64> = (0..rng.usize(1..20)).map(|_| 30.0 * rng.f64()).collect();
-        let ends = [0.0].iter().chain(&turns).chain(&[0.0]).copied().collect::<Vec<_>>();
-        let way: Vec<f64> =
-            ends.windows(2).flat_map(|w| (0..100).map(move |n| w[0] + (w[1] - w[0]) * f64::from(n) / 99.0)).collect();
-        assert!(cycle(&way) >= -1e-9);
-    }
-}
-
-#[test]
 fn creep_grows_by_its_rate_in_each_decade() {
     for steps_a_decade in [3, 50] {
         let mut effect = effect("creep", "rate_percent_per_decade = 5", 1);

@@ -121,10 +121,15 @@ impl Bench {
 
     /// Steps for a time. Returns the largest true force, N.
     pub fn run(&mut self, seconds: f64) -> f64 {
+        self.run_with(seconds, |_| {})
+    }
+
+    /// Steps as [`Bench::run`], with a change to the inputs of the controller.
+    pub fn run_with(&mut self, seconds: f64, change: impl Fn(&mut Record)) -> f64 {
         let until_s = self.time_s() + seconds;
         let mut largest_n: f64 = 0.0;
         while self.time_s() < until_s {
-            self.step();
+            self.step_with(&change);
             largest_n = largest_n.max(self.truth().force_n);
         }
         largest_n

@@ -84,17 +84,6 @@ fn interrupt_torque(finger: &mut Finger, seconds: f64) -> f64 {
     largest_n
 }
 
-/// Steps for a time while the controller is given other records; returns the largest true force meanwhile, N.
-fn run_with(finger: &mut Finger, seconds: f64, change: impl Fn(&mut Record)) -> f64 {
-    let until_s = finger.time_s() + seconds;
-    let mut largest_n: f64 = 0.0;
-    while finger.time_s() < until_s {
-        finger.step_with(&change);
-        largest_n = largest_n.max(finger.truth().force_n);
-    }
-    largest_n
-}
-
 /// Replaces the codes of a frame and keeps its sequence number.
 fn show(record: &mut Record, codes: &Frame) {
     record.frame = Frame { sequence: record.frame.sequence, ..*codes };

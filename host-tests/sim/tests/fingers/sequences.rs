@@ -372,7 +372,7 @@ impl Disturbance {
             Self::SilentBus => finger.command().bus_watchdog_ms = 100,
             Self::BridgeFault | Self::LostSignal => {}
         }
-        let peak_n = run_with(&mut finger, WATCHED_S, |record| match self {
+        let peak_n = finger.run_with(WATCHED_S, |record| match self {
             Self::BridgeFault => record.sense.bridge_fault = true,
             Self::LostSignal => show(record, blank),
             Self::SilentBus => record.sense.bus_silent_ms = 200,

@@ -18,7 +18,7 @@ fn lost(modulus_kpa: f64, goal_n: f64, freezes: bool, before_touch_s: Option<f64
     let pressed_s = before_touch_s.map_or(1.0, |before_s| touch_s(&tables, goal_n) - before_s);
     let before_n = press(&mut finger, goal_n, pressed_s);
     let codes = if freezes { *finger.frame() } else { blank };
-    let peak_n = before_n.max(run_with(&mut finger, 1.5, |record| show(record, &codes)));
+    let peak_n = before_n.max(finger.run_with(1.5, |record| show(record, &codes)));
     let what = format!("freezes: {freezes}, {before_touch_s:?} s before the touch, {modulus_kpa} kPa, goal {goal_n} N");
     Case::new(format!("{what}: {:?}", finger.status().fault), peak_n, most_n(goal_n))
 }
@@ -62,7 +62,7 @@ fn gains_that_halve_during_a_press_do_not_double_the_force() {
                 touch(&mut finger);
                 finger.run(after_s);
             }
-            let peak_n = run_with(&mut finger, 1.5, halve);
+            let peak_n = finger.run_with(1.5, halve);
             let (force_n, fault) = (finger.truth().force_n, finger.status().fault);
             let what = format!("goal {goal_n} N, {after_s} s after the touch, {force_n:.2} N at last: {fault:?}");
             cases.push(Case::new(what, peak_n, most_n(goal_n)));

@@ -150,10 +150,7 @@ pub fn library_names() -> io::Result<Vec<String>> {
 fn names_in(folder: &Path) -> io::Result<Vec<String>> {
     let mut names = Vec::new();
     for entry in fs::read_dir(folder)? {
-        let path = entry?.path();
-        if path.extension().is_some_and(|extension| extension == "toml") {
-            names.extend(path.file_stem().map(|stem| stem.to_string_lossy().into_owned()));
-        }
+        names.extend(entry?.file_name().to_string_lossy().strip_suffix(".toml").map(str::to_owned));
     }
     names.sort();
     Ok(names)

@@ -14,15 +14,9 @@ use toml_edit::{Document, Item, TableLike, TomlError};
 
 /// Reads a scene. Errors name the file `file`.
 pub fn read(file: &str, text: &str) -> Result<Scene, SceneErrors> {
+    let document = Document::parse(text).map_err(|error| not_toml(file, text, &error))?;
     let mut reader = Reader { file, text, errors: Vec::new() };
-    let scene = match Document::parse(text) {
-        Ok(document) => reader.scene(document.as_table()),
-        Err(error) => {
-            reader.errors.push(not_toml(file, text, &error));
-            None
-        }
-    };
-    match scene {
+    match reader.scene(document.as_table()) {
         Some(scene) if reader.errors.is_empty() => Ok(scene),
         _ => {
             reader.errors.sort_by_key(|error| (error.line, error.column));
@@ -31,9 +25,9 @@ pub fn read(file: &str, text: &str) -> Result<Scene, SceneErrors> {
     }
 }
 
-pub(crate) fn not_toml(file: &str, text: &str, error: &TomlError) -> SceneError {
+pub(crate) fn not_toml(file: &str, text: &str, error: &TomlError) -> SceneErrors {
     let message = format!("this is not TOML: {}", error.message().trim().replace('\n', "; "));
-    SceneError::new(file, text, error.span().unwrap_or(0..0), message, String::new())
+    SceneErrors(vec![SceneError::new(file, text, error.span().unwrap_or(0..0), message, String::new())])
 }
 
 struct Reader<'a> {
@@ -430,13 +424,8 @@ pub struct SceneErrors(pub Vec<SceneError>);
 
 impl fmt::Display for SceneErrors {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (place, error) in self.0.iter().enumerate() {
-            if place > 0 {
-                f.write_str("\n\n")?;
-            }
-            error.fmt(f)?;
-        }
-        Ok(())
+        let errors: Vec<String> = self.0.iter().map(SceneError::to_string).collect();
+        f.write_str(&errors.join("\n\n"))
     }
 }
 

@@ -156,7 +156,8 @@ impl Finger {
         }
         self.friction = Friction::default();
         if self.drive.any() {
-            self.drive.electric.each(|part| part.apply(&mut self.now.circuit));
+            self.drive.electric.each(|part| part(&mut self.now.circuit));
+            self.drive.heat.each(|part| part.apply(&mut self.now.circuit));
             let middle = self.now.shaft.speed_rad_per_s + 0.5 * dt_s * self.now.rad_per_s2;
             self.drive.resist.each(|part| part(middle, &mut self.friction));
         }
@@ -194,7 +195,7 @@ impl Finger {
         self.stop_at_ends();
         self.now.tip_mm = self.flank_mm();
         if self.drive.any() {
-            self.drive.electric.each(|part| part.after(self.now.dt_s, &self.now.circuit, end.square_a2_s));
+            self.drive.heat.each(|part| part.after(self.now.dt_s, end.square_a2_s));
             self.drive.play.each(|part| self.now.tip_mm = part(self.now.tip_mm, surface_mm));
         }
     }

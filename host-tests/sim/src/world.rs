@@ -262,7 +262,7 @@ impl World {
             current_a: finger.current_a(),
             supply_v: finger.supply_v(),
             duty: finger.now.circuit.duty,
-            winding_c: 25.0,
+            winding_c: finger.drive.heat.parts().next().map_or(25.0, |heat| heat.winding_c),
             tangential_n: -finger.contact.n_per_mm_along * along.stretch_mm,
             slip_mm: along.slip_mm,
             object_mm: self.body.place_mm,
@@ -272,7 +272,6 @@ impl World {
             friction_n: finger.friction_n(),
             ..Truth::default()
         };
-        finger.drive.electric.parts().for_each(|part| part.tell(&mut truth));
         truth.broken = finger.contact.effects.strength.parts().any(|part| part.broken);
         if pressures {
             truth.pressures_kpa = core::array::from_fn(|row| self.row_kpa(index, f64::INFINITY, row));

@@ -10,7 +10,7 @@ use crate::effects::{Description, Metered, Stage};
 use crate::mechanics::decay;
 use crate::scene::tables::Key;
 use crate::setup::Setup;
-use crate::watch::{Cost, Truth};
+use crate::watch::Cost;
 
 /// Circuit of the winding during a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -59,23 +59,8 @@ pub struct Friction {
 /// Inertia added at the shaft, kg m^2, for the travel of the tip per angle, m/rad. Called once.
 pub type Inertia = dyn FnMut(f64) -> f64 + Send;
 
-/// Effect on the supply of the winding.
-pub trait Electric: Send {
-    /// Changes the circuit of the next step.
-    fn apply(&mut self, circuit: &mut Circuit);
-
-    /// Ends a step with its length and the integral of the square of the current.
-    fn after(&mut self, _dt_s: f64, _circuit: &Circuit, _square_a2_s: f64) {}
-
-    /// Adds the state to the truth.
-    fn tell(&self, _truth: &mut Truth) {}
-}
-
-impl<F: FnMut(&mut Circuit) + Send> Electric for F {
-    fn apply(&mut self, circuit: &mut Circuit) {
-        self(circuit);
-    }
-}
+/// Effect on the circuit of the winding in the next step.
+pub type Electric = dyn FnMut(&mut Circuit) + Send;
 
 /// Effect that adds friction to a step with about this mean speed, rad/s.
 pub type Resist = dyn FnMut(f64, &mut Friction) + Send;
@@ -88,7 +73,8 @@ pub type Encoder = dyn FnMut(i32) -> i32 + Send;
 
 named! {
     inertia: Inertia,
-    electric: dyn Electric,
+    electric: Electric,
+    heat: ThermalDerating,
     resist: Resist,
     potential: Cogging,
     play: Play,
@@ -154,7 +140,7 @@ pub const EFFECTS: &[Description] = &[
             let [ambient_c, k_per_w, tau_s, magnet_per_k] =
                 ["ambient_c", "k_per_w", "tau_s", "magnet_per_k"].map(|name| build.number(name));
             let heat = ThermalDerating { ambient_c, k_per_w, tau_s, magnet_per_k, winding_c: ambient_c, cold_ohm: 0.0 };
-            parts.drive.electric.push(build.part(Box::new(heat)))
+            parts.drive.heat.push(build.part(Box::new(heat)))
         },
     },
     Description {
@@ -302,24 +288,26 @@ pub const EFFECTS: &[Description] = &[
 /// Temperature coefficient of the resistance of copper.
 const COPPER_PER_K: f64 = 0.0039;
 
-struct ThermalDerating {
+pub struct ThermalDerating {
     ambient_c: f64,
     k_per_w: f64,
     tau_s: f64,
     magnet_per_k: f64,
-    winding_c: f64,
+    pub winding_c: f64,
     /// Resistance at 25 degC before this effect.
     cold_ohm: f64,
 }
 
-impl Electric for ThermalDerating {
-    fn apply(&mut self, circuit: &mut Circuit) {
+impl ThermalDerating {
+    /// Changes the circuit of the next step.
+    pub fn apply(&mut self, circuit: &mut Circuit) {
         self.cold_ohm = circuit.winding_ohm;
         circuit.winding_ohm *= 1.0 + COPPER_PER_K * (self.winding_c - 25.0);
         circuit.torque_nm_per_a *= 1.0 + self.magnet_per_k * (self.winding_c - 25.0);
     }
 
-    fn after(&mut self, dt_s: f64, _circuit: &Circuit, square_a2_s: f64) {
+    /// Ends a step with its length and the integral of the square of the current.
+    pub fn after(&mut self, dt_s: f64, square_a2_s: f64) {
         if dt_s == 0.0 {
             return;
         }
@@ -333,10 +321,6 @@ impl Electric for ThermalDerating {
         let change = source - rate * self.winding_c;
         self.winding_c +=
             if (x * rate).abs() < 1e-6 { change * x * (1.0 - 0.5 * x * rate) } else { change * (1.0 - left) / rate };
-    }
-
-    fn tell(&self, truth: &mut Truth) {
-        truth.winding_c = self.winding_c;
     }
 }
 

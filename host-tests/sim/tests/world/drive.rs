@@ -135,21 +135,20 @@ fn the_winding_warms_up_like_its_closed_form() {
         let current_a = 0.4_f64;
         for _ in 0..(15.0 / step_s) as u32 {
             let mut circuit = cold;
-            drive.electric.each(|part| part.apply(&mut circuit));
-            drive.electric.each(|part| part.after(step_s, &circuit, current_a * current_a * step_s));
+            drive.heat.each(|part| part.apply(&mut circuit));
+            drive.heat.each(|part| part.after(step_s, current_a * current_a * step_s));
         }
         let time_s = f64::from((15.0 / step_s) as u32) * step_s;
         // tau dT/dt = K (1 + 0.0039 (T - 25)) - (T - 30), K = i^2 R R_th.
         let k = current_a * current_a * 2.83 * 46.0;
         let rate = (1.0 - 0.0039 * k) / 10.0;
         let end = (k * (1.0 - 0.0039 * 25.0) + 30.0) / (1.0 - 0.0039 * k);
-        let mut truth = Truth::default();
-        drive.electric.parts().for_each(|part| part.tell(&mut truth));
-        close(truth.winding_c, end + (30.0 - end) * (-rate * time_s).exp(), 1e-8);
+        let winding_c = drive.heat.parts().next().unwrap().winding_c;
+        close(winding_c, end + (30.0 - end) * (-rate * time_s).exp(), 1e-8);
         let mut circuit = cold;
-        drive.electric.each(|part| part.apply(&mut circuit));
-        close(circuit.winding_ohm, 2.83 * (1.0 + 0.0039 * (truth.winding_c - 25.0)), 1e-12);
-        close(circuit.torque_nm_per_a, 5.35e-3 * (1.0 - 0.001 * (truth.winding_c - 25.0)), 1e-12);
+        drive.heat.each(|part| part.apply(&mut circuit));
+        close(circuit.winding_ohm, 2.83 * (1.0 + 0.0039 * (winding_c - 25.0)), 1e-12);
+        close(circuit.torque_nm_per_a, 5.35e-3 * (1.0 - 0.001 * (winding_c - 25.0)), 1e-12);
     }
 }
 

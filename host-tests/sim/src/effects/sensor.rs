@@ -289,9 +289,9 @@ pub const EFFECTS: &[Description] = &[
         state: "conductance of each stuck taxel",
         reference: "docs/runs.md, Readout: defects of the array",
         keys: &[
-            Key { name: "dead", about: "Open circuits, by row and column.", kind: TAXELS },
-            Key { name: "shorted", about: "Short circuits, by row and column.", kind: TAXELS },
-            Key { name: "stuck", about: "Taxels that no longer change, by row and column.", kind: TAXELS },
+            Key { name: "dead", about: "Open circuits, by row and column.", kind: Kind::Taxels },
+            Key { name: "shorted", about: "Short circuits, by row and column.", kind: Kind::Taxels },
+            Key { name: "stuck", about: "Taxels that no longer change, by row and column.", kind: Kind::Taxels },
             Key::number("at_s", "Time of the defect; -10 is before the tare.", -10.0, 1e6, -10.0),
         ],
         zero: &[],
@@ -506,8 +506,6 @@ fn gone(x: f64) -> f64 {
         _ => 1.0 - decay(x),
     }
 }
-
-const TAXELS: Kind = Kind::Pairs { below: ROWS as i64 };
 
 #[derive(Clone, Copy)]
 enum Taxel {

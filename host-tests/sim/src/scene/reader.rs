@@ -6,7 +6,7 @@ use crate::events::{EVENT, Event, KINDS};
 use crate::metrics;
 use crate::scene::tables::{EXPECT, Key, Kind, MANY, ROOT, SCRIPT, TABLES, Table, Value, Values};
 use crate::scene::{Bound, Goal, Scene};
-use fingertip::shipped::Config;
+use fingertip::shipped::{Config, ROWS};
 use std::fmt;
 use std::ops::Range;
 use std::path::Path;
@@ -316,7 +316,7 @@ impl Reader<'_> {
                 }
                 given => words.iter().find(|word| Some(**word) == given).map(|word| Value::Word(word)),
             },
-            Kind::Pairs { below } => pairs(item, below).map(Value::Pairs),
+            Kind::Taxels => pairs(item, ROWS as i64).map(Value::Pairs),
         };
         if value.is_none() {
             let given = self.text.get(at.clone()).unwrap_or("that").to_owned();

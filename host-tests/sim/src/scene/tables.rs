@@ -3,6 +3,7 @@
 
 use crate::events::{EVENT, KINDS};
 use fingertip::params::Params;
+use fingertip::shipped::ROWS;
 use std::fmt;
 
 #[derive(Clone, Copy, Debug)]
@@ -216,11 +217,8 @@ pub enum Kind {
     },
     /// Text in one line; required.
     Text,
-    /// Pairs of whole numbers, such as `[[3, 4], [9, 9]]` for taxels by row and column; empty if it is missing.
-    Pairs {
-        /// Limit below which each number lies.
-        below: i64,
-    },
+    /// Taxels by row and column, such as `[[3, 4], [9, 9]]`; empty if it is missing.
+    Taxels,
 }
 
 impl Key {
@@ -260,7 +258,7 @@ impl Key {
                 format!("{}number, {min} to {max}, may be left out", if whole { "whole " } else { "" })
             }
             Kind::Text => "text, required".into(),
-            Kind::Pairs { below } => format!("pairs [row, column], each 0 to {}, default none", below - 1),
+            Kind::Taxels => format!("pairs [row, column], each 0 to {}, default none", ROWS - 1),
         }
     }
 
@@ -270,7 +268,7 @@ impl Key {
             Kind::Number { default, .. } => default.map(Value::Number),
             Kind::Whole { default, .. } => default.map(Value::Whole),
             Kind::Word { default, .. } => default.map(Value::Word),
-            Kind::Pairs { .. } => Some(Value::Pairs(Vec::new())),
+            Kind::Taxels => Some(Value::Pairs(Vec::new())),
             Kind::Optional { .. } | Kind::Text => None,
         }
     }

@@ -147,7 +147,7 @@ fn every_default_lies_within_its_range_and_every_key_says_what_it_is() {
             Kind::Whole { min, max, default } => (min..=max).contains(&default.unwrap_or(min)),
             Kind::Word { words, default } => default.is_none_or(|default| words.contains(&default)),
             Kind::Optional { min, max, .. } => min <= max,
-            Kind::Text | Kind::Pairs { .. } => true,
+            Kind::Text | Kind::Taxels => true,
         };
         assert!(fits, "{table}: {}", key.name);
     }

@@ -255,7 +255,7 @@ const FLASH_END: u32 = 0x1000_0000;
 const LEAD: u64 = 2;
 
 /// Lines of the largest flash, 2 MiB; its aliases are the same lines.
-const FLASH_LINES: usize = 1 << 17;
+const FLASH_LINES: u32 = 1 << 17;
 
 /// Wait states of an STM32F4 at 168 MHz and 3.3 V.
 const WAIT_STATES: u64 = 5;
@@ -352,47 +352,31 @@ fn is_flash(line: u32) -> bool {
     line < FLASH_END >> LINE_BITS
 }
 
-/// Lines, the longest unused one goes first.
+/// Lines by their last use, the latest first; the longest unused one goes first.
 #[derive(Clone, Debug)]
 struct Cache {
-    lines: Vec<usize>,
+    lines: Vec<u32>,
     size: usize,
-    /// Last use of each line of the flash; 0 if it is not cached.
-    used: Vec<u64>,
-    uses: u64,
 }
 
 impl Cache {
     fn new(size: usize) -> Self {
-        Self { lines: Vec::with_capacity(size), size, used: vec![0; FLASH_LINES], uses: 0 }
+        Self { lines: Vec::with_capacity(size), size }
     }
 
     fn contains(&self, line: u32) -> bool {
-        self.used[line as usize % FLASH_LINES] != 0
+        self.lines.contains(&(line % FLASH_LINES))
     }
 
     /// True if a line is there; it then counts as just used.
     fn touch(&mut self, line: u32) -> bool {
-        let there = self.contains(line);
-        if there {
-            self.use_now(line as usize % FLASH_LINES);
-        }
-        there
+        let place = self.lines.iter().position(|known| *known == line % FLASH_LINES);
+        place.inspect(|place| self.lines[..=*place].rotate_right(1)).is_some()
     }
 
+    /// Takes in a line that is not there.
     fn insert(&mut self, line: u32) {
-        let line = line as usize % FLASH_LINES;
-        if self.lines.len() < self.size {
-            self.lines.push(line);
-        } else if let Some(oldest) = self.lines.iter_mut().min_by_key(|line| self.used[**line]) {
-            self.used[*oldest] = 0;
-            *oldest = line;
-        }
-        self.use_now(line);
-    }
-
-    fn use_now(&mut self, line: usize) {
-        self.uses += 1;
-        self.used[line] = self.uses;
+        self.lines.truncate(self.size - 1);
+        self.lines.insert(0, line % FLASH_LINES);
     }
 }

@@ -198,24 +198,6 @@ pub fn frames() -> [Frame; 2] {
 }
 
 #[test]
-fn a_gain_scales_its_taxel_and_no_other() {
-    let [pressed, blank] = frames();
-    let config = config();
-    let plain = *tared(&Calibration::NONE, &blank, &config).read(&pressed, &config);
-    let mut gains = GAINS;
-    gains[4][6] = GAIN_ONE / 2;
-    gains[5][3] = GAIN_ONE / 4 * 5;
-    let scaled = *tared(&Calibration::new(&gains, &[0; ROWS]).unwrap(), &blank, &config).read(&pressed, &config);
-    for (row, column) in places() {
-        let share = f64::from(gains[row][column]) / f64::from(GAIN_ONE);
-        let expected = f64::from(plain.taxels[row][column]) * share;
-        let found = f64::from(scaled.taxels[row][column]);
-        assert!((found - expected).abs() <= 1.5, "row {row}, column {column}: {found}, not {expected}");
-    }
-    assert!(plain.taxels[4][6] > 1_000, "the contact lies there");
-}
-
-#[test]
 fn what_cannot_be_is_refused_by_name() {
     for (value, row, column) in [(0, 0, 0), (GAIN_MAX + 1, 9, 9), (u16::MAX, 3, 7)] {
         let mut gains = GAINS;

@@ -64,15 +64,6 @@ fn the_centre_follows_the_contact() {
 }
 
 #[test]
-fn the_undriven_slot_takes_out_a_common_offset() {
-    let mut bench = Bench::new(&Setup::default());
-    let before = bench.press(1.0);
-    recode(&mut bench.frame, |_, _, code| code + 25);
-    (0..COLUMNS).for_each(|column| bench.frame.set_code(ROWS, column, bench.frame.code(ROWS, column) + 25));
-    assert_eq!(from_sums(bench.array.read(&bench.frame, &bench.config), &bench.config), before);
-}
-
-#[test]
 fn the_baseline_follows_drift_only_when_told() {
     let mut bench = Bench::new(&Setup::default());
     bench.read();

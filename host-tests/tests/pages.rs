@@ -59,19 +59,9 @@ fn code(page: &str) -> (Vec<String>, Vec<String>) {
     (blocks, spans.collect())
 }
 
-/// Splits a line into words as a shell does: a quoted text is one word.
+/// Splits a line into words as a shell does; none of a line with an open quote.
 fn words(command: &str) -> Vec<String> {
-    let (mut words, mut quote) = (vec![String::new()], None);
-    for sign in command.chars() {
-        match (sign, quote) {
-            ('"' | '\'', None) => quote = Some(sign),
-            (_, Some(open)) if sign == open => quote = None,
-            (' ', None) => words.push(String::new()),
-            _ => words.last_mut().expect("there is always one").push(sign),
-        }
-    }
-    words.retain(|word| !word.is_empty());
-    words
+    shlex::split(command).unwrap_or_default()
 }
 
 /// The help texts of all programs, each asked once.

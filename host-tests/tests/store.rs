@@ -158,15 +158,10 @@ fn a_value_out_of_its_range_is_its_default_and_a_fault() {
 
 /// The gains as their documentation has them: two in a value, the first in its low half.
 fn with_gains_of(record: &Record, words: core::ops::Range<u32>, change: impl Fn(u32, u32) -> u32) -> Vec<u8> {
-    let mut bytes = of_values(&named(record), 1);
-    let count = named(record).len() + words.len();
-    bytes.truncate(12 + 8 * named(record).len());
-    bytes[8..12].copy_from_slice(&(count as u32).to_le_bytes());
-    for word in words {
-        bytes.extend((crc32(b"gains_10x10").wrapping_add(word)).to_le_bytes());
-        bytes.extend(change(word, record.gains.word(word as usize)).to_le_bytes());
-    }
-    finish(bytes)
+    let first = crc32fast::hash(b"gains_10x10");
+    let word = |word: u32| (first.wrapping_add(word), change(word, record.gains.word(word as usize)).cast_signed());
+    let named = named(record).into_iter().map(|(name, value)| (crc32fast::hash(name.as_bytes()), value));
+    of_numbers(&named.chain(words.map(word)).collect::<Vec<_>>(), 1)
 }
 
 #[test]
@@ -235,24 +230,6 @@ fn what_contradicts_goes_back_to_its_defaults_and_the_rest_stays() {
     assert_eq!(params, Params::DEFAULT);
 }
 
-/// CRC-32 (ISO-HDLC), bit by bit.
-fn crc32(bytes: &[u8]) -> u32 {
-    let mut crc = !0u32;
-    for byte in bytes {
-        crc ^= u32::from(*byte);
-        for _ in 0..8 {
-            crc = if crc & 1 == 1 { crc >> 1 ^ 0xEDB8_8320 } else { crc >> 1 };
-        }
-    }
-    !crc
-}
-
-fn finish(mut bytes: Vec<u8>) -> Vec<u8> {
-    bytes.extend(crc32(&bytes).to_le_bytes());
-    bytes.resize(bytes.len().next_multiple_of(16), 0xFF);
-    bytes
-}
-
 /// The names before the parameters, and the parameters' names.
 fn names() -> Vec<&'static str> {
     let head = ["id", "baud_code", "return_delay_2us", "fit_level"].into_iter();
@@ -268,15 +245,22 @@ fn named(record: &Record) -> Vec<(&'static str, i32)> {
 
 /// A record as its documentation describes it.
 fn of_values(values: &[(&str, i32)], sequence: u32) -> Vec<u8> {
+    let numbered = values.iter().map(|(name, value)| (crc32fast::hash(name.as_bytes()), *value));
+    of_numbers(&numbered.collect::<Vec<_>>(), sequence)
+}
+
+/// The same of values by their numbers.
+fn of_numbers(values: &[(u32, i32)], sequence: u32) -> Vec<u8> {
     let mut bytes = b"FTPR".to_vec();
     bytes.extend(sequence.to_le_bytes());
     bytes.extend((values.len() as u32).to_le_bytes());
-    for (name, value) in values {
-        assert_eq!(number(name), crc32(name.as_bytes()));
-        bytes.extend(number(name).to_le_bytes());
+    for (number, value) in values {
+        bytes.extend(number.to_le_bytes());
         bytes.extend(value.to_le_bytes());
     }
-    finish(bytes)
+    bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
+    bytes.resize(bytes.len().next_multiple_of(16), 0xFF);
+    bytes
 }
 
 /// Difference of another firmware's records.

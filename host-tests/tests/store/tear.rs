@@ -216,12 +216,9 @@ pub fn with_gains(number: i32) -> Record {
     record
 }
 
-/// SplitMix64: the same bits in every run.
+/// Bits without a pattern, the same in every run.
 pub fn bits(seed: u64) -> u32 {
-    let mut mixed = seed.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    mixed = (mixed ^ mixed >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    mixed = (mixed ^ mixed >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
-    (mixed ^ mixed >> 31) as u32
+    Rng::with_seed(seed).u32(..)
 }
 
 /// Operation in which the power is lost, by its number, and the result of that operation.

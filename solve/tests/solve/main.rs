@@ -47,7 +47,7 @@ fn a_hold_shows_the_creep() {
         let mut reading = |frame: usize| {
             finger.bench.place(7.0);
             let force = finger.bench.step().contact.force;
-            (frame % 2_500 == 0).then(|| [finger.bench.time_s() - begun_s, force.0.to_num()])
+            frame.is_multiple_of(2_500).then(|| [finger.bench.time_s() - begun_s, force.0.to_num()])
         };
         let readings = (1..=300_000).filter_map(&mut reading).collect();
         let found = creep(&HeldSeries { readings }).expect("a hold");

@@ -32,6 +32,8 @@ const CHECKED: I8F24 = I8F24::from_bits(1 << 23);
 /// Force by which it must fall: 0.1 N, or half of it if that is less. An object that yields by 2 mm/N loses 0.2 N of
 /// 7 N and nearly all of 0.2 N. The residue of hysteresis and creep falls by a few percent in that time.
 const FALLS: Newtons = Newtons::from_bits((1 << 16) / 10);
+/// Least speed of a release, however slow an approach is: 5 mm/s. An object that yields by a millimetre is left within 0.5 s.
+const RELEASE_LEAST: MillimetresPerSecond = MillimetresPerSecond::from_bits(5 << 16);
 /// Force beyond the goal and three tenths of it within which a shorted motor must be able to stop: 0.4 N.
 const STOPPED: Newtons = Newtons::from_bits((4 << 16) / 10);
 
@@ -89,7 +91,9 @@ impl Grip {
         let holds = goal.force > Newtons::ZERO && touch.stage() != Stage::Doubtful;
         self.creep.observe(holds && touch.held(), contact.force, config);
         let (distance, limit, slack) = if holds {
-            self.release = None;
+            if self.release.take().is_some() {
+                touch.resume();
+            }
             touch.seek();
             self.pressing(goal, contact, touch, motion, config, limits)
         } else {
@@ -97,7 +101,8 @@ impl Grip {
             let release = self.release.get_or_insert_with(|| Release::new(contact, touch, travel));
             let quick = release.follow(contact, touch, travel, config);
             let distance = Millimetres(release.rest.0.saturating_sub(travel.0));
-            (distance, if quick { config.speed_max } else { config.approach }, config.count)
+            let slow = config.approach.max(RELEASE_LEAST);
+            (distance, if quick { config.speed_max } else { slow }, config.count)
         };
         let (reference, limited) = motion.towards(distance, slack, limit, config);
         if limited {

@@ -11,15 +11,18 @@
 //! | clear | a release has backed off; what the array still reads is a residue of the contact | a larger reading: held; the next approach: none |
 //!
 //! A force cannot fall by a quarter within a frame: the object would have to leave at metres in a second. Such a step
-//! is withheld: the loop continues with the force before it, and does not press harder. The guard deliberately
-//! keeps a separate record, from raw readings.
+//! is withheld: the loop continues with the force before it, and does not press harder. A step that takes back a step
+//! up shows the force again. The guard deliberately keeps a separate record, from raw readings.
 
 use crate::config::Config;
 use crate::contact::Contact;
 use crate::units::{Millimetres, Newtons};
+use fixed::types::I16F16;
 
 /// A force that falls by more than this part of itself, and `contact_on_mn`, in one frame did not fall at the tip: 1/4.
 const STEP_BITS: u32 = 2;
+/// Time after a step up within which a fall takes it back; one that stays for 8 ms is fault 2.
+const ROSE_NS: u32 = 10_000_000;
 /// Longest frame time in which no object moves that far, ns.
 pub const FRAME_NS_MAX: u32 = 500_000;
 /// Time for which a force stays away before the touch is doubtful, or stays before it pushes a tip at rest, ns.
@@ -63,7 +66,7 @@ enum Place {
     Here,
     /// The force returned and has not risen since. The surface is kept from the contact before.
     Before,
-    /// The force has not risen since torque was enabled. The surface is kept from before that.
+    /// The force has not risen since torque was enabled or a release ended. The surface is kept from before that.
     Inherited,
     /// The force rose: the surface is known.
     Known,
@@ -84,6 +87,8 @@ pub struct Touch {
     least: Newtons,
     /// Force that the array lost in a step, added to what it reads.
     withheld: Newtons,
+    /// Frame of the last step up, and the force before it.
+    rise: (u32, Newtons),
     /// Force, sum and bad taxels of the last frame; the lesser force and sum of the last two frames: a frame that reads
     /// too much is no reference.
     before: (Newtons, Newtons, u8),
@@ -159,11 +164,12 @@ impl Touch {
         let Contact { force, .. } = *inputs.contact;
         let (force_before, Newtons(sum_before)) = self.lesser;
         let step = force_before.0.saturating_sub(force.0);
+        let fell = sum_before.saturating_sub(inputs.summed.0);
         let least = (sum_before >> STEP_BITS).saturating_add(config.contact_on.0);
         // Taxels that fail take their share of the sum with them; in a slow frame an object can leave.
         let comparable = self.before.2 == inputs.contact.bad_taxels && config.timing.frame_ns <= FRAME_NS_MAX;
-        if comparable && sum_before.saturating_sub(inputs.summed.0) > least {
-            self.withheld = Newtons(self.withheld.0.saturating_add(step)).max(Newtons::from_bits(1));
+        if comparable && fell.saturating_abs() > least {
+            self.note_step(step, fell > 0, least, force, config);
         } else if self.withheld > Newtons::ZERO && step.saturating_neg() > self.withheld.0 >> 1 {
             // The signal is back.
             self.withheld = Newtons::ZERO;
@@ -185,6 +191,31 @@ impl Touch {
             if self.away_ns > DOUBTFUL_NS {
                 (self.stage, self.least) = (Stage::Doubtful, force);
             }
+        }
+    }
+
+    /// Takes a step of the signal, by at least `least` in the sum. A fall soon after a rise takes it back, if it ends within
+    /// half of the force before that.
+    #[cold]
+    #[inline(never)]
+    fn note_step(&mut self, step: I16F16, fell: bool, least: I16F16, force: Newtons, config: &Config) {
+        let (force_before, Newtons(sum_before)) = self.lesser;
+        if !fell {
+            if step.saturating_neg() > self.withheld.0 >> 1 {
+                self.withheld = Newtons::ZERO;
+            }
+            // One frame that reads too much is no rise. The time is counted on from here.
+            if self.before.1.0.saturating_sub(sum_before) > least {
+                self.frames = self.frames.min(FRAMES_MAX / 2);
+                self.rise = (self.frames, force_before);
+            }
+            return;
+        }
+        let (at, Newtons(before)) = core::mem::take(&mut self.rise);
+        let soon = self.frames.saturating_sub(at).saturating_mul(config.timing.frame_ns) <= ROSE_NS;
+        let off = force.0.saturating_sub(before).saturating_abs();
+        if before == I16F16::ZERO || !soon || off > before >> 1 {
+            self.withheld = Newtons(self.withheld.0.saturating_add(step)).max(Newtons::from_bits(1));
         }
     }
 
@@ -230,7 +261,7 @@ impl Touch {
         (self.stage != Stage::None).then_some(self.surface)
     }
 
-    /// True if the force rose by `contact_on_mn` since the touch began, returned, or torque was enabled.
+    /// True if the force rose by `contact_on_mn` since the touch began, returned, was released, or torque was enabled.
     pub fn placed(&self) -> bool {
         self.place == Place::Known
     }
@@ -293,11 +324,19 @@ impl Touch {
         }
     }
 
-    /// Prepares the record for torque: drops a doubtful touch, and marks a known surface as inherited.
+    /// Prepares the record for torque: drops a doubtful touch and what is withheld, and marks a known surface as inherited.
     pub fn start(&mut self) {
+        self.withheld = Newtons::ZERO;
         if self.stage == Stage::Doubtful {
             *self = Self::default();
-        } else if self.place == Place::Known {
+        } else {
+            self.resume();
+        }
+    }
+
+    /// Prepares the record for a new goal: what a release left may be a residue, until the force rises.
+    pub fn resume(&mut self) {
+        if self.place == Place::Known {
             (self.place, self.least) = (Place::Inherited, self.before.0);
         }
     }

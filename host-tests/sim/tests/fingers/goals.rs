@@ -247,6 +247,53 @@ fn residual_after(hold_s: f64) {
     judge("speed without contact", "mm/s", &cases);
 }
 
+/// Another goal amid a release: until the force rises, what the array reads may be a residue, and there may be air ahead.
+#[test]
+fn a_goal_amid_a_release_does_not_drive_the_tip_through_the_air() {
+    let remembering = "[effects.hysteresis]\nwidth_percent = 2\n[effects.creep]\nrate_percent_per_decade = 2\n";
+    let mut tasks = Vec::new();
+    for yield_mm_per_n in [0.0, 0.5] {
+        for (first_n, second_n) in [(2.0, 3.0), (1.0, 0.3), (5.0, 1.0)] {
+            tasks.extend((0..12).map(|step| (yield_mm_per_n, first_n, second_n, 0.005 * f64::from(step * step))));
+        }
+    }
+    let cases = cores::map(tasks, |(yield_mm_per_n, first_n, second_n, after_s)| {
+        let mut finger = finger(&(object(3.0, yield_mm_per_n) + LOSSES + remembering));
+        press(&mut finger, first_n, 0.7);
+        press(&mut finger, 0.0, after_s);
+        set_goal(&mut finger, second_n);
+        let (until_s, mut ended_s, mut fastest) = (finger.time_s() + 0.8, finger.time_s(), 0.0_f64);
+        while finger.time_s() < until_s {
+            finger.step();
+            let truth = finger.truth();
+            if truth.force_n > 0.0 {
+                ended_s = finger.time_s();
+            } else if finger.time_s() > ended_s + 0.02 {
+                fastest = fastest.max(truth.speed_mm_per_s.abs());
+            }
+        }
+        let held = (finger.truth().force_n - second_n).abs() < 0.1 * second_n + 0.03;
+        let what =
+            format!("{yield_mm_per_n} mm/N, {first_n} N, {second_n} N {after_s} s after goal 0, holds it: {held}");
+        Case::new(what, if held { fastest } else { f64::NAN }, 1.5 * APPROACH_MM_PER_S)
+    });
+    judge("speed without contact", "mm/s", &cases);
+}
+
+/// A release is quick enough for its promise however slow an approach is.
+#[test]
+fn goal_zero_releases_at_the_slowest_approach() {
+    let mut cases = Vec::new();
+    for (yield_mm_per_n, goal_n) in [(0.0, 5.0), (0.0, 1.0), (1.0, 1.0)] {
+        let controller = "[controller]\napproach_um_per_s = 500\n";
+        let mut finger = finger(&(object(0.2, yield_mm_per_n) + LOSSES + controller));
+        press(&mut finger, goal_n, 8.0);
+        let held_n = finger.truth().force_n;
+        cases.push(case(&mut finger, yield_mm_per_n, format!("{yield_mm_per_n} mm/N, {held_n:.3} of {goal_n} N")));
+    }
+    judge("released at the slowest approach", "N", &cases);
+}
+
 /// The tare takes the force that presses as zero: with torque on, the tip would press harder by as much.
 // With `Command { tare_forced: true, .. }` the same tare allows torque.
 #[test]

@@ -71,6 +71,40 @@ fn gains_that_halve_during_a_press_do_not_double_the_force() {
     judge("gains halved", "N", &cases);
 }
 
+/// What is withheld after a step down ends with its reason: a step up before it, and torque that was off meanwhile.
+#[test]
+fn a_force_is_held_again_after_interference_and_after_a_pause_of_torque() {
+    let mut cases = Vec::new();
+    let mut holds = |finger: &mut Finger, what: String| {
+        for goal_n in [2.0, 3.0] {
+            press(finger, goal_n, 1.0);
+            let (off_n, fault) = ((finger.truth().force_n - goal_n).abs(), finger.status().fault);
+            cases.push(Case::new(format!("{what}, {goal_n} N, {fault:?}"), off_n, 0.1));
+        }
+    };
+    for (more, seconds) in [(200, 0.001), (200, 0.003), (200, 0.006), (400, 0.006), (100, 0.007)] {
+        let mut finger = finger(&(object(3.0, 0.0) + LOSSES));
+        press(&mut finger, 2.0, 0.7);
+        finger.run_with(seconds, |record| {
+            for (row, column) in (4..6).flat_map(|row| (0..COLUMNS).map(move |column| (row, column))) {
+                record.frame.set_code(row, column, record.frame.code(row, column) + more);
+            }
+        });
+        holds(&mut finger, format!("two rows read {more} more for {seconds} s"));
+    }
+    for held_n in [1.0, 2.0, 5.0] {
+        let mut finger = finger(&(object(3.0, 0.0) + LOSSES));
+        press(&mut finger, held_n, 0.7);
+        let codes = *finger.frame();
+        finger.command().torque = false;
+        finger.run_with(0.3, |record| show(record, &codes));
+        finger.run(0.2);
+        finger.command().torque = true;
+        holds(&mut finger, format!("{held_n} N, frozen while torque was off"));
+    }
+    judge("held again: off by", "N", &cases);
+}
+
 /// Runs a scene; returns the deviation of the duty at rest and the swing of the true force.
 fn at_rest(scene: &Scene, what: &str) -> [Case; 2] {
     let goal_n = scene.script.iter().map(|event| event.goal_n).fold(0.0, f64::max);

@@ -126,7 +126,7 @@ params! {
     /// Largest current, by the motor model.
     current_max_ma = 2_000 in 20..=20_000;
     /// Largest slew of the motor's voltage.
-    voltage_slew_mv_per_ms = 60_000 in 100..=1_000_000;
+    voltage_slew_mv_per_ms = 60_000 in 3_000..=1_000_000;
     /// Largest speed of the tip. At least approach_um_per_s.
     speed_max_um_per_s = 250_000 in 1_000..=2_000_000;
     /// Speed of approach, and of a release from an unsure contact. At most speed_max_um_per_s.

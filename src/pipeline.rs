@@ -89,7 +89,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             temperature_drift: TemperatureDrift::default(),
             monitor: Monitor::default(),
             guard: Guard::default(),
-            activity: Activity::Off(Halt::OPEN),
+            activity: Activity::Off(Halt::BRAKES),
             step: press::Step::NONE,
             status: Status::default(),
             tared: false,

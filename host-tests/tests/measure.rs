@@ -155,7 +155,8 @@ fn a_press_has_no_more_rows_than_stated() {
         let (mut step, mut picture) = (Step::<ROWS, COLUMNS>::NONE, TactileImage::EMPTY);
         let mut contact = Contact::default();
         motion.observe(0, &config);
-        let mut press = Press::begin(&motion, BuiltIn::PROOF.expect("it is built in"));
+        let mut press =
+            Press::begin(&motion, Millimetres::from_bits(-1 << 30), BuiltIn::PROOF.expect("it is built in"));
         let (mut encoder, mut rows, mut sequence) = (0_i32, 0, 0_u32);
         let stride = [3, 60, 600, 40_000][random.usize(0..4)];
         while press.running() && sequence < 40_000 {

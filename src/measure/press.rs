@@ -56,6 +56,8 @@ const FRAMES_MAX: u16 = 16_383;
 pub struct Press {
     _built_in: BuiltIn,
     phase: Phase,
+    /// Travel at which nothing may touch any more when the tip backs off.
+    rest: Millimetres,
     /// Travel at which the tip touched, by the force and the configured modulus.
     touch: Millimetres,
     /// Depth of the quick cycle.
@@ -188,11 +190,12 @@ impl<const ROWS: usize, const COLUMNS: usize> Step<ROWS, COLUMNS> {
 }
 
 impl Press {
-    /// Begins a press. The tip may touch or not.
-    pub fn begin(motion: &SpeedLoop, built_in: BuiltIn) -> Self {
+    /// Begins a press. The tip may touch or not; it backs off to `rest` at most.
+    pub fn begin(motion: &SpeedLoop, rest: Millimetres, built_in: BuiltIn) -> Self {
         Self {
             _built_in: built_in,
             phase: Phase::Retreat,
+            rest,
             touch: Millimetres::ZERO,
             deepest: Millimetres::ZERO,
             step_from: Millimetres::ZERO,
@@ -240,8 +243,13 @@ impl Press {
         let at_end = config.travel_max.0.saturating_sub(travel.0).to_bits() < END;
         let force = view.contact.force;
         let measured = view.motion.observer.measured(view.encoder, config);
-        // Something pushes back: the grip that follows releases it faster than this motion would.
-        if force > config.force_max && matches!(self.phase, Phase::In(_) | Phase::Hold | Phase::Back(_)) {
+        // Something pushes back, or follows: the grip that comes next releases it faster than this motion would.
+        let touched = match self.phase {
+            Phase::Retreat => force >= config.contact_off && travel <= self.rest,
+            Phase::In(_) | Phase::Hold | Phase::Back(_) => force > config.force_max,
+            Phase::Seek | Phase::Before | Phase::Last | Phase::Over => false,
+        };
+        if touched {
             self.phase = Phase::Over;
             return standing.end(Ended::Touched, super::millinewtons(force));
         }

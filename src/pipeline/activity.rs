@@ -117,9 +117,7 @@ pub struct Halt {
 }
 
 impl Halt {
-    /// State of a motor at rest, with the bridge open.
-    pub const OPEN: Self = Self { at: Millimetres::ZERO, still_ns: 0, open: true };
-    /// A motor that was driven just now.
+    /// A motor that was driven just now, or may have been before a reset.
     pub const BRAKES: Self = Self { at: Millimetres::ZERO, still_ns: 0, open: false };
 
     /// Returns true if the tip is at rest.
@@ -307,7 +305,10 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             (Task::Stop, ..) => return,
             (Task::Press, Activity::Grip(_), Some(built_in)) => {
                 self.status.measure = MeasureStatus::running(task);
-                self.activity = Activity::Press(Press::begin(&self.motion, built_in));
+                // Farther back than a release only a residue touches, or an object that pushes.
+                let behind = contact.indentation.0.saturating_add(self.config.clearance.0);
+                let rest = Millimetres(self.motion.observer.travel.0.saturating_sub(behind));
+                self.activity = Activity::Press(Press::begin(&self.motion, rest, built_in));
                 return;
             }
             // The motion under way answers both requests.

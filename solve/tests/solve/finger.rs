@@ -3,7 +3,6 @@
 
 use fingertip::measure::Task;
 use sim::effects::Parts;
-use sim::effects::sensor::Stages as _;
 use sim::native::bench::Bench;
 pub use sim::native::calibrated::Place;
 use sim::scene::{Scene, read};

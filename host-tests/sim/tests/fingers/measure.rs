@@ -163,6 +163,32 @@ fn presses_end_within_limits(count: usize) {
     assert!(broken.is_empty(), "{broken:#?}");
 }
 
+/// A press that begins on a contact backs off as far as a release, though the array still reads a residue.
+#[test]
+fn a_press_that_begins_on_a_contact_stays_near_it() {
+    let tips = tips(12, &[]);
+    let cases = cores::map(&tips, |tip| {
+        let distance_mm = drawn(tip, "object.distance_mm").expect("it is drawn");
+        let mut finger = begun(&tip.scene);
+        press(&mut finger, 3.0, 1.0 + distance_mm / APPROACH_MM_PER_S);
+        let held = finger.truth();
+        let mut least_mm = f64::INFINITY;
+        finger.request(Task::Press);
+        while finger.time_s() < 1e9 && finger.status().measure.progress < 10 && least_mm > -50.0 {
+            finger.step();
+            least_mm = least_mm.min(finger.truth().travel_mm);
+            if finger.status().measure.state != MeasureState::Running && least_mm < held.travel_mm {
+                break;
+            }
+        }
+        let ended = finger.status().measure.ended;
+        let what = format!("{:.2} N at {:.2} mm, {ended:?}", held.force_n, held.travel_mm);
+        let clearance_mm = 1e-3 * f64::from(tip.scene.params().clearance_um);
+        Case::new(what, held.travel_mm - least_mm, held.indentation_mm + clearance_mm + 1.0)
+    });
+    judge("a press that begins on a contact: backs off", "mm", &cases);
+}
+
 /// The reference finger with a defect.
 fn harmed(defect: impl FnOnce(&mut Faults)) -> Bench {
     let config = Config::shipped(&images::CONFIRMED).expect("the defaults are allowed");

@@ -1,7 +1,7 @@
 //! Bus of a scene's fingers: the same bytes as the firmware's, in virtual time.
 
 use fingertip::link::Reply;
-use fingertip::link::packet::instruction::{READ, WRITE};
+use fingertip::link::packet::instruction::{READ, REBOOT, WRITE};
 use fingertip::link::packet::{Event, Receiver, Sender};
 use fingertip::shipped::address;
 use fingertip::state::{Fault, Mode};
@@ -126,4 +126,21 @@ fn what_breaks_is_a_fault_until_it_is_mended_and_cleared() {
     }
     let between = Host::new("grasp").0.command("move 3").unwrap_err();
     assert!(between.contains("between two fingers"), "{between}");
+}
+
+/// A controller that starts anew shorts the motor until the tip is at rest, as in mode off: open, a tip that is being
+/// released flies back.
+#[test]
+fn a_restart_amid_a_release_brakes_the_tip() {
+    for after in [0, 40, 100] {
+        let mut host = Host::new("wall");
+        host.hold(2_000);
+        host.write(address::GOAL_FORCE_MN, &[0; 4]);
+        host.frames(after);
+        let begun_mm = host.0.truths()[0].0.travel_mm;
+        host.ask(1, REBOOT, &[]);
+        host.frames(5_000);
+        let back_mm = begun_mm - host.0.truths()[0].0.travel_mm;
+        assert!((0.0..4.0).contains(&back_mm), "{back_mm} mm, {after} frames after goal 0");
+    }
 }

@@ -91,9 +91,7 @@ impl Grip {
         let holds = goal.force > Newtons::ZERO && touch.stage() != Stage::Doubtful;
         self.creep.observe(holds && touch.held(), contact.force, config);
         let (distance, limit, slack) = if holds {
-            if self.release.take().is_some() {
-                touch.resume();
-            }
+            self.release = None;
             touch.seek();
             self.pressing(goal, contact, touch, motion, config, limits)
         } else {
@@ -169,6 +167,7 @@ impl Release {
             touch.moved_back(travel, contact.indentation);
         }
         let slow = !touch.held() || !touch.placed();
+        touch.doubt_place();
         Self { rest: travel, slow, falls: touch.held(), from: (travel, touch.shown()) }
     }
 

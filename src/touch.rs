@@ -66,7 +66,7 @@ enum Place {
     Here,
     /// The force returned and has not risen since. The surface is kept from the contact before.
     Before,
-    /// The force has not risen since torque was enabled or a release ended. The surface is kept from before that.
+    /// The force has not risen since torque was enabled or a release began. The surface is kept from before that.
     Inherited,
     /// The force rose: the surface is known.
     Known,
@@ -87,8 +87,6 @@ pub struct Touch {
     least: Newtons,
     /// Force that the array lost in a step, added to what it reads.
     withheld: Newtons,
-    /// Frame of the last step up, and the force before it.
-    rise: (u32, Newtons),
     /// Force, sum and bad taxels of the last frame; the lesser force and sum of the last two frames: a frame that reads
     /// too much is no reference.
     before: (Newtons, Newtons, u8),
@@ -102,6 +100,8 @@ pub struct Touch {
     risen: u32,
     /// Time without a force, ns.
     away_ns: u32,
+    /// Frame of the last step up, and the force before it.
+    rise: (u32, Newtons),
 }
 
 /// Inputs of the record in a frame.
@@ -167,8 +167,8 @@ impl Touch {
         let fell = sum_before.saturating_sub(inputs.summed.0);
         let least = (sum_before >> STEP_BITS).saturating_add(config.contact_on.0);
         // Taxels that fail take their share of the sum with them; in a slow frame an object can leave.
-        let comparable = self.before.2 == inputs.contact.bad_taxels && config.timing.frame_ns <= FRAME_NS_MAX;
-        if comparable && fell.saturating_abs() > least {
+        let comparable = || self.before.2 == inputs.contact.bad_taxels && config.timing.frame_ns <= FRAME_NS_MAX;
+        if fell.to_bits().unsigned_abs() > least.to_bits().cast_unsigned() && comparable() {
             self.note_step(step, fell > 0, least, force, config);
         } else if self.withheld > Newtons::ZERO && step.saturating_neg() > self.withheld.0 >> 1 {
             // The signal is back.
@@ -330,12 +330,12 @@ impl Touch {
         if self.stage == Stage::Doubtful {
             *self = Self::default();
         } else {
-            self.resume();
+            self.doubt_place();
         }
     }
 
-    /// Prepares the record for a new goal: what a release left may be a residue, until the force rises.
-    pub fn resume(&mut self) {
+    /// Takes note that a release begins, or torque: what the array reads may be a residue until the force rises.
+    pub fn doubt_place(&mut self) {
         if self.place == Place::Known {
             (self.place, self.least) = (Place::Inherited, self.before.0);
         }

@@ -131,15 +131,17 @@ sim::sizes!(
     judge("slow", measured(1..4, SLOW), 0)
 );
 
-// Friction that changes from stroke to stroke is not in the model.
+// Friction that changes from stroke to stroke, and torque that changes along the travel, are not in the model.
 sim::sizes!(friction_that_is_not_even_is_not_silently_wrong, uneven(0..4), uneven(4..8));
 
 fn uneven(numbers: Range<usize>) {
     let drives = numbers.map(|number| {
-        let (scene, mut rng) = (drive(number, &[]), fastrand::Rng::with_seed(number as u64));
+        let cogs = "[effects.cogging]\ntorque_mnm = { is = \"0.05 * friction_mnm\" }\nteeth = 3\n[motor]\n";
+        let along = ("[motor]\n", if number % 2 == 0 { cogs } else { "[motor]\n" });
+        let (scene, mut rng) = (drive(number, &[along]), fastrand::Rng::with_seed(number as u64));
         let other = || {
             let share = 0.01 * (1.0 + 0.05 * (2.0 * rng.f64() - 1.0));
-            Some(drive(number, &[("0.01 * friction_percent", &format!("{share} * friction_percent"))]))
+            Some(drive(number, &[along, ("0.01 * friction_percent", &format!("{share} * friction_percent"))]))
         };
         let record = measure(&scene, other);
         (scene, record)

@@ -4,7 +4,7 @@
 use crate::served::{Served, fails, line_with, program};
 use fingertip::link::packet::instruction::REBOOT;
 use fingertip::shipped::address;
-use fingertip_cli::{Client, Error};
+use fingertip_cli::Error;
 use serde_json::Value;
 use std::fs;
 use std::io::Read as _;
@@ -68,13 +68,15 @@ fn errors_in_json_are_the_last_line_of_standard_error() {
 #[test]
 fn an_answer_to_a_killed_program_is_taken_by_none() {
     let finger = Served::begin("wall");
-    let ask: [fn(&mut Client) -> Result<(), Error>; 2] =
-        [|client| client.ping().map(drop), |client| client.read(address::FIRMWARE_VERSION, 40).map(drop)];
-    for asks in ask {
+    for length in [0, 40] {
         finger.command("stall");
         let mut killed = finger.client();
         killed.timeout = Duration::from_millis(1);
-        assert!(matches!(asks(&mut killed), Err(Error::Silent(_))));
+        let asked = match length {
+            0 => killed.ping().map(drop),
+            _ => killed.read(address::FIRMWARE_VERSION, length).map(drop),
+        };
+        assert!(matches!(asked, Err(Error::Silent(_))));
         drop(killed);
         let next = finger.start(&["info"]);
         Served::wait_for(|| finger.command("held") == "2");

@@ -21,6 +21,17 @@ const SCENE: &str = "demo";
 /// Duration of the goals in the quick run: of the first, which includes the approach, and of the others.
 const QUICK_S: [f64; 2] = [0.5, 0.25];
 
+/// Array at the end of a hold, with the contact that the controller sensed.
+#[derive(Clone, Copy, Debug)]
+pub struct HeldImage {
+    pub goal_n: f64,
+    pub force_n: f64,
+    /// Centre of the contact, along columns and rows.
+    pub centre_mm: [f64; 2],
+    pub radius_mm: f64,
+    pub pressures_kpa: Pressures,
+}
+
 #[derive(Clone, Debug)]
 pub struct Asked {
     /// Time at which the goal reached the controller.
@@ -36,8 +47,7 @@ pub struct Run {
     pub goals: Vec<Asked>,
     /// State of the world at each frame.
     pub trace: Vec<Sample>,
-    /// Goals, N, each with the array at the end of its hold and the contact that the controller sensed.
-    pub pictures: Vec<(f64, Map)>,
+    pub pictures: Vec<HeldImage>,
     /// Frames that the controller missed, by its own count.
     pub missed_frames: u32,
 }
@@ -78,7 +88,7 @@ pub struct Trace {
     run: Run,
     controllers: Vec<Controller>,
     /// Last tactile image under the last goal.
-    last: Option<(f64, Map)>,
+    last: Option<HeldImage>,
     fault: Option<Fault>,
 }
 
@@ -98,9 +108,11 @@ impl Trace {
 
     /// Keeps the tactile image of a hold that is over.
     fn keep(&mut self) {
-        let known = |goal_n| self.run.pictures.iter().any(|(known_n, _)| *known_n == goal_n);
-        let new = self.last.take().filter(|(goal_n, _)| *goal_n >= DRAWN_N && !known(*goal_n));
-        self.run.pictures.extend(new);
+        let last = self.last.take().filter(|last| last.goal_n >= DRAWN_N);
+        let known = |new: &HeldImage| self.run.pictures.iter().any(|picture| picture.goal_n == new.goal_n);
+        if let Some(new) = last.filter(|new| !known(new)) {
+            self.run.pictures.push(new);
+        }
     }
 }
 
@@ -137,13 +149,13 @@ impl Watch for Trace {
             duty: truth.duty,
         });
         let contact = &status.contact;
-        let map = Map {
-            title: format!("{goal_n} N"),
-            pressures_kpa: self.array.kilopascals(step.frame),
+        self.last = Some(HeldImage {
+            goal_n,
+            force_n: newtons(contact.force),
             centre_mm: [contact.centre_x.0.to_num(), contact.centre_y.0.to_num()],
             radius_mm: contact.radius.0.to_num(),
-        };
-        self.last = Some((goal_n, map));
+            pressures_kpa: self.array.kilopascals(step.frame),
+        });
     }
 }
 
@@ -397,9 +409,15 @@ pub fn draw(run: &Run, forces: &Forces, folder: &Path) -> Result<Vec<PathBuf>, R
         let title = format!("{:.1} to {:.1} N", step.from_n, step.to_n);
         panels.push(panel(title, asked.at_s, Some(step.time_optimal_ms)));
     }
-    let mut maps = run.pictures.clone();
-    maps.sort_by(|(a_n, _), (b_n, _)| a_n.total_cmp(b_n));
-    let maps: Vec<Map> = maps.into_iter().map(|(_, map)| map).collect();
+    let map = |picture: &HeldImage| Map {
+        title: format!("{} N", picture.goal_n),
+        pressures_kpa: picture.pressures_kpa,
+        centre_mm: picture.centre_mm,
+        radius_mm: picture.radius_mm,
+    };
+    let mut maps: Vec<_> = run.pictures.iter().collect();
+    maps.sort_by(|a, b| a.goal_n.total_cmp(&b.goal_n));
+    let maps: Vec<_> = maps.into_iter().map(map).collect();
     let pictures = [
         ("run.svg", plot::overview(&run.trace)?),
         ("steps.svg", plot::steps(&panels)?),

@@ -72,13 +72,15 @@ impl Draw {
         let Place { centre_mm: [x_mm, y_mm], tilt_deg: [columns_deg, rows_deg] } = place;
         let text = format!(
             "about = \"a press\"\nduration_s = 1.0\nseed = {seed}\n[tip]\nmodulus_kpa = {modulus_kpa:?}\n\
+             [controller]\nmodulus_pa = {}\ncodes_per_kpa_milli = 24000\ndirection_confirmed = 1\n\
              [object]\ndistance_mm = {DISTANCE_MM:?}\ncentre_x_mm = {x_mm:?}\ncentre_y_mm = {y_mm:?}\n\
              [effects.tilted_plane]\nalong_columns_deg = {columns_deg:?}\nalong_rows_deg = {rows_deg:?}\n\
              [effects.noise]\nrms_codes = {noise_codes:?}\n[effects.gain_spread]\nrms_percent = {gains_percent:?}\n\
              [effects.creep]\nrate_percent_per_decade = {creep_percent:?}\n\
              [effects.hysteresis]\nwidth_percent = {hysteresis_percent:?}\n\
              [effects.relaxation]\nshare = {relaxation:?}\ntau_s = {relaxation_s:?}\n\
-             [effects.broken_taxels]\ndead = {dead:?}\n{extra}"
+             [effects.broken_taxels]\ndead = {dead:?}\n{extra}",
+            (1e3 * modulus_kpa) as i32
         );
         read("press.toml", &text).unwrap_or_else(|error| panic!("{error}\n{text}"))
     }

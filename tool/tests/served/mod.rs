@@ -23,7 +23,7 @@ use std::time::{Duration, Instant};
 /// Patience on the slowest machine, where an answer is expected.
 const PATIENCE: &str = "600000";
 
-/// A command, and the way of its answer.
+/// A command, and where its answer goes.
 type Asked = (String, Sender<Result<String, String>>);
 
 pub struct Served {
@@ -41,7 +41,7 @@ struct Told {
     line: Line,
 }
 
-/// The way of packets to a finger.
+/// What happens to packets before the finger hears them.
 #[derive(Default)]
 struct Line {
     /// Packets until it stops receiving, packets that it misses then, and packets that came.

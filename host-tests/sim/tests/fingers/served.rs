@@ -128,7 +128,7 @@ fn what_breaks_is_a_fault_until_it_is_mended_and_cleared() {
     assert!(between.contains("between two fingers"), "{between}");
 }
 
-/// A controller that starts anew shorts the motor until the tip is at rest, as in mode off: open, a tip that is being
+/// A controller that restarts shorts the motor until the tip is at rest, as in mode off: open, a tip that is being
 /// released flies back.
 #[test]
 fn a_restart_amid_a_release_brakes_the_tip() {

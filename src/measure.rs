@@ -90,7 +90,7 @@ numbered! {
         Reversed = 5,
         /// The tip left the range of the strokes (um).
         Astray = 6,
-        /// The array measured a touch, or in a press more than the largest goal (mN).
+        /// The array measured a touch, in a press more than the largest goal, or a contact that followed the tip back (mN).
         Touched = 7,
         /// The motor measured a force that the array did not (mN).
         Pushed = 8,

@@ -5,7 +5,7 @@ mod modulus;
 mod record;
 mod strokes;
 
-use crate::finger::{Draw, Finger, Place, any_place, presses};
+use crate::finger::{Draw, Finger, Part, Place, cycle, plan, presses};
 use fingertip::measure::series::{HEAD, Head, check, step_bytes};
 use fingertip::params::Params;
 use solve::gains::{Condition, NoGains, Verdict};
@@ -39,17 +39,13 @@ fn a_scale_gives_the_factor() {
 #[test]
 fn a_hold_shows_the_creep() {
     for percent in [1.0, 4.0] {
-        let mut finger = Finger::at(&Place::default(), &Draw { creep_percent: percent, ..Draw::plain(250.0) });
-        finger.bench.tare();
-        finger.bench.command().torque = false;
-        let begun_s = finger.bench.time_s();
-        // The tip is held in the plate.
-        let mut reading = |frame: usize| {
-            finger.bench.place(7.0);
-            let force = finger.bench.step().contact.force;
-            frame.is_multiple_of(2_500).then(|| [finger.bench.time_s() - begun_s, force.0.to_num()])
-        };
-        let readings = (1..=300_000).filter_map(&mut reading).collect();
+        let mut finger = Finger::new(&Draw { creep_percent: percent, ..Draw::plain(250.0) });
+        finger.go(&Place::default());
+        finger.tare();
+        let ends_s = (1..=120).map(|n| 0.25 * f64::from(n)).collect();
+        let press =
+            finger.press(&[Part::Ramp { to_mm: 2.0, mm_per_s: 10.0, step_mm: 9.0 }, Part::Hold { ends_s }], 8.0);
+        let readings = press.steps[1..].iter().map(|step| [step.middle_s(), step.force_n(&press.array)]).collect();
         let found = creep(&HeldSeries { readings }).expect("a hold");
         assert!(found.share.value > 0.005 * percent && found.left < 0.002 * percent, "{found:?}");
     }
@@ -65,12 +61,16 @@ fn two_presses_show_the_temperature() {
         relaxation: 0.05,
         ..Draw::plain(250.0)
     };
-    let place = Place { centre_mm: [0.4, -0.3], tilt_deg: [1.0, 0.5] };
-    let mut warm = Finger::at(&place, &draw).press(30.0, 0.0);
-    let mut cold = Finger::at(&place, &Draw { extra: String::new(), ..draw }).press(0.0, 0.0);
-    for (press, chip_c) in [(&mut warm, 45.0), (&mut cold, 25.0)] {
-        press.steps.iter_mut().for_each(|step| step.chip_c = Some(chip_c));
-    }
+    let mut finger = Finger::new(&draw);
+    finger.go(&Place { centre_mm: [0.4, -0.3], tilt_deg: [1.0, 0.5] });
+    finger.pause(30.0);
+    finger.tare();
+    let mut warm = finger.press(&plan(), 8.0);
+    warm.steps.iter_mut().for_each(|step| step.chip_c = Some(45.0));
+    let mut finger = Finger::new(&Draw { extra: String::new(), ..draw });
+    finger.go(&Place { centre_mm: [0.4, -0.3], tilt_deg: [1.0, 0.5] });
+    finger.tare();
+    let cold = finger.press(&plan(), 8.0);
     let found = temperature(&cold, &warm).expect("two presses");
     let per_k = found.per_k;
     assert!((per_k.value - 0.0036).abs() < 3.0 * per_k.sigma && per_k.sigma < 5e-4, "{found:?}");
@@ -86,7 +86,7 @@ fn drawn_arrays(seeds: Range<u64>) {
     for seed in seeds {
         let draw = Draw::any(seed, [15.0, 25.0], [1, 3]);
         let truth = draw.gains();
-        let found = gains(&presses(&draw, 3)).unwrap_or_else(|why| panic!("{why:?} {draw:?}"));
+        let found = gains(&presses(&draw, 3, &plan())).unwrap_or_else(|why| panic!("{why:?} {draw:?}"));
         let known = || found.taxels.iter().zip(&truth).filter(|(gain, _)| gain.condition == Condition::Sound);
         let count = known().count() as f64;
         let factor = known().map(|(gain, truth)| truth / gain.reads).sum::<f64>() / count;
@@ -116,7 +116,7 @@ fn drawn_arrays(seeds: Range<u64>) {
 #[test]
 fn odd_taxels_are_named() {
     let draw = Draw { gains_percent: 5.0, creep_percent: 2.0, ..Draw::plain(250.0) };
-    let mut presses = presses(&draw, 2);
+    let mut presses = presses(&draw, 2, &plan());
     let before = gains(&presses).expect("gains");
     for step in presses.iter_mut().flat_map(|press| &mut press.steps) {
         // One conducts as the square, one is read from its neighbour, one was counted as bad by the chip.

@@ -214,6 +214,25 @@ fn a_push_against_a_released_tip_does_not_change_the_next_goal() {
     judge("a push against a released tip, then 1 N: off by", "N", &cases);
 }
 
+/// Largest speed, mm/s, from 20 ms behind the end of the last contact on, in this time, s. A goal, N, is set at its time.
+fn fastest_in_the_air(finger: &mut Finger, (at_s, goal_n): (f64, f64), seconds: f64) -> f64 {
+    let begun_s = finger.time_s();
+    let (mut ended_s, mut fastest) = (begun_s, 0.0_f64);
+    while finger.time_s() < begun_s + seconds {
+        if finger.time_s() >= begun_s + at_s {
+            set_goal(finger, goal_n);
+        }
+        finger.step();
+        let truth = finger.truth();
+        if truth.force_n > 0.0 {
+            ended_s = finger.time_s();
+        } else if finger.time_s() > ended_s + 0.02 {
+            fastest = fastest.max(truth.speed_mm_per_s.abs());
+        }
+    }
+    fastest
+}
+
 // A residual reading after a contact does not move a tip that touches nothing.
 sim::sizes!(a_residual_reading_does_not_drive_the_tip_through_the_air, residual_after(0.5), residual_after(2.0));
 
@@ -225,20 +244,7 @@ fn residual_after(hold_s: f64) {
             let mut finger = finger(&(object(5.0, 0.0) + LOSSES + remembering));
             press(&mut finger, goal_n, hold_s);
             finger.place_object(8.0);
-            let begun_s = finger.time_s();
-            let (mut ended_s, mut fastest) = (begun_s, 0.0_f64);
-            while finger.time_s() < begun_s + 2.0 {
-                if finger.time_s() >= begun_s + away_s {
-                    set_goal(&mut finger, 0.0);
-                }
-                finger.step();
-                let truth = finger.truth();
-                if truth.force_n > 0.0 {
-                    ended_s = finger.time_s();
-                } else if finger.time_s() > ended_s + 0.02 {
-                    fastest = fastest.max(truth.speed_mm_per_s.abs());
-                }
-            }
+            let fastest = fastest_in_the_air(&mut finger, (away_s, 0.0), 2.0);
             let fault = finger.status().fault;
             let what = format!("{goal_n} N for {hold_s} s, goal 0 {away_s} s after the object is away, {fault:?}");
             cases.push(Case::new(what, fastest, 1.5 * APPROACH_MM_PER_S));
@@ -261,19 +267,7 @@ fn a_goal_amid_a_release_does_not_drive_the_tip_through_the_air() {
         let mut finger = finger(&(object(3.0, yield_mm_per_n) + remembering));
         press(&mut finger, first_n, 0.7);
         set_goal(&mut finger, 0.0);
-        let (begun_s, mut ended_s, mut fastest) = (finger.time_s(), finger.time_s(), 0.0_f64);
-        while finger.time_s() < begun_s + 0.8 {
-            if finger.time_s() >= begun_s + after_s {
-                set_goal(&mut finger, second_n);
-            }
-            finger.step();
-            let truth = finger.truth();
-            if truth.force_n > 0.0 {
-                ended_s = finger.time_s();
-            } else if finger.time_s() > ended_s + 0.02 {
-                fastest = fastest.max(truth.speed_mm_per_s.abs());
-            }
-        }
+        let fastest = fastest_in_the_air(&mut finger, (after_s, second_n), 0.8);
         let held = (finger.truth().force_n - second_n).abs() < 0.1 * second_n + 0.03;
         let what =
             format!("{yield_mm_per_n} mm/N, {first_n} N, {second_n} N {after_s} s after goal 0, holds it: {held}");

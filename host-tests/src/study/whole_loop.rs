@@ -33,8 +33,13 @@ pub struct WholeLoop {
 impl WholeLoop {
     /// Reads the output of the program.
     pub fn read(text: &str) -> Result<Self, String> {
-        let read = serde_json::from_str(text).map_err(|error| format!("the output of `budget --whole-loop`: {error}"));
-        read.map(|(levels, rates, fingers)| Self { levels, rates, fingers })
+        let wrong = |why: &dyn std::fmt::Display| format!("the output of `budget --whole-loop`: {why}");
+        let (goals_n, levels, rates, fingers): ([f64; GOALS], _, _, _) =
+            serde_json::from_str(text).map_err(|error| wrong(&error))?;
+        if goals_n != [0.5, 1.0, 2.0, 5.0] {
+            return Err(wrong(&format_args!("goals of {goals_n:?} N")));
+        }
+        Ok(Self { levels, rates, fingers })
     }
 
     /// Returns the section that opens the page.

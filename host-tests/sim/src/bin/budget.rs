@@ -14,7 +14,7 @@ struct Args {
     /// Number of fingers, each run 14 times, for the whole loop 17 times
     #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u32).range(1..))]
     fingers: u32,
-    /// Says instead how far the force is off at each fit level, and what other frame rates change, as JSON for a program
+    /// Prints instead, as JSON for the study, the errors of the force at each fit level and at other frame rates
     #[arg(long)]
     whole_loop: bool,
 }

@@ -178,10 +178,10 @@ const SETTLE_NS: [u32; 4] = [2_400, 11_500, 38_800, 84_200];
 /// The whole loop: error of the true force against the work per frame, and settling against the frame rate.
 ///
 /// Fingers of the budget hold its forces at each fit level, as they come and calibrated. The demonstration's finger and
-/// the same population show what other frame rates change. Returns JSON: an array of the levels, the rates and the
-/// number of fingers.
+/// the same population show what other frame rates change. Returns JSON: an array of the goals, the levels, the rates
+/// and the number of fingers.
 pub fn whole_loop(fingers: usize) -> Result<String, RunError> {
-    Ok(serde_json::to_string(&(levels(fingers)?, rates(fingers)?, fingers))? + "\n")
+    Ok(serde_json::to_string(&(GOALS_N, levels(fingers)?, rates(fingers)?, fingers))? + "\n")
 }
 
 /// Runs the fingers at each fit level. Returns the errors of fingers as they come and calibrated, mN rms.

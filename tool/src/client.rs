@@ -265,8 +265,8 @@ impl Client {
         Duration::from_secs_f64(f64::from(u32::from(BROADCAST) * PING_BITS) / f64::from(self.baud))
     }
 
-    /// Sends an instruction and waits for its answer: `length` bytes behind the error, or the error alone. One of another
-    /// length answers what a killed program asked before.
+    /// Sends an instruction and waits for its answer: the error and `length` bytes, or the error alone. An answer of another
+    /// length is passed over: it is that to the last request of a program that was killed.
     fn ask(&mut self, doing: &str, instruction: u8, params: &[u8], length: usize) -> Result<Vec<u8>, Error> {
         let (id, mut receiver, mut other_length) = (self.id, Receiver::new(), false);
         let fits = |answer: &[u8]| matches!(answer, [error, data @ ..] if data.len() == length || error & !ALERT != 0);
@@ -284,17 +284,15 @@ impl Client {
             if packet.id != id || packet.instruction != instruction::STATUS {
                 continue;
             }
-            match event {
-                Some(Event::Packet) if fits(packet.params) => {}
-                Some(Event::Packet) => {
+            let (number, data) = match (event, packet.params) {
+                (Some(Event::Packet), [error, data @ ..]) if fits(packet.params) => (error & !ALERT, data),
+                (Some(Event::Packet), _) => {
                     other_length = true;
                     continue;
                 }
-                Some(Event::BadCrc) => return damaged("its check sum is wrong"),
+                (Some(Event::BadCrc), _) => return damaged("its check sum is wrong"),
                 _ => continue,
-            }
-            let Some((&error, data)) = packet.params.split_first() else { continue };
-            let number = error & !ALERT;
+            };
             if number != 0 {
                 let meaning = table::meaning_of_error(number);
                 let text = format!("{doing}: refused by ID {id} with error {number}: {meaning}");

@@ -207,9 +207,14 @@ fn stopped(ways: &[(&str, bool)]) {
         }
         let [low, high] = address::BUS_WATCHDOG.to_le_bytes();
         if way == "later" {
-            for (number, params) in [(instruction::REG_WRITE, &[low, high, 25][..]), (instruction::ACTION, &[])] {
-                while commander.pass(&packet(1, number, params), Some(1), 1).expect("it listens").is_empty() {}
-            }
+            let later = [(instruction::REG_WRITE, &[low, high, 25][..]), (instruction::ACTION, &[])];
+            // Both again where an answer was lost: an action without its write is refused.
+            let answers = std::iter::repeat_with(|| {
+                later
+                    .map(|(number, params)| commander.pass(&packet(1, number, params), Some(1), 1).expect("it listens"))
+            });
+            let mut answered = answers.skip_while(|answers| answers.iter().any(Vec::is_empty));
+            assert_eq!(answered.next().expect("an answer comes").map(|answer| answer[8]), [0; 2]);
         }
         if way == "indirect" {
             commander.write(address::INDIRECT_ADDRESS_1, &[low, high]).expect("it obeys");

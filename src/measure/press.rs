@@ -56,7 +56,7 @@ const FRAMES_MAX: u16 = 16_383;
 pub struct Press {
     _built_in: BuiltIn,
     phase: Phase,
-    /// Travel at which nothing may touch any more when the tip backs off.
+    /// Travel to which the tip backs off at most; a contact there ends the press.
     rest: Millimetres,
     /// Travel at which the tip touched, by the force and the configured modulus.
     touch: Millimetres,

@@ -66,7 +66,7 @@ enum Place {
     Here,
     /// The force returned and has not risen since. The surface is kept from the contact before.
     Before,
-    /// The force has not risen since torque was enabled or a release began. The surface is kept from before that.
+    /// The force has not risen since torque, a release or a press began. The surface is kept from before that.
     Inherited,
     /// The force rose: the surface is known.
     Known,
@@ -261,7 +261,7 @@ impl Touch {
         (self.stage != Stage::None).then_some(self.surface)
     }
 
-    /// True if the force rose by `contact_on_mn` since the touch began, returned, was released, or torque was enabled.
+    /// True if the force rose by `contact_on_mn` since the touch, torque, a release or a press began, or it returned.
     pub fn placed(&self) -> bool {
         self.place == Place::Known
     }
@@ -334,7 +334,7 @@ impl Touch {
         }
     }
 
-    /// Takes note that a release begins, or torque: what the array reads may be a residue until the force rises.
+    /// Takes note that a release, a press or torque begins: what the array reads may be a residue until the force rises.
     pub fn doubt_place(&mut self) {
         if self.place == Place::Known {
             (self.place, self.least) = (Place::Inherited, self.before.0);

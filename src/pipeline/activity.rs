@@ -308,6 +308,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
                 // Farther back than a release only a residue touches, or an object that pushes.
                 let behind = contact.indentation.0.saturating_add(self.config.clearance.0);
                 let rest = Millimetres(self.motion.observer.travel.0.saturating_sub(behind));
+                self.touch.doubt_place();
                 self.activity = Activity::Press(Press::begin(&self.motion, rest, built_in));
                 return;
             }

@@ -214,25 +214,6 @@ fn a_push_against_a_released_tip_does_not_change_the_next_goal() {
     judge("a push against a released tip, then 1 N: off by", "N", &cases);
 }
 
-/// Largest speed, mm/s, from 20 ms behind the end of the last contact on, in this time, s. A goal, N, is set at its time.
-fn fastest_in_the_air(finger: &mut Finger, (at_s, goal_n): (f64, f64), seconds: f64) -> f64 {
-    let begun_s = finger.time_s();
-    let (mut ended_s, mut fastest) = (begun_s, 0.0_f64);
-    while finger.time_s() < begun_s + seconds {
-        if finger.time_s() >= begun_s + at_s {
-            set_goal(finger, goal_n);
-        }
-        finger.step();
-        let truth = finger.truth();
-        if truth.force_n > 0.0 {
-            ended_s = finger.time_s();
-        } else if finger.time_s() > ended_s + 0.02 {
-            fastest = fastest.max(truth.speed_mm_per_s.abs());
-        }
-    }
-    fastest
-}
-
 // A residual reading after a contact does not move a tip that touches nothing.
 sim::sizes!(a_residual_reading_does_not_drive_the_tip_through_the_air, residual_after(0.5), residual_after(2.0));
 

@@ -98,6 +98,25 @@ fn touch(finger: &mut Finger) {
     }
 }
 
+/// Largest speed, mm/s, from 20 ms behind the end of the last contact on, in this time, s. A goal, N, is set at its time.
+fn fastest_in_the_air(finger: &mut Finger, (at_s, goal_n): (f64, f64), seconds: f64) -> f64 {
+    let begun_s = finger.time_s();
+    let (mut ended_s, mut fastest) = (begun_s, 0.0_f64);
+    while finger.time_s() < begun_s + seconds {
+        if finger.time_s() >= begun_s + at_s {
+            set_goal(finger, goal_n);
+        }
+        finger.step();
+        let truth = finger.truth();
+        if truth.force_n > 0.0 {
+            ended_s = finger.time_s();
+        } else if finger.time_s() > ended_s + 0.02 {
+            fastest = fastest.max(truth.speed_mm_per_s.abs());
+        }
+    }
+    fastest
+}
+
 /// Time from the first frame with torque to the touch of a finger of these tables, s.
 fn touch_s(tables: &str, goal_n: f64) -> f64 {
     let mut finger = finger(tables);

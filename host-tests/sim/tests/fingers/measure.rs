@@ -163,11 +163,12 @@ fn presses_end_within_limits(count: usize) {
     assert!(broken.is_empty(), "{broken:#?}");
 }
 
-/// A press that begins on a contact backs off as far as a release, though the array still reads a residue.
+/// A press that begins on a contact backs off as far as a release, though the array still reads a residue. Where that ends
+/// it, the goal is approached as from the air.
 #[test]
 fn a_press_that_begins_on_a_contact_stays_near_it() {
     let tips = tips(12, &[]);
-    let cases = cores::map(&tips, |tip| {
+    let (places, speeds): (Vec<_>, Vec<_>) = (cores::map(&tips, |tip| {
         let distance_mm = drawn(tip, "object.distance_mm").expect("it is drawn");
         let mut finger = begun(&tip.scene);
         press(&mut finger, 3.0, 1.0 + distance_mm / APPROACH_MM_PER_S);
@@ -184,9 +185,13 @@ fn a_press_that_begins_on_a_contact_stays_near_it() {
         let ended = finger.status().measure.ended;
         let what = format!("{:.2} N at {:.2} mm, {ended:?}", held.force_n, held.travel_mm);
         let clearance_mm = 1e-3 * f64::from(tip.scene.params().clearance_um);
-        Case::new(what, held.travel_mm - least_mm, held.indentation_mm + clearance_mm + 1.0)
-    });
-    judge("a press that begins on a contact: backs off", "mm", &cases);
+        let place = Case::new(what.clone(), held.travel_mm - least_mm, held.indentation_mm + clearance_mm + 1.0);
+        (place, Case::new(what, fastest_in_the_air(&mut finger, (0.0, 3.0), 0.5), 1.5 * APPROACH_MM_PER_S))
+    }))
+    .into_iter()
+    .unzip();
+    judge("a press that begins on a contact: backs off", "mm", &places);
+    judge("a press that begins on a contact: speed in the air", "mm/s", &speeds);
 }
 
 /// The reference finger with a defect.

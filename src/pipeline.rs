@@ -291,6 +291,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
                     sequence: status.sequence,
                     picture,
                     contact,
+                    lasts: touch.lasts(config),
                     encoder: sense.encoder,
                     motion,
                     applied_mv: (applied >> 15) as i32,

@@ -164,7 +164,7 @@ class Bus:
         forces = newtons if isinstance(newtons, Mapping) else dict.fromkeys(self.fingers, newtons)
         if not forces:
             raise FingertipError("no finger is known on this bus: call scan() or finger()")
-        goals = {device_id: round(1000 * force) for device_id, force in forces.items()}
+        goals = {device_id: round(min(max(1000 * force, -1.0), 1e9)) for device_id, force in forces.items()}
         for goal_mn in goals.values():
             encoded(reg.GOAL_FORCE_MN, goal_mn)
         rest = [device_id for device_id, goal_mn in goals.items() if not self.finger(device_id).ready(goal_mn)]

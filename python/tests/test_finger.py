@@ -124,7 +124,8 @@ class Moves(OnServed):
         finger = self.open()
         finger.tare()
         # Outside the range of the register, above force_max_mn, and not a number.
-        for newtons, kind in [(-1.0, ValueError), (1e6, ValueError), (100.0, FingertipError), (float("nan"), ValueError)]:
+        no_numbers = [(float(text), ValueError) for text in ("nan", "inf", "-inf")]
+        for newtons, kind in [(-1.0, ValueError), (1e6, ValueError), (100.0, FingertipError), *no_numbers]:
             self.refused(kind, finger.press, newtons)
             self.assertEqual(finger.read(reg.TORQUE_ENABLE), 0)
         for silence_s in [0.0, 3.0, float("nan")]:

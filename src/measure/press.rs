@@ -111,6 +111,8 @@ pub struct PressInputs<'a, const ROWS: usize, const COLUMNS: usize> {
     pub picture: &'a TactileImage<ROWS, COLUMNS>,
     /// Contact by the plain sum.
     pub contact: &'a Contact,
+    /// True if it lasts longer than a peak of noise.
+    pub lasts: bool,
     /// Count of the encoder.
     pub encoder: i32,
     /// Estimated motion.
@@ -258,7 +260,7 @@ impl Press {
             Phase::Last => self.end(standing, Ended::Complete, Millimetres::ZERO),
             Phase::Retreat if force < config.contact_off => self.phase = Phase::Seek,
             Phase::Retreat => {}
-            Phase::Seek if force >= config.contact_on => {
+            Phase::Seek if view.lasts && force >= config.contact_on => {
                 self.touch = Millimetres(travel.0.saturating_sub(config.tip.indentation(force).0));
                 self.phase = Phase::Before;
             }

@@ -24,7 +24,10 @@ impl<const ROWS: usize, const COLUMNS: usize> Staged<'_, ROWS, COLUMNS> {
             return Err(StatusError::Result);
         }
         self.settings.command.torque = on;
-        if on { Ok(()) } else { self.take_goal(Newtons::ZERO) }
+        if !on {
+            self.take_goal(Newtons::ZERO);
+        }
+        Ok(())
     }
 
     /// Requests a tare: 2 forces torque to be allowed after it.
@@ -67,16 +70,16 @@ impl<const ROWS: usize, const COLUMNS: usize> Staged<'_, ROWS, COLUMNS> {
         if self.settings.watchdog_tripped && value != 0 {
             return Err(StatusError::Range);
         }
-        self.take_goal(newtons(value as i32))
+        self.take_goal(newtons(value as i32));
+        Ok(())
     }
 
     /// A goal of 0 also ends a motion that measures. The loop may not see torque off, if on follows at once.
-    fn take_goal(&mut self, goal: Newtons) -> Result<(), StatusError> {
+    fn take_goal(&mut self, goal: Newtons) {
         self.settings.command.goal = goal;
         if goal == Newtons::ZERO {
             self.stop_measure();
         }
-        Ok(())
     }
 
     /// Sets the bus watchdog: 0 resets a tripped one.

@@ -194,6 +194,28 @@ fn a_press_that_begins_on_a_contact_stays_near_it() {
     judge("a press that begins on a contact: speed in the air", "mm/s", &speeds);
 }
 
+/// Noise of 6 codes lifts single frames above the force of a contact: the press begins at the plate all the same.
+#[test]
+fn a_press_takes_no_peak_of_noise_for_the_touch() {
+    let tips = tips(12, &[("rms_codes = { uniform = [0, 3] }", "rms_codes = 6")]);
+    let cases = cores::map(&tips, |tip| {
+        let distance_mm = drawn(tip, "object.distance_mm").expect("it is drawn");
+        let mut finger = begun(&tip.scene);
+        finger.run(0.05);
+        finger.request(Task::Press);
+        finger.step();
+        // The cycles begin half a millimetre before the touch, at 10 %.
+        while finger.status().measure.state == MeasureState::Running && finger.status().measure.progress < 10 {
+            finger.step();
+        }
+        let truth = finger.truth();
+        let what = format!("a plate at {distance_mm:.2} mm: {:?}", finger.status());
+        assert_eq!(finger.status().measure.state, MeasureState::Running, "{what}");
+        Case::new(what, (truth.travel_mm + 0.5 - distance_mm).abs(), 0.4)
+    });
+    judge("a noisy press begins at the plate", "mm", &cases);
+}
+
 /// The reference finger with a defect.
 fn harmed(defect: impl FnOnce(&mut Faults)) -> Bench {
     let config = Config::shipped(&images::CONFIRMED).expect("the defaults are allowed");

@@ -172,8 +172,8 @@ fn a_press_has_no_more_rows_than_stated() {
             motion.observe(encoder, &config);
             let chip = random.bool().then(|| Celsius::from_bits(random.i32(..)));
             let (picture, contact, motion) = (&picture, &contact, &motion);
-            let applied_mv = random.i32(-20_000..20_000);
-            let view = PressInputs { sequence, picture, contact, encoder, motion, applied_mv, chip };
+            let (applied_mv, lasts) = (random.i32(-20_000..20_000), sequence.is_multiple_of(2));
+            let view = PressInputs { sequence, picture, contact, lasts, encoder, motion, applied_mv, chip };
             press.observe(&view, &mut step, &mut standing, &config);
             rows += usize::from(press.part() == Some(0));
         }

@@ -2,18 +2,21 @@
 
 use fingertip::link::table::{Access, Kind};
 use fingertip::shipped::REGISTERS;
-use host_tests::{analogue, control_table, page};
+use host_tests::{control_table, figures, page};
+use std::error::Error;
 
-fn main() -> Result<(), String> {
+fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
     let name = std::env::args().nth(1).unwrap_or_default();
     let text = match name.as_str() {
-        "docs/board.md" => analogue::PAGE.renewed(&analogue::markdown())?,
         "docs/control-table.md" => control_table::markdown(),
         "docs/firmware.md" => page::PAGE.renewed(&page::table())?,
         "examples/dynamixel/fingertip.model" => control_table::text(false),
         "examples/dynamixel/fingertip_direct.model" => control_table::text(true),
+        "docs/pictures/figure-7.svg" => figures::figure_7()?,
+        "docs/pictures/figure-10.svg" => figures::figure_10()?,
+        "docs/pictures/figure-11.svg" => figures::figure_11()?,
         "python/fingertip/registers.py" => registers(),
-        _ => return Err(format!("usage: generated FILE; `{name}` is not one of the generated files")),
+        _ => return Err(format!("usage: generated FILE; `{name}` is not one of the generated files").into()),
     };
     print!("{text}");
     Ok(())

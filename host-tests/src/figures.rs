@@ -24,19 +24,14 @@ const DEEPEST_MM: f64 = 3.0;
 const NOISE: f64 = 0.1;
 const SEED: u64 = 2003;
 
-/// All figures: name of the file and SVG.
-pub fn all() -> Result<[(&'static str, String); 3], PlotError> {
-    let tip = tip();
-    Ok([("figure-7.svg", figure_7(&tip)?), ("figure-10.svg", figure_10(&tip)?), ("figure-11.svg", figure_11(&tip)?)])
-}
-
 /// The paper's tip: a = 10 mm, Y = 250 kPa.
 pub fn tip() -> Tip {
     Tip::new(Millimetres::from_bits(10 << 24), Kilopascals::from_bits(250 << 16)).expect("inside the domain")
 }
 
 /// Pressure over the distance from the contact's centre, and what the array's row beside the centre sees of it.
-fn figure_7(tip: &Tip) -> Result<String, PlotError> {
+pub fn figure_7() -> Result<String, PlotError> {
+    let tip = &tip();
     let panels = DEPTHS_MM.map(|d_mm| {
         let d = Millimetres::from_bits(d_mm << 24);
         let half_mm = 0.5 * PITCH_MM * COLUMNS as f64;
@@ -59,7 +54,8 @@ fn figure_7(tip: &Tip) -> Result<String, PlotError> {
 }
 
 /// Tactile image, with the contact's circle dotted.
-fn figure_10(tip: &Tip) -> Result<String, PlotError> {
+pub fn figure_10() -> Result<String, PlotError> {
+    let tip = &tip();
     let pictures = DEPTHS_MM.map(|d_mm| {
         let d = Millimetres::from_bits(d_mm << 24);
         Map {
@@ -73,7 +69,8 @@ fn figure_10(tip: &Tip) -> Result<String, PlotError> {
 }
 
 /// Force over indentation: the model, and readings of the noisy array with the modulus that fits them.
-fn figure_11(tip: &Tip) -> Result<String, PlotError> {
+pub fn figure_11() -> Result<String, PlotError> {
+    let tip = &tip();
     let readings = readings(tip);
     let Modulus { kpa, sigma_kpa } = fit(tip, &readings);
     let fitted = format!("Y = {kpa:.1} kPa, standard uncertainty {sigma_kpa:.1} kPa, by these readings");

@@ -9,16 +9,16 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Files that the example `generated` prints by their paths, and one by another example.
-const GENERATED: &str = "docs/control-table.md docs/firmware.md docs/board.md examples/dynamixel/fingertip.model \
-                         examples/dynamixel/fingertip_direct.model python/fingertip/registers.py";
+const GENERATED: &str = "docs/control-table.md docs/firmware.md examples/dynamixel/fingertip.model \
+                         examples/dynamixel/fingertip_direct.model python/fingertip/registers.py \
+                         docs/pictures/figure-7.svg docs/pictures/figure-10.svg docs/pictures/figure-11.svg";
 const SCENES: (&str, &str) = ("docs/scenes.md", "scenes-page");
 /// Error budget of the force; enough fingers that the larger causes come in the same order with other draws.
 const BUDGET: (&str, &str) = ("docs/budget.md", "24");
 /// The demonstration's figures, as the README shows them.
 const FIGURES: &str = "docs/demo.json";
-/// Pictures of the demonstration and of the paper.
+/// Pictures of the demonstration.
 const PICTURES: &str = "docs/pictures";
-const PAPER: [&str; 3] = ["docs/pictures/figure-7.svg", "docs/pictures/figure-10.svg", "docs/pictures/figure-11.svg"];
 const README: (&str, &str) = ("README.md", "readme");
 
 #[derive(clap::Args)]
@@ -38,14 +38,6 @@ pub fn run(args: &Args, console: &mut Console) -> Result<()> {
     let mut budget = Program::sim("budget").build(console)?;
     renew(BUDGET.0, &console::output(budget.args(["--fingers", BUDGET.1]))?, args.check, &mut stale, console)?;
     renew(cores::PAGE.0, &cores::page(console)?, args.check, &mut stale, console)?;
-    let drawn = host::target().join("docs").join("figures");
-    let mut figures = Program::tool("figures").build(console)?;
-    console.run(figures.arg(&drawn))?;
-    for path in PAPER {
-        let file = drawn.join(Path::new(path).file_name().unwrap_or_default());
-        let text = fs::read_to_string(&file).with_context(|| format!("cannot read {}", host::shown(&file)))?;
-        renew(path, &text, args.check, &mut stale, console)?;
-    }
 
     let root = host::root();
     let (json, pictures) = if args.check {

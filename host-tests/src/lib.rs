@@ -6,7 +6,6 @@ pub mod control_table;
 pub mod figures;
 pub mod fit_cases;
 pub mod fit_statistics;
-pub mod long_run;
 pub mod page;
 pub mod paper;
 pub mod program;

@@ -14,6 +14,7 @@ mod force_loop;
 mod frame_pass;
 mod guard;
 mod link;
+mod long_run;
 mod measure;
 mod model;
 mod monitor;

@@ -87,38 +87,6 @@ fn sums_are_doubted_by_what_reaches_over_the_edge_or_is_hidden() {
     assert!(both > 10, "{kinds:?}");
 }
 
-/// One bad taxel under a contact of 42 to 380 mN. The sums miss the hidden share h: their squared radius is too small,
-/// and their share too large, by the root of 1 - h; apart from that it is right to a tenth. A taxel that is not in the
-/// middle moves the estimated centre away, which makes the share smaller by up to a quarter.
-#[test]
-fn the_share_that_one_bad_taxel_hides_of_a_light_contact_is_right() {
-    let mut rng = Rng::with_seed(5);
-    let mut kinds = [0; 2];
-    for _ in 0..4_000 {
-        let (row, column) = (3 + rng.usize(..4), 3 + rng.usize(..4));
-        let near = |index: usize, rng: &mut Rng| (index as f64 - 4.5 + 1.4 * (rng.f64() - 0.5)) * PITCH_MM;
-        let (x_mm, y_mm) = (near(column, &mut rng), near(row, &mut rng));
-        let scene = crate::common::plane(PITCH_MM, 0.23 + 0.47 * rng.f64(), x_mm, y_mm);
-        let pressures = scene.pressures();
-        let right = pressures[row][column] / pressures.iter().flatten().sum::<f64>();
-        let mut bad = NONE;
-        bad[row] = 1 << column;
-        let doubt = doubt_of_sums(&plane(scene.d_mm, [x_mm, y_mm], 0.0, bad, &mut rng));
-        match doubt {
-            0 => assert!(0.75 * right < 33.0 / 256.0, "{right} by the model is not doubted: {scene:?}"),
-            255 => panic!("all is doubted: {scene:?}"),
-            _ => {
-                // In steps of 1/256, rounded down.
-                let share = (1.0 + 3.0 * f64::from(doubt) / 255.0) / 8.0;
-                let allowed = 0.75 * right - 1.0 / 256.0..1.1 * right / (1.0 - right).sqrt();
-                assert!(allowed.contains(&share), "{share}, {right} by the model: {scene:?}");
-            }
-        }
-        kinds[usize::from(doubt > 0)] += 1;
-    }
-    assert!(kinds.iter().all(|kind| *kind > 500), "{kinds:?}");
-}
-
 /// A flickering taxel hides at most a twentieth of a contact of 2 mm: the uncertainty stays 0 at every fit level.
 #[test]
 fn a_taxel_that_flickers_under_a_contact_makes_no_doubt() {

@@ -130,7 +130,7 @@ pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<()> {
 }
 
 /// Gives a program the paths of files to write or read, by their flags. The user may be elsewhere than the program.
-pub fn give_files(command: &mut Command, files: [(&str, &Option<PathBuf>); 2]) -> Result<()> {
+pub fn give_files<const N: usize>(command: &mut Command, files: [(&str, &Option<PathBuf>); N]) -> Result<()> {
     for (flag, path) in files {
         if let Some(path) = path {
             command.arg(flag).arg(std::path::absolute(path).with_context(|| shown(path))?);

@@ -135,17 +135,14 @@ const FINGERS: &str = "12";
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  cargo xtask study\n  cargo xtask study --check\n  \
-    cargo xtask study --json study.json --out /tmp/study")]
+    cargo xtask study --json study.json")]
 pub struct StudyArgs {
     /// Change nothing; fail where a figure of docs/study.md, the README or a picture is stale
-    #[arg(long, conflicts_with = "out")]
+    #[arg(long)]
     check: bool,
     /// Write the figures to a file, an object a line
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write pages and pictures to a folder instead of the documentation
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
 }
 
 /// Runs the study and renews or checks its page, its table in the README and its pictures.
@@ -164,7 +161,7 @@ pub fn study(args: &StudyArgs, console: &mut Console) -> Result<()> {
     host::write(&whole_loop, held)?;
     let mut command = judge.build(console)?;
     command.arg("report").arg(&shipped).arg(&quick).arg(&whole_loop).args(args.check.then_some("--check"));
-    host::give_files(&mut command, [("--json", &args.json), ("--out", &args.out)])?;
+    host::give_files(&mut command, [("--json", &args.json)])?;
     console.run(&mut command)
 }
 

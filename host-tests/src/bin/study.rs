@@ -31,9 +31,6 @@ enum Command {
         /// Write the figures to this file
         #[arg(long, value_name = "FILE")]
         json: Option<PathBuf>,
-        /// Write page and pictures into this folder
-        #[arg(long, value_name = "DIR")]
-        out: Option<PathBuf>,
     },
 }
 
@@ -44,8 +41,8 @@ fn main() -> ExitCode {
             let inputs = Inputs::default();
             write(&kept, &inputs.few_to_bytes()).and_then(|()| write(&full, &inputs.few_with_records()))
         }
-        Command::Report { shipped, quick, whole, check, json, out } => {
-            report([&shipped, &quick], &whole, check, json.as_deref(), out.as_deref())
+        Command::Report { shipped, quick, whole, check, json } => {
+            report([&shipped, &quick], &whole, check, json.as_deref())
         }
     })
 }
@@ -58,7 +55,7 @@ fn write(file: &Path, bytes: &[u8]) -> Result<(), String> {
     fs::write(file, bytes).map_err(|error| format!("{}: {error}", file.display()))
 }
 
-fn report(runs: [&Path; 2], whole: &Path, check: bool, json: Option<&Path>, out: Option<&Path>) -> Result<(), String> {
+fn report(runs: [&Path; 2], whole: &Path, check: bool, json: Option<&Path>) -> Result<(), String> {
     let [shipped, quick] = runs.map(|file| output::parse(&read(file)?));
     let (runs, inputs) = (output::merged(shipped?, quick?)?, Inputs::default());
     let studied: Result<Vec<Studied>, String> =
@@ -80,9 +77,6 @@ fn report(runs: [&Path; 2], whole: &Path, check: bool, json: Option<&Path>, out:
     }
     verdicts(&studied);
     frame_front(&studied)?;
-    if let Some(folder) = out {
-        return write_all(folder, &files);
-    }
     let mut stale = Vec::new();
     for (name, text) in &files {
         if !renew(name, text, check)? {
@@ -120,15 +114,5 @@ fn frame_front(studied: &[Studied]) -> Result<(), String> {
         return Err(format!("the front from frame to contact is too small: {verdict}"));
     }
     println!("front from frame to contact: {verdict}; at least 3, 10 and 3 are asked");
-    Ok(())
-}
-
-fn write_all(folder: &Path, files: &[(String, String)]) -> Result<(), String> {
-    fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
-    for (name, text) in files {
-        let file = folder.join(Path::new(name).file_name().unwrap_or_default());
-        write(&file, text.as_bytes())?;
-        println!("written  {}", file.display());
-    }
     Ok(())
 }

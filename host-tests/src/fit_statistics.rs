@@ -135,13 +135,13 @@ pub struct Verdict {
 pub type Judged = Vec<Verdict>;
 
 impl Verdict {
-    /// Judges the case of this number, with this fit level of [`Fit`].
-    pub fn of(series: &Series, number: usize, fit_level: FitLevel) -> Self {
+    /// Judges the case of this number.
+    pub fn of(series: &Series, number: usize) -> Self {
         let case = series.case(number);
         let config = config(&case.scene);
         let noisy = series.reading.noise != Noise::None;
         let mut rng = Rng::with_seed(0xf7a3_0000_0000 + number as u64);
-        let mut fit = Fit::new(fit_level);
+        let mut fit = Fit::default();
         let sums = Outcome::of(&contact::from_sums(&case.picture, config), &case.scene, noisy);
         let mut last = sums;
         for _ in 0..FRAMES {
@@ -156,12 +156,12 @@ impl Verdict {
 
 /// The tip pressed in at `um_per_frame` to the indentation of a good case, on an array without noise: the largest error
 /// of the force that [`Fit`] makes once enough taxels see the contact, in units of its bound, and that of the centre.
-pub fn pressed(number: usize, um_per_frame: f64, fit_level: FitLevel) -> Outcome {
+pub fn pressed(number: usize, um_per_frame: f64) -> Outcome {
     let [clean, ..] = GOOD;
     let mut scene = clean.case(number).scene;
     let (config, end) = (config(&scene), scene.d_mm);
     let mut rng = Rng::with_seed(number as u64);
-    let mut fit = Fit::new(fit_level);
+    let mut fit = Fit::default();
     let mut worst = Outcome { force: 0.0, centre: 0.0, flagged: false };
     let mut settled = 0;
     scene.d_mm = 0.1;
@@ -179,11 +179,11 @@ pub fn pressed(number: usize, um_per_frame: f64, fit_level: FitLevel) -> Outcome
     worst
 }
 
-/// Judges `cases` cases of a series on all threads, with this fit level of [`Fit`]. `progress` gets the number done.
-pub fn judge(series: &Series, cases: usize, fit_level: FitLevel, progress: &(impl Fn(usize) + Sync)) -> Judged {
+/// Judges `cases` cases of a series on all threads. `progress` gets the number done.
+pub fn judge(series: &Series, cases: usize, progress: &(impl Fn(usize) + Sync)) -> Judged {
     let done = AtomicUsize::new(0);
     sim::cores::map(0..cases, |number| {
-        let verdict = Verdict::of(series, number, fit_level);
+        let verdict = Verdict::of(series, number);
         progress(done.fetch_add(1, Ordering::Relaxed) + 1);
         verdict
     })
@@ -203,15 +203,15 @@ pub const PAGE: Page = Page { name: "docs/contact.md", tables: "tables", command
 /// Cases a series where nothing else is asked.
 pub const CASES: usize = 10_000;
 
-/// All tables, with this fit level of `Fit`; `progress` hears a series' name and how many of its cases are done.
-pub fn markdown(cases: usize, fit_level: FitLevel, progress: &(impl Fn(&str, usize) + Sync)) -> String {
-    let judged = |series: &Series| judge(series, cases, fit_level, &|done| progress(series.name, done));
+/// All tables; `progress` gets a series' name and how many of its cases are done.
+pub fn markdown(cases: usize, progress: &(impl Fn(&str, usize) + Sync)) -> String {
+    let judged = |series: &Series| judge(series, cases, &|done| progress(series.name, done));
     let good: Vec<_> = GOOD.iter().map(|series| (series, judged(series))).collect();
     let bad: Vec<_> = BAD.iter().map(|series| (series, judged(series))).collect();
-    let mut page = format!("{cases} cases a series, `Fit` with fit level {}.\n\n", fit_level as u8);
+    let mut page = format!("{cases} cases a series, `Fit` with fit level {}.\n\n", FitLevel::default() as u8);
     errors(&mut page, &good);
     alarms(&mut page, &bad);
-    motion(&mut page, cases, fit_level, progress);
+    motion(&mut page, cases, progress);
     page
 }
 
@@ -250,7 +250,7 @@ fn alarms(page: &mut String, bad: &[(&Series, Judged)]) {
     }
 }
 
-fn motion(page: &mut String, cases: usize, fit_level: FitLevel, progress: &(impl Fn(&str, usize) + Sync)) {
+fn motion(page: &mut String, cases: usize, progress: &(impl Fn(&str, usize) + Sync)) {
     let cases = (cases / 100).max(1);
     let _ = write!(
         page,
@@ -260,7 +260,7 @@ fn motion(page: &mut String, cases: usize, fit_level: FitLevel, progress: &(impl
     for um_per_frame in [0.3, 1.0, 3.0] {
         let outcome = |number| {
             progress("pressed in", number);
-            pressed(number, um_per_frame, fit_level)
+            pressed(number, um_per_frame)
         };
         let outcomes: Vec<_> = (0..cases).map(outcome).collect();
         let force = || outcomes.iter().map(|outcome| outcome.force);

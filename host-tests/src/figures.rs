@@ -3,6 +3,7 @@
 //! Forces and pressures are the core's. What the array sees is the core's pressure averaged over each taxel of an ideal
 //! 10 x 10 array: simulated, as are the readings of figure 11, to which noise is added. Nothing here was measured.
 
+use crate::prove::random::reference_tip;
 use fastrand::Rng;
 use fingertip::model::Tip;
 use fingertip::shipped::{COLUMNS, ROWS};
@@ -24,14 +25,9 @@ const DEEPEST_MM: f64 = 3.0;
 const NOISE: f64 = 0.1;
 const SEED: u64 = 2003;
 
-/// The paper's tip: a = 10 mm, Y = 250 kPa.
-pub fn tip() -> Tip {
-    Tip::new(Millimetres::from_bits(10 << 24), Kilopascals::from_bits(250 << 16)).expect("inside the domain")
-}
-
 /// Pressure over the distance from the contact's centre, and what the array's row beside the centre sees of it.
 pub fn figure_7() -> Result<String, PlotError> {
-    let tip = &tip();
+    let tip = &reference_tip();
     let panels = DEPTHS_MM.map(|d_mm| {
         let d = Millimetres::from_bits(d_mm << 24);
         let half_mm = 0.5 * PITCH_MM * COLUMNS as f64;
@@ -55,7 +51,7 @@ pub fn figure_7() -> Result<String, PlotError> {
 
 /// Tactile image, with the contact's circle dotted.
 pub fn figure_10() -> Result<String, PlotError> {
-    let tip = &tip();
+    let tip = &reference_tip();
     let pictures = DEPTHS_MM.map(|d_mm| {
         let d = Millimetres::from_bits(d_mm << 24);
         Map {
@@ -70,7 +66,7 @@ pub fn figure_10() -> Result<String, PlotError> {
 
 /// Force over indentation: the model, and readings of the noisy array with the modulus that fits them.
 pub fn figure_11() -> Result<String, PlotError> {
-    let tip = &tip();
+    let tip = &reference_tip();
     let readings = readings(tip);
     let Modulus { kpa, sigma_kpa } = fit(tip, &readings);
     let fitted = format!("Y = {kpa:.1} kPa, standard uncertainty {sigma_kpa:.1} kPa, by these readings");

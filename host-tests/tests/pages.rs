@@ -2,7 +2,8 @@
 //! reads from top to bottom: no stage uses one that comes after it in `src/lib.rs`.
 
 use crate::common::*;
-use host_tests::figures::{Modulus, PITCH_MM, fit, readings, seen, tip};
+use host_tests::figures::{Modulus, PITCH_MM, fit, readings, seen};
+use host_tests::prove::random::reference_tip;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -291,7 +292,7 @@ fn the_schematic_is_that_of_the_netlist() {
 
 #[test]
 fn what_the_array_sees_sums_to_the_force_and_its_readings_give_the_modulus_back() {
-    let tip = tip();
+    let tip = reference_tip();
     for d_mm in [1, 2, 3] {
         let d = Millimetres::from_bits(d_mm << 24);
         let seen = seen(&tip, d);

@@ -95,7 +95,7 @@ pub fn tip(radius_bits: i32, modulus_bits: i32) -> Tip {
     Tip::new(Millimetres::from_bits(radius_bits), Kilopascals::from_bits(modulus_bits)).expect("inside the domain")
 }
 
-/// a = 10 mm, Y = 250 kPa.
+/// The paper's tip: a = 10 mm, Y = 250 kPa.
 pub fn reference_tip() -> Tip {
     tip(10 << 24, 250 << 16)
 }

@@ -4,7 +4,7 @@ use super::inputs::{Inputs, Pair, Seen};
 use super::output::Ran;
 use super::page::Point;
 use super::scan;
-use crate::figures::tip;
+use crate::prove::random::reference_tip;
 use crate::prove::reference::{Real, Reference, real};
 
 pub struct Kernel {
@@ -194,7 +194,7 @@ fn point(kernel: &Kernel, ran: &Ran, inputs: &Inputs) -> Result<Point, String> {
 }
 
 fn scalar(ran: &Ran, inputs: &[Pair], exact: Exact, relative: bool) -> Option<[f64; 2]> {
-    let reference = Reference::new(&tip());
+    let reference = Reference::new(&reference_tip());
     let mut errors = Errors::default();
     if ran.returned.len() != inputs.len() {
         return None;

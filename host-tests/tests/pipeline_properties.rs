@@ -19,9 +19,7 @@ enum Codes {
     Contact { row: usize, column: usize, codes: u16 },
     /// A sound array but for one code.
     Odd { slot: usize, column: usize, code: u16 },
-    /// All alike.
-    Flat(u16),
-    /// Two codes in turns.
+    /// Two codes in turns, or all alike.
     Checkerboard([u16; 2]),
     /// Two codes, alternating by row, as from a scan out of step.
     Stripes([u16; 2]),
@@ -43,7 +41,6 @@ impl Codes {
                     Self::Odd { slot: odd_slot, column: odd_column, code } => {
                         if (slot, column) == (odd_slot, odd_column) { code } else { sound }
                     }
-                    Self::Flat(code) => code,
                     Self::Checkerboard(codes) => codes[(slot + column) % 2],
                     Self::Stripes(codes) => codes[slot % 2],
                     Self::Noise(_) => random.u16(..),
@@ -103,7 +100,7 @@ fn codes() -> impl Strategy<Value = Codes> {
         40 => (0..ROWS, 0..COLUMNS, prop_oneof![Just(0), 0..3_600_u16])
             .prop_map(|(row, column, codes)| Codes::Contact { row, column, codes }),
         3 => (0..SLOTS, 0..COLUMNS, code()).prop_map(|(slot, column, code)| Codes::Odd { slot, column, code }),
-        1 => code().prop_map(Codes::Flat),
+        1 => code().prop_map(|code| Codes::Checkerboard([code; 2])),
         1 => [code(), code()].prop_map(Codes::Checkerboard),
         1 => [code(), code()].prop_map(Codes::Stripes),
         1 => any::<u64>().prop_map(Codes::Noise),

@@ -215,15 +215,23 @@ fn measuring() -> Bench {
     board
 }
 
-/// Like every later frame: not driven at all where it shows a fault.
+/// Like every later frame: not driven at all where it shows a fault. Without torque a wrong supply is none.
 #[test]
 fn the_first_frame_with_torque_is_judged_before_it_drives() {
+    let supplies: [(Spoil, Fault); 2] = [
+        (|record| record.sense.supply_mv = 3_000, Fault::SupplyLow),
+        (|record| record.sense.supply_mv = 60_000, Fault::SupplyHigh),
+    ];
     let others: [(Spoil, Fault); 2] = [(overloaded, Fault::Bridge), (pressed, Fault::OverForce)];
-    for (spoil, fault) in EARLY_AND_LATE.into_iter().chain(others) {
+    let judged = EARLY_AND_LATE.into_iter().chain(others).map(|case| (case, 0));
+    for ((spoil, fault), frames_before) in judged.chain(supplies.map(|case| (case, 10))) {
         let mut board = crate::common::ready();
         board.command().torque = false;
         board.command().goal = newtons(7_000);
         board.step();
+        for _ in 0..frames_before {
+            assert_eq!(board.step_with(spoil).fault, None, "{fault:?} without torque");
+        }
         board.command().torque = true;
         let status = board.step_with(spoil);
         assert_eq!((status.fault, status.duty.0), (Some(fault), 0));
@@ -320,21 +328,6 @@ fn torque_that_comes_with_a_tare_or_during_it_waits_for_its_end() {
             assert_eq!(board.step().duty.0, 0);
         }
         assert_eq!((board.step().mode, board.status().tare), (Mode::Approach, Taring::Done), "after {after} frames");
-    }
-}
-
-#[test]
-fn torque_at_a_wrong_supply_is_a_fault_before_it_drives() {
-    for (supply_mv, fault) in [(3_000, Fault::SupplyLow), (60_000, Fault::SupplyHigh)] {
-        let mut board = crate::common::ready();
-        board.command().torque = false;
-        for _ in 0..10 {
-            assert_eq!(board.step_with(|record| record.sense.supply_mv = supply_mv).fault, None);
-        }
-        board.command().torque = true;
-        board.command().goal = newtons(1_000);
-        let status = board.step_with(|record| record.sense.supply_mv = supply_mv);
-        assert_eq!((status.fault, status.duty.0), (Some(fault), 0));
     }
 }
 

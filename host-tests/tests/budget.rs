@@ -54,21 +54,29 @@ impl Loop {
 }
 
 proptest! {
-    #![proptest_config(seeded(400, 2003))]
+    #![proptest_config(seeded(800, 2003))]
 
+    /// A deadline is missed only where the rest jumps by more than the margin. Where there is room, the effort comes
+    /// back and stays.
     #[test]
-    fn a_deadline_is_missed_only_where_the_rest_jumps_by_more_than_the_margin(
+    fn no_deadline_is_missed_and_the_effort_comes_back(
         asked in 0..6_u8,
-        stretches in proptest::collection::vec(stretch(), 1..12),
+        stretches in proptest::collection::vec(stretch(), 0..12),
+        rest in 1_000..9_000_u32,
+        contact in prop::bool::ANY,
     ) {
         let mut running = Loop::new();
         let asked = FitLevel::from_number(asked);
         let margin = DEADLINE - Budget::usable(DEADLINE);
-        let mut before = None;
-        for stretch in &stretches {
+        // Long enough for the longest wait.
+        let calm = Stretch { frames: (WAIT_MAX + 12) * WINDOW, rest, spread: 100, contact, model_q8: 256 };
+        let (mut before, mut levels) = (None, BTreeSet::new());
+        for stretch in stretches.iter().chain([&calm; 2]) {
+            levels.clear();
             for frame in 0..stretch.frames {
                 let (fit_level, taken) = running.frame(asked, DEADLINE, stretch);
                 prop_assert!(fit_level <= asked);
+                levels.insert(fit_level);
                 // The last measurement covers all but a jump of the rest and of the contact.
                 let jumped = before.is_none_or(|before: Stretch| stretch.rest + stretch.spread > before.rest + margin);
                 if taken > DEADLINE {
@@ -77,34 +85,8 @@ proptest! {
             }
             before = Some(*stretch);
         }
-    }
-
-    #[test]
-    fn where_there_is_room_the_effort_comes_back_and_stays(
-        asked in 1..6_u8,
-        stretches in proptest::collection::vec(stretch(), 0..6),
-        rest in 1_000..9_000_u32,
-        contact in prop::bool::ANY,
-    ) {
-        let mut running = Loop::new();
-        let asked = FitLevel::from_number(asked);
-        for stretch in &stretches {
-            for _ in 0..stretch.frames {
-                running.frame(asked, DEADLINE, stretch);
-            }
-        }
-        // Long enough for the longest wait.
-        let calm = Stretch { frames: (WAIT_MAX + 12) * WINDOW, rest, spread: 100, contact, model_q8: 256 };
-        let mut changes = 0;
-        let mut last = None;
-        for frame in 0..2 * calm.frames {
-            let (fit_level, taken) = running.frame(asked, DEADLINE, &calm);
-            changes += u32::from(frame >= calm.frames && last.is_some_and(|last| last != fit_level));
-            last = Some(fit_level);
-            prop_assert!(frame < REFINEMENT || taken <= DEADLINE, "{taken} in frame {frame}");
-        }
-        prop_assert_eq!(changes, 0, "it hunts");
-        let last = last.expect("there were frames");
+        prop_assert_eq!(levels.len(), 1, "it hunts: {:?}", levels);
+        let last = levels.pop_last().expect("there were frames");
         // A fit level is sure to fit if the frame by the sums, the largest cost of the model and the margin for jumps fit
         // into the usable time. With a contact, the frame by the sums is uncertain by the spread of the model's cost.
         let usable = Budget::usable(DEADLINE);

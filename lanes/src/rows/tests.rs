@@ -160,21 +160,6 @@ fn a_pass_with_a_curve_is_its_formula() {
     shapes!(curved: 3 x 3, 3 x 5, 4 x 4, 10 x 10, 16 x 32);
 }
 
-#[test]
-fn a_half_of_the_array_at_the_top_fits() {
-    fn upper<const ROWS: usize, const COLUMNS: usize>() {
-        let (mut codes, mut rows, common) = bench::<ROWS, COLUMNS>(&mut Mix(1), true);
-        codes.rows.iter_mut().take(ROWS / 2).for_each(|row| *row = [0; COLUMNS]);
-        let total = pass(&codes, &mut rows, &common, &mut [[0; COLUMNS]; ROWS], 0..ROWS, Total::ZERO);
-        let weighted = |row: usize| 2 * row as i64 + 1 - ROWS as i64;
-        let line = i64::from(total.first) / (ROWS - ROWS / 2) as i64;
-        let exact = (ROWS / 2..ROWS).map(|row| weighted(row) * line).sum::<i64>() / 4;
-        let moment = (total.first >> 2).wrapping_mul(ROWS as i32 + 1).wrapping_sub(total.running.wrapping_mul(2));
-        assert!(i64::from(moment).abs_diff(exact) < 4 * ROWS as u64 * ROWS as u64, "{moment}, not {exact}");
-    }
-    shapes!(upper: 10 x 10, 16 x 16, 16 x 32, 15 x 31);
-}
-
 /// In codes.
 fn exact(permille: u32, taxel: f64, tare: f64) -> f64 {
     let p = f64::from(permille) / 1_000.0;

@@ -137,23 +137,11 @@ fn an_end_stop_on_either_side_stops_the_motor() {
     expect(&mut board, Fault::EncoderFrozen, 3_000);
 }
 
-/// The finger first completes the release, whatever arrives on the bus meanwhile.
-#[test]
-fn a_silent_bus() {
-    let mut board = holding(1_000);
-    board.command().bus_watchdog_ms = 40;
-    let mut silent_for = |ms| board.step_with(|record| record.sense.bus_silent_ms = ms);
-    assert_eq!((silent_for(39).mode, silent_for(40).mode), (Mode::Force, Mode::Release));
-    let until = |status: &Status| status.mode != Mode::Release;
-    let stopped = core::iter::repeat_with(|| silent_for(0)).take(5_001).find(until);
-    assert_eq!(stopped.map(|status| status.fault), Some(Some(Fault::BusSilent)));
-}
-
 /// A host that is back within the release finds its fault: at once with torque off or a new configuration, else once the
 /// object is released.
 #[test]
 fn nothing_that_arrives_ends_a_release_for_a_silent_bus() {
-    let requests: [fn(&mut Bench); 6] = [
+    let requests: [fn(&mut Bench); 7] = [
         |board| board.command().torque = false,
         |board| board.command().goal = newtons(5_000),
         |board| board.command().tare_request += 1,
@@ -163,11 +151,13 @@ fn nothing_that_arrives_ends_a_release_for_a_silent_bus() {
             let config = board.pipeline().config().clone();
             board.pipeline().configure(&config);
         },
+        |_| {},
     ];
     for (number, request) in requests.into_iter().enumerate() {
         let mut board = holding(3_000);
         board.command().bus_watchdog_ms = 40;
-        board.step_with(|record| record.sense.bus_silent_ms = 40);
+        let mut silent_for = |ms| board.step_with(|record| record.sense.bus_silent_ms = ms).mode;
+        assert_eq!((silent_for(39), silent_for(40)), (Mode::Force, Mode::Release));
         board.frames(20);
         request(&mut board);
         let frames = (0..5_001).find(|_| board.step().mode != Mode::Release);
@@ -179,15 +169,23 @@ fn nothing_that_arrives_ends_a_release_for_a_silent_bus() {
     }
 }
 
+/// Frames whose numbers grow by a step: what is missed is counted, and a frame that comes again twice is a fault.
 #[test]
-fn missed_frames_are_counted() {
-    let mut board = holding(1_000);
-    let mut frame = *board.frame();
-    frame.sequence = frame.sequence.wrapping_add(4);
-    let record = board.record();
-    let (_, status) = board.pipeline().step(&frame, &record.sense, &record.command);
-    assert_eq!(status.missed_frames, 3);
-    assert!(status.limits.has(Limits::FRAME_MISSED));
+fn missed_frames_are_counted_and_repeated_ones_are_not_new() {
+    let (mut board, mut ahead) = (holding(1_000), 0);
+    for (step, missed_frames, flagged, fault) in [
+        (4, 3, true, None),
+        (1, 3, false, None),
+        (0, 3, true, None),
+        (1, 3, false, None),
+        (0, 3, true, None),
+        (0, 3, true, Some(Fault::LostFrames)),
+    ] {
+        ahead += step - 1;
+        let status = board.step_with(|record| record.frame.sequence = record.frame.sequence.wrapping_add_signed(ahead));
+        let found = (status.missed_frames, status.limits.has(Limits::FRAME_MISSED), status.fault);
+        assert_eq!(found, (missed_frames, flagged, fault), "{step} behind {ahead}");
+    }
 }
 
 /// More dead taxels than allowed short a driven motor in the middle of a frame. The verdict is left to the step.

@@ -97,15 +97,10 @@ impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
             self.scan(slot);
         }
         self.frame.sequence = self.frame.sequence.wrapping_add(1);
-        let status = self.repeat();
+        let sense = self.plant.sense(0);
+        let status = *self.pipeline.step(&self.frame, &sense, &self.command).1;
         assert_eq!(status.fault, None, "at {} N", self.force_n());
         status
-    }
-
-    /// A control step with the frame of the last one.
-    fn repeat(&mut self) -> Status {
-        let sense = self.plant.sense(0);
-        *self.pipeline.step(&self.frame, &sense, &self.command).1
     }
 
     /// Runs for the given time, s, and returns the last status.
@@ -121,81 +116,69 @@ impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
         }
         self.command.torque = true;
     }
-
-    /// Presses for the given time, s; returns the least and largest true force of the last 50 ms and the last status.
-    fn hold(&mut self, goal_mn: i32, seconds: f64) -> ([f64; 2], Status) {
-        self.command.goal = newtons(goal_mn);
-        self.run(seconds - 0.05);
-        let mut forces = [f64::INFINITY, 0.0_f64];
-        for _ in 0..(0.05 / self.frame_s()) as u32 {
-            self.step();
-            forces = [forces[0].min(self.force_n()), forces[1].max(self.force_n())];
-        }
-        let status = *self.pipeline.status();
-        assert_eq!(status.mode, Mode::Force);
-        (forces, status)
-    }
 }
 
 // The closed loop with a finger: it approaches, holds 1 N and 2 N, and releases.
 
-/// Presses for a time: the true force stays within a share of the goal, and the centre within a distance of its place.
-/// Gives the share of the force that the array does not see, and the last status.
-fn presses<const ROWS: usize, const COLUMNS: usize>(
-    finger: &mut Finger<ROWS, COLUMNS>,
-    goal_mn: i32,
+/// A population's promise: no force is more than 150 mN above the goal, and 300 mN for each N of it.
+const OVER_N: f64 = 0.45;
+
+/// Holds 1 N and 2 N for a time each, s, and releases. In the last 50 ms the true force may be off by so much of each, N,
+/// and the centre by a distance. Returns the share of the force that the array does not see, and the
+/// least confidence.
+fn holds<const ROWS: usize, const COLUMNS: usize>(
+    mut finger: Finger<ROWS, COLUMNS>,
     seconds: f64,
-    [share, off_mm]: [f64; 2],
-) -> (f64, Status) {
-    let ([least, most], status) = finger.hold(goal_mn, seconds);
-    let goal = f64::from(goal_mn) * 1e-3;
-    let seen = finger.pipeline.array().picture().force(finger.pipeline.config()).0.to_num::<f64>();
-    let hidden = 1.0 - seen / finger.force_n();
-    let centre = [status.contact.centre_x, status.contact.centre_y].map(|place| place.0.to_num::<f64>());
-    assert!(
-        goal * (1.0 - share) < least && most < goal * (1.0 + share),
-        "{ROWS} x {COLUMNS}, {goal} N: {least} .. {most} N, {hidden} hidden"
-    );
-    let wall = finger.plant.finger().setup.wall;
-    let is = [wall.centre_x_mm, wall.centre_y_mm];
-    assert!(centre.iter().zip(is).all(|(found, place)| (found - place).abs() < off_mm), "{centre:?}");
-    (hidden, status)
+    off_n: [f64; 2],
+    off_mm: f64,
+) -> (f64, u8) {
+    let (name, wall) = (format!("{ROWS} x {COLUMNS}"), finger.plant.finger().setup.wall);
+    let [frames, last] = [seconds, 0.05].map(|seconds| (seconds / finger.frame_s()) as usize);
+    let (mut hidden, mut confidence) = (0.0, u8::MAX);
+    finger.start();
+    for (goal, off_n) in [1.0, 2.0].into_iter().zip(off_n) {
+        finger.command.goal = newtons((1e3 * goal) as i32);
+        let forces: Vec<f64> = (0..frames).map(|_| (finger.step(), finger.force_n()).1).collect();
+        let over = forces.iter().map(|force| force - goal).fold(0.0, f64::max);
+        let off = forces[frames - last..].iter().map(|force| (force - goal).abs()).fold(0.0, f64::max);
+        let Status { mode, contact, .. } = *finger.pipeline.status();
+        hidden = 1.0
+            - finger.pipeline.array().picture().force(finger.pipeline.config()).0.to_num::<f64>() / finger.force_n();
+        assert_eq!((mode, contact.bad_taxels, contact.doubt), (Mode::Force, 0, 0), "{name}, {goal} N");
+        assert!(over < OVER_N && off < off_n, "{name}, {goal} N: {over} N over, {off} N off, {hidden} hidden");
+        confidence = confidence.min(contact.confidence);
+        let centre = [contact.centre_x, contact.centre_y].map(|place| place.0.to_num::<f64>());
+        let [x_mm, y_mm] = [centre[0] - wall.centre_x_mm, centre[1] - wall.centre_y_mm].map(f64::abs);
+        assert!(x_mm.max(y_mm) < off_mm, "{name}, {goal} N: at {centre:?} mm");
+    }
+    finger.command.goal = fingertip::units::Newtons::ZERO;
+    assert_eq!((finger.run(0.4).mode, finger.force_n()), (Mode::Release, 0.0), "{name}");
+    (hidden, confidence)
 }
 
-/// Holds two forces and releases, with the least and the most work on the fit.
-fn holds<const ROWS: usize, const COLUMNS: usize>(pitch_um: i32) {
+/// With the least and the most work on the fit.
+fn in_the_middle<const ROWS: usize, const COLUMNS: usize>(pitch_um: i32) {
     for fit_level in [FitLevel::OneRow, FitLevel::AllRows] {
-        let mut finger = Finger::<ROWS, COLUMNS>::new(pitch_um, [0.0, 0.0], fit_level, &CLOCKS);
-        finger.start();
-        for goal_mn in [1_000, 2_000] {
-            let (_, status) = presses(&mut finger, goal_mn, 0.6, [0.01, 0.05]);
-            assert_eq!((status.contact.bad_taxels, status.contact.doubt), (0, 0));
-        }
-        finger.command.goal = fingertip::units::Newtons::ZERO;
-        assert_eq!((finger.run(0.4).mode, finger.force_n()), (Mode::Release, 0.0), "{fit_level:?}");
+        holds(Finger::<ROWS, COLUMNS>::new(pitch_um, [0.0, 0.0], fit_level, &CLOCKS), 0.6, [0.01, 0.02], 0.05);
     }
 }
 
 sim::sizes!(
     an_array_of_any_shape_holds_a_force,
-    (holds::<3, 3>(4_000), holds::<3, 5>(4_000), holds::<16, 32>(900)),
-    (holds::<4, 4>(3_500), holds::<8, 8>(1_750), holds::<10, 10>(1_500), holds::<16, 16>(900))
+    (in_the_middle::<3, 3>(4_000), in_the_middle::<3, 5>(4_000), in_the_middle::<16, 32>(900)),
+    (
+        in_the_middle::<4, 4>(3_500),
+        in_the_middle::<8, 8>(1_750),
+        in_the_middle::<10, 10>(1_500),
+        in_the_middle::<16, 16>(900)
+    )
 );
 
-/// The sum is too low for a contact partly off the array: the fit estimates the rest. Returns the share that is off.
-fn over_the_edge<const ROWS: usize, const COLUMNS: usize>(
-    pitch_um: i32,
-    centre_mm: [f64; 2],
-    fit_level: FitLevel,
-) -> f64 {
-    let mut finger = Finger::<ROWS, COLUMNS>::new(pitch_um, centre_mm, fit_level, &CLOCKS);
-    finger.start();
-    let [_, hidden] = [1_000, 2_000].map(|goal_mn| {
-        let (hidden, status) = presses(&mut finger, goal_mn, 0.8, [0.03, 0.15]);
-        assert!(status.contact.confidence > 200, "{}", status.contact.confidence);
-        hidden
-    });
-    hidden
+/// The sum is too low for a contact partly off the array: the fit estimates the rest.
+fn over_the_edge<const ROWS: usize, const COLUMNS: usize>(pitch_um: i32, centre_mm: [f64; 2], fit_level: FitLevel) {
+    let finger = Finger::<ROWS, COLUMNS>::new(pitch_um, centre_mm, fit_level, &CLOCKS);
+    let (hidden, confidence) = holds(finger, 0.8, [0.03, 0.06], 0.15);
+    assert!((0.1..0.6).contains(&hidden) && confidence > 200, "{ROWS} x {COLUMNS}: {hidden} hidden, {confidence}");
 }
 
 sim::sizes!(
@@ -206,66 +189,29 @@ sim::sizes!(
 
 fn find_what_an_edge_hides(levels: &[FitLevel]) {
     for &fit_level in levels {
-        let hidden = [
-            over_the_edge::<8, 8>(1_500, [4.5, 0.0], fit_level),
-            over_the_edge::<8, 8>(1_500, [-2.0, -4.0], fit_level),
-            over_the_edge::<16, 16>(750, [4.5, 1.0], fit_level),
-            over_the_edge::<16, 32>(700, [9.0, -4.0], fit_level),
-            over_the_edge::<9, 7>(1_500, [-3.5, 4.5], fit_level),
-        ];
-        assert!(hidden.iter().all(|hidden| (0.1..0.6).contains(hidden)), "{hidden:?}");
+        over_the_edge::<8, 8>(1_500, [4.5, 0.0], fit_level);
+        over_the_edge::<8, 8>(1_500, [-2.0, -4.0], fit_level);
+        over_the_edge::<16, 16>(750, [4.5, 1.0], fit_level);
+        over_the_edge::<16, 32>(700, [9.0, -4.0], fit_level);
+        over_the_edge::<9, 7>(1_500, [-3.5, 4.5], fit_level);
     }
 }
 
-/// Holds 1 N and 2 N at a wall. Returns the largest force above the goal and the largest error at rest, N.
-fn held<const ROWS: usize, const COLUMNS: usize>(pitch_um: i32, frames_per_s: u32, converters: u32) -> [f64; 2] {
+fn at_rate<const ROWS: usize, const COLUMNS: usize>(pitch_um: i32, frames_per_s: u32, converters: u32) {
     let clocks = Clocks { converters, frame_ns: Some(1_000_000_000 / frames_per_s), ..CLOCKS };
-    let mut finger = Finger::<ROWS, COLUMNS>::new(pitch_um, [0.0, 0.0], FitLevel::AllRows, &clocks);
-    finger.start();
-    let (mut over, mut off) = (0.0_f64, 0.0_f64);
-    for (goal_mn, goal) in [(1_000, 1.0), (2_000, 2.0)] {
-        finger.command.goal = newtons(goal_mn);
-        for _ in 0..frames_per_s * 3 / 2 {
-            finger.step();
-            over = over.max(finger.force_n() - goal);
-        }
-        let ([least, most], _) = finger.hold(goal_mn, 0.1);
-        off = off.max(most - goal).max(goal - least);
-    }
-    [over, off]
+    holds(Finger::<ROWS, COLUMNS>::new(pitch_um, [0.0, 0.0], FitLevel::AllRows, &clocks), 1.6, [0.01; 2], 0.05);
 }
-
-/// A population's promise: no force is more than 150 mN above the goal, and 300 mN for each N of it.
-const OVER_N: f64 = 0.45;
 
 sim::sizes!(a_force_is_held_at_every_rate, hold_at(&[100, 1_000]), hold_at(&[200, 500, 2_000, 5_000, 10_000]));
 
 fn hold_at(rates: &[u32]) {
     for &frames_per_s in rates {
-        let mut runs = vec![held::<6, 4>(2_000, frames_per_s, 2), held::<10, 10>(1_500, frames_per_s, 2)];
+        at_rate::<6, 4>(2_000, frames_per_s, 2);
+        at_rate::<10, 10>(1_500, frames_per_s, 2);
         if frames_per_s <= 1_000 {
-            runs.push(held::<16, 32>(900, frames_per_s, 1));
-        }
-        for [over, off] in runs {
-            assert!(off < 0.01, "{off} N off at {frames_per_s} Hz");
-            assert!(over < OVER_N, "{over} N over at {frames_per_s} Hz");
+            at_rate::<16, 32>(900, frames_per_s, 1);
         }
     }
-}
-
-/// Steps of a driven finger whose frames are new, repeated once, or repeated for ever.
-#[test]
-fn a_frame_that_comes_again_is_not_new() {
-    let mut finger = Finger::<6, 4>::new(2_000, [0.0, 0.0], FitLevel::AllRows, &CLOCKS);
-    finger.start();
-    finger.run(0.1);
-    let missed = finger.pipeline.status().missed_frames;
-    let status = finger.repeat();
-    assert_eq!((status.fault, status.missed_frames), (None, missed));
-    assert!(status.limits.has(Limits::FRAME_MISSED));
-    assert!(!finger.step().limits.has(Limits::FRAME_MISSED));
-    let twice = [finger.repeat(), finger.repeat()].map(|status| (status.fault, status.missed_frames));
-    assert_eq!(twice, [(None, missed), (Some(Fault::LostFrames), missed)]);
 }
 
 /// Worst of a population: force above 1.3 times the goal and 0.15 N, distance from the goal beyond 15 % and 0.1 N,

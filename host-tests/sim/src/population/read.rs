@@ -237,7 +237,7 @@ const OWN: [&str; 4] = ["magnitude", "draw", "events", "count"];
 
 /// Reads the text of a population without `extends`.
 pub fn read(file: &str, text: &str) -> Result<Population, SceneErrors> {
-    let error = |(at, message, allowed): Wrong| SceneError::new(file, text, at, message, allowed);
+    let error = |(at, message, allowed): Wrong| SceneError::new(file, text, at, &message, &allowed);
     let document = Document::parse(text).map_err(|failure| not_toml(file, text, &failure))?;
     let root = document.as_table();
     let magnitude =

@@ -27,7 +27,7 @@ pub fn read(file: &str, text: &str) -> Result<Scene, SceneErrors> {
 
 pub(crate) fn not_toml(file: &str, text: &str, error: &TomlError) -> SceneErrors {
     let message = format!("this is not TOML: {}", error.message().trim().replace('\n', "; "));
-    SceneErrors(vec![SceneError::new(file, text, error.span().unwrap_or(0..0), message, String::new())])
+    SceneErrors(vec![SceneError::new(file, text, error.span().unwrap_or(0..0), &message, "")])
 }
 
 struct Reader<'a> {
@@ -37,16 +37,29 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn error(&mut self, at: Range<usize>, message: impl Into<String>, allowed: impl Into<String>) -> &mut SceneError {
-        self.errors.push(SceneError::new(self.file, self.text, at, message.into(), allowed.into()));
-        self.errors.last_mut().expect("one was pushed")
+    fn error(&mut self, at: Range<usize>, message: impl Into<String>, allowed: impl Into<String>) {
+        self.mistaken(at, message, allowed, None);
+    }
+
+    /// Reports a mistake with the word that was probably meant.
+    fn mistaken(
+        &mut self,
+        at: Range<usize>,
+        message: impl Into<String>,
+        allowed: impl Into<String>,
+        meant: Option<&str>,
+    ) {
+        let mut error = SceneError::new(self.file, self.text, at, &message.into(), &allowed.into());
+        if let Some(meant) = meant {
+            error.text += &format!("\n  did you mean `{meant}`?");
+        }
+        self.errors.push(error);
     }
 
     /// Reports an unknown word, with the known ones.
     fn unknown<'w>(&mut self, what: &str, given: &str, at: Range<usize>, words: impl Iterator<Item = &'w str> + Clone) {
         let allowed = words.clone().collect::<Vec<_>>().join(", ");
-        let suggestion = alike(given, words).map(str::to_owned);
-        self.error(at, format!("unknown {what}"), allowed).suggestion = suggestion;
+        self.mistaken(at, format!("unknown {what}"), allowed, alike(given, words));
     }
 
     /// Returns none if a required part is missing. Its error is among the others.
@@ -291,7 +304,7 @@ impl Reader<'_> {
             Some(key) => format!("{}: {}", key.name, key.allowed()),
             None => words.collect::<Vec<_>>().join(", "),
         };
-        self.error(at, message, allowed).suggestion = suggestion.map(str::to_owned);
+        self.mistaken(at, message, allowed, suggestion);
     }
 
     fn value(&mut self, key: &Key, item: &Item, at: Range<usize>) -> Option<Value> {
@@ -309,9 +322,8 @@ impl Reader<'_> {
             Kind::Text => item.as_str().filter(|text| !text.contains('\n')).map(|text| Value::Text(text.to_owned())),
             Kind::Word { words, .. } => match item.as_str() {
                 Some(given) if !words.contains(&given) => {
-                    let suggestion = alike(given, words.iter().copied()).map(str::to_owned);
                     let message = format!("`{name}` does not know \"{given}\"");
-                    self.error(at, message, key.allowed()).suggestion = suggestion;
+                    self.mistaken(at, message, key.allowed(), alike(given, words.iter().copied()));
                     return None;
                 }
                 given => words.iter().find(|word| Some(**word) == given).map(|word| Value::Word(word)),
@@ -363,58 +375,33 @@ pub(crate) fn item_span(table: &dyn TableLike, name: &str) -> Range<usize> {
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SceneError {
-    pub file: String,
     /// Line, from 1.
     pub line: usize,
     /// Column in characters, from 1.
     pub column: usize,
-    pub message: String,
-    pub allowed: String,
-    /// Word that was probably meant.
-    pub suggestion: Option<String>,
-    pub source_line: String,
-    /// Number of marked characters.
-    pub width: usize,
+    /// Place, message, marked line, allowed values, and the word that was probably meant.
+    pub text: String,
 }
 
 impl SceneError {
     /// Creates an error at a range of bytes of a text.
-    pub fn new(file: &str, text: &str, at: Range<usize>, message: String, allowed: String) -> Self {
+    pub fn new(file: &str, text: &str, at: Range<usize>, message: &str, allowed: &str) -> Self {
         let start = (0..=at.start.min(text.len())).rev().find(|at| text.is_char_boundary(*at)).unwrap_or(0);
         let line_start = text[..start].rfind('\n').map_or(0, |newline| newline + 1);
         let source_line = text[line_start..].lines().next().unwrap_or("");
+        let line = text[..line_start].matches('\n').count() + 1;
         let column = text[line_start..start].chars().count() + 1;
         let meant = text.get(start..at.end).and_then(|meant| meant.lines().next()).unwrap_or("");
-        Self {
-            file: file.into(),
-            line: text[..line_start].matches('\n').count() + 1,
-            column,
-            message,
-            allowed,
-            suggestion: None,
-            source_line: source_line.into(),
-            width: meant.chars().count().max(1),
-        }
-    }
-}
-
-impl fmt::Display for SceneError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { file, line, column, message, allowed, source_line, .. } = self;
-        writeln!(f, "{file}:{line}:{column}: {message}")?;
-        let number = line.to_string();
-        let margin = " ".repeat(number.len());
+        let marks = "^".repeat(meant.chars().count().max(1));
+        let margin = " ".repeat(line.to_string().len());
         // Tabs remain, so that the marks are below the marked text.
         let before: String = source_line.chars().take(column - 1).map(|c| if c == '\t' { '\t' } else { ' ' }).collect();
-        writeln!(f, "  {number} | {source_line}")?;
-        write!(f, "  {margin} | {before}{}", "^".repeat(self.width))?;
+        let mut text =
+            format!("{file}:{line}:{column}: {message}\n  {line} | {source_line}\n  {margin} | {before}{marks}");
         if !allowed.is_empty() {
-            write!(f, "\n  allowed: {allowed}")?;
+            text += &format!("\n  allowed: {allowed}");
         }
-        if let Some(suggestion) = &self.suggestion {
-            write!(f, "\n  did you mean `{suggestion}`?")?;
-        }
-        Ok(())
+        Self { line, column, text }
     }
 }
 
@@ -424,7 +411,7 @@ pub struct SceneErrors(pub Vec<SceneError>);
 
 impl fmt::Display for SceneErrors {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let errors: Vec<String> = self.0.iter().map(SceneError::to_string).collect();
+        let errors: Vec<&str> = self.0.iter().map(|error| error.text.as_str()).collect();
         f.write_str(&errors.join("\n\n"))
     }
 }

@@ -239,26 +239,19 @@ impl Key {
 
     /// Describes the allowed values: "number, 0 to 5, default 1".
     pub fn allowed(&self) -> String {
-        let default = |value: Option<String>| value.map_or("required".into(), |value| format!("default {value}"));
-        match self.kind {
-            Kind::Number { min, max, default: value } => {
-                format!("number, {min} to {max}, {}", default(value.map(|value| value.to_string())))
-            }
-            Kind::Whole { min, max, default: value } => {
-                format!("whole number, {min} to {max}, {}", default(value.map(|value| value.to_string())))
-            }
-            Kind::Word { words, default: value } => {
-                format!(
-                    "{}, {}",
-                    words.iter().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(" or "),
-                    default(value.map(|value| format!("\"{value}\"")))
-                )
-            }
-            Kind::Optional { min, max, whole } => {
-                format!("{}number, {min} to {max}, may be left out", if whole { "whole " } else { "" })
-            }
-            Kind::Text => "text, required".into(),
+        let values = match self.kind {
+            Kind::Number { min, max, .. } => format!("number, {min} to {max}"),
+            Kind::Whole { min, max, .. } => format!("whole number, {min} to {max}"),
+            Kind::Word { words, .. } => words.iter().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(" or "),
+            Kind::Optional { min, max, whole: true } => format!("whole number, {min} to {max}, may be left out"),
+            Kind::Optional { min, max, whole: false } => format!("number, {min} to {max}, may be left out"),
+            Kind::Text => "text".into(),
             Kind::Taxels => format!("pairs [row, column], each 0 to {}, default none", ROWS - 1),
+        };
+        match (self.kind, self.default()) {
+            (Kind::Optional { .. } | Kind::Taxels, _) => values,
+            (_, Some(default)) => format!("{values}, default {default}"),
+            (_, None) => format!("{values}, required"),
         }
     }
 

@@ -55,7 +55,7 @@ fn answers(text: &str) {
     if let Err(errors) = read_it(text) {
         assert!(!errors.0.is_empty(), "refused without a reason:\n{text}");
         for error in &errors.0 {
-            assert!(error.line >= 1 && error.line <= text.lines().count().max(1) + 1, "{error}");
+            assert!(error.line >= 1 && error.line <= text.lines().count().max(1) + 1, "{}", error.text);
             assert!(error.column >= 1);
         }
         let _ = errors.to_string();

@@ -20,25 +20,16 @@ use floating::Floating;
 /// A number for each column.
 pub type Row = [f64; COLUMNS];
 
-/// Effect on the pressures on the taxels of a row, kPa: row, time of its sample (never before the last one) and
-/// pressures.
-pub type Pressure = dyn FnMut(usize, f64, &mut Row) + Send;
+/// Effect on the numbers of a slot (a row, or [`ROWS`] without one): slot, time of its sample (never before the last one)
+/// and numbers.
+pub type Slot = dyn FnMut(usize, f64, &mut Row) + Send;
 
 /// Temperature of the microcontroller at a time, degrees Celsius.
 pub type Chip = dyn Fn(f64) -> f64 + Send;
 
-/// Effect on the conductances of the taxels of a row, S: row, time and conductances as in [`Pressure`].
-pub type Conductance = dyn FnMut(usize, f64, &mut Row) + Send;
-
 /// Effect on the conductances that the columns see of the driven row, S: row, conductances of all taxels at the last
 /// sample of their row, and conductances seen.
 pub type Network = dyn FnMut(usize, &[Row; ROWS], &mut Row) + Send;
-
-/// Effect on the voltages of the amplifiers: slot (a row, or [`ROWS`] without one), time and voltages.
-pub type Volts = dyn FnMut(usize, f64, &mut Row) + Send;
-
-/// Effect on the codes of the converter before rounding: slot, time and codes as in [`Volts`].
-pub type Codes = dyn FnMut(usize, f64, &mut Row) + Send;
 
 /// True if an effect gives the same codes in each scan of a contact at rest, and remembers the last slot at most.
 pub fn repeats(named: &NamedEffect) -> bool {
@@ -51,12 +42,16 @@ pub fn repeats(named: &NamedEffect) -> bool {
 }
 
 named! {
-    pressure: Pressure,
+    // Pressures on the taxels of a row, kPa.
+    pressure: Slot,
     chip: Chip,
-    conductance: Conductance,
+    // Conductances of the taxels of a row, S.
+    conductance: Slot,
     network: Network,
-    volts: Volts,
-    codes: Codes,
+    // Voltages of the amplifiers.
+    volts: Slot,
+    // Codes of the converter before rounding.
+    codes: Slot,
 }
 
 impl Named {

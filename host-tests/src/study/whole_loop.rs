@@ -137,7 +137,7 @@ fn rounded_error_kpa(bits: u32) -> f64 {
     for (i, j) in (1..=PLACES).flat_map(|i| (0..PLACES).map(move |j| (i, j))) {
         let d_mm = 8.0 * i as f64 / PLACES as f64;
         let flattened = tip.flattened(d_mm);
-        let r2 = flattened.contact_radius2_mm2() * j as f64 / PLACES as f64;
+        let r2 = flattened.contact_radius2_mm2 * j as f64 / PLACES as f64;
         let length = round((tip.radius_mm * tip.radius_mm - r2).sqrt(), 16.0);
         let shorter = round(length - round(tip.radius_mm - d_mm, 16.0), 16.0);
         let kpa = round(tip.modulus_kpa * round(shorter / length, 1.0), 256.0);

@@ -31,8 +31,6 @@ pub struct Pressures {
     tip: Tip,
     pitch_mm: f64,
     centre_mm: [f64; 2],
-    deepest_mm: f64,
-    peak_per_mm: f64,
     /// Knots by place of the centre and root of the indentation. The first root mirrors the one after 0.
     knots: Vec<Vec<Knot>>,
     /// Points of a shaped surface by place of the centre, from the first contact there on.
@@ -55,88 +53,65 @@ impl Between {
     pub const NOTHING: Self = Self { root: 0, weights: [0.0; 4], peak_kpa: 0.0, shift_mm: 0.0 };
 }
 
-/// Four knots around a root.
-struct Around {
-    place: usize,
-    root: usize,
-}
-
 impl Pressures {
     /// Pressures of a tip on an array whose middle has this distance from the centre of the contact.
     pub fn new(tip: Tip, pitch_mm: f64, centre_mm: [f64; 2]) -> Self {
-        let deepest_mm = Tip::DEEPEST * tip.radius_mm;
-        let roots = (deepest_mm.sqrt() / ROOT) as usize + 4;
+        let roots = ((Tip::DEEPEST * tip.radius_mm).sqrt() / ROOT) as usize + 4;
         let knots = (0..=2 * PLACES).map(|_| vec![None; roots]).collect();
-        let peak_per_mm = tip.modulus_kpa / tip.radius_mm;
         let points = (0..=2 * PLACES).map(|_| None).collect();
-        Self { tip, pitch_mm, centre_mm, deepest_mm, peak_per_mm, knots, points }
+        Self { tip, pitch_mm, centre_mm, knots, points }
     }
 
     /// Returns the place of an indentation, with the centre shifted along the rows.
-    #[inline]
     pub fn between(&self, d_mm: f64, shift_mm: f64) -> Between {
         if d_mm <= 0.0 {
             return Between::NOTHING;
         }
-        let d_mm = d_mm.min(self.deepest_mm);
+        let Tip { radius_mm, modulus_kpa } = self.tip;
+        let d_mm = d_mm.min(Tip::DEEPEST * radius_mm);
         let (root, weights) = weigh(d_mm.sqrt() / ROOT);
-        Between { root, weights, peak_kpa: self.peak_per_mm * d_mm, shift_mm }
+        Between { root, weights, peak_kpa: modulus_kpa / radius_mm * d_mm, shift_mm }
     }
 
-    #[inline]
     pub fn row_kpa(&mut self, effects: &Named, between: &Between, row: usize) -> Row {
-        let mut kpa = [0.0; COLUMNS];
-        if between.peak_kpa > 0.0 {
-            while let Err(missing) = self.sum(between, row, &mut kpa) {
-                self.work_out(effects, missing);
-            }
-        }
-        kpa
-    }
-
-    /// Sets the mean pressures, or returns the knots that are not computed yet.
-    fn sum(&self, between: &Between, row: usize, kpa: &mut Row) -> Result<(), Around> {
         let Between { root, weights, peak_kpa, shift_mm } = *between;
-        if shift_mm == 0.0 {
-            // Without a shift along the surface the place is a knot.
-            let [a, b, c, d] = self.around(PLACES, root, row)?;
-            let [wa, wb, wc, wd] = weights.map(|weight| weight * peak_kpa);
-            *kpa = core::array::from_fn(|n| positive(wa * a[n] + wb * b[n] + wc * c[n] + wd * d[n]));
-            return Ok(());
-        }
-        let (place, along) = weigh((shift_mm / PLACE_MM + PLACES as f64).clamp(1.0, 2.0 * PLACES as f64 - 2.0));
         let mut sum = [0.0; COLUMNS];
-        for (next, along) in along.into_iter().enumerate() {
-            let [a, b, c, d] = self.around(place + next - 1, root, row)?;
-            let [wa, wb, wc, wd] = weights.map(|weight| along * weight * peak_kpa);
-            for (n, sum) in sum.iter_mut().enumerate() {
-                *sum += wa * a[n] + wb * b[n] + wc * c[n] + wd * d[n];
+        if peak_kpa > 0.0 {
+            let (place, along) = weigh((shift_mm / PLACE_MM + PLACES as f64).clamp(1.0, 2.0 * PLACES as f64 - 2.0));
+            // Without a shift along the surface the place is a knot.
+            for (place, along) in (place - 1..).zip(along).filter(|(_, along)| *along != 0.0) {
+                let [a, b, c, d] = self.around(effects, place, root, row);
+                let [wa, wb, wc, wd] = weights.map(|weight| along * weight * peak_kpa);
+                for (n, sum) in sum.iter_mut().enumerate() {
+                    *sum += wa * a[n] + wb * b[n] + wc * c[n] + wd * d[n];
+                }
             }
         }
-        *kpa = sum.map(positive);
-        Ok(())
+        // The interpolation overshoots where a taxel first touches the rim.
+        sum.map(|kpa| if kpa > 0.0 { kpa } else { 0.0 })
     }
 
     /// Returns a row at the four knots around a root.
     #[inline(always)]
-    fn around(&self, place: usize, root: usize, row: usize) -> Result<[&Row; 4], Around> {
-        match &self.knots[place][root..root + 4] {
-            [Some(a), Some(b), Some(c), Some(d)] => Ok([&a[row], &b[row], &c[row], &d[row]]),
-            _ => Err(Around { place, root }),
+    fn around(&mut self, effects: &Named, place: usize, root: usize, row: usize) -> [&Row; 4] {
+        if self.knots[place][root..root + 4].iter().any(Option::is_none) {
+            self.work_out(effects, place, root);
         }
+        let knots = &self.knots[place][root..root + 4];
+        core::array::from_fn(|at| knots[at].as_ref().map_or(&[0.0; COLUMNS], |knot| &knot[row]))
     }
 
     /// Computes the knots around a root at the first contact there. Cold, so that the work for each row stays fast.
     #[cold]
-    fn work_out(&mut self, effects: &Named, around: Around) {
-        let shift_mm = (around.place as f64 - PLACES as f64) * PLACE_MM;
+    fn work_out(&mut self, effects: &Named, place: usize, root: usize) {
+        let shift_mm = (place as f64 - PLACES as f64) * PLACE_MM;
         let centre_mm = [self.centre_mm[0], self.centre_mm[1] + shift_mm];
-        let (tip, pitch_mm, points) = (&self.tip, self.pitch_mm, &mut self.points[around.place]);
+        let (tip, pitch_mm, points) = (&self.tip, self.pitch_mm, &mut self.points[place]);
         let cells = move || {
             let taxels = (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column)));
             taxels.map(move |(row, column)| Cell::at(pitch_mm, centre_mm, row, column))
         };
-        for (at, knot) in self.knots[around.place].iter_mut().enumerate().skip(around.root).take(4) {
+        for (at, knot) in self.knots[place].iter_mut().enumerate().skip(root).take(4) {
             let root = (at as f64 - 1.0) * ROOT;
             let d_mm = root * root;
             knot.get_or_insert_with(|| {
@@ -157,11 +132,6 @@ impl Pressures {
 /// Numbers of the taxels, row by row.
 fn by_row(mut numbers: impl Iterator<Item = f64>) -> Box<[Row; ROWS]> {
     Box::new(core::array::from_fn(|_| core::array::from_fn(|_| numbers.next().unwrap_or(0.0))))
-}
-
-/// Cuts negative values: the interpolation overshoots where a taxel first touches the rim.
-fn positive(kpa: f64) -> f64 {
-    if kpa > 0.0 { kpa } else { 0.0 }
 }
 
 /// Lower knot of a place, and the weights of the four knots around it.
@@ -262,7 +232,7 @@ impl Cell {
     }
 
     pub fn mean_kpa(&self, tip: &Flattened) -> f64 {
-        let rim2 = tip.contact_radius2_mm2();
+        let rim2 = tip.contact_radius2_mm2;
         let near2 = square(nearest(self.x_mm)) + square(nearest(self.y_mm));
         if near2 >= rim2 {
             return 0.0;
@@ -320,7 +290,8 @@ pub struct Flattened {
     modulus_kpa: f64,
     radius2_mm2: f64,
     remaining_mm: f64,
-    contact_radius2_mm2: f64,
+    /// Square of the contact radius (eq. 5, 6).
+    pub contact_radius2_mm2: f64,
 }
 
 impl Tip {
@@ -356,11 +327,6 @@ impl Tip {
 }
 
 impl Flattened {
-    /// Square of the contact radius (eq. 5, 6).
-    pub fn contact_radius2_mm2(&self) -> f64 {
-        self.contact_radius2_mm2
-    }
-
     /// Pressure at a distance from the contact's centre (eq. 13, 15, 16); 0 outside of the contact.
     ///
     /// p = Y dL/L with L = sqrt(a^2 - r^2) and dL = (r_c^2 - r^2) / (L + a - d), which equals L - (a - d) but

@@ -66,7 +66,7 @@ fn pressure_force_and_radius_are_the_papers() {
         let (d, r, rc, p, f) = (v[2], v[3], v[4], v[6], v[7]);
         let flat = tip.flattened(d);
         let close = |ours: f64, oracle: f64| (ours - oracle).abs() <= 4e-15 * oracle.abs().max(1e-12);
-        assert!(close(flat.contact_radius2_mm2().sqrt(), rc), "radius at {line}");
+        assert!(close(flat.contact_radius2_mm2.sqrt(), rc), "radius at {line}");
         // The rim: p goes to 0 with r_c^2 - r^2, of which only the sizes' rounding is left.
         let rounding = 4e-16 * tip.modulus_kpa * rc * rc / (tip.radius_mm - d).powi(2);
         assert!((flat.pressure_kpa(r * r) - p).abs() <= 4e-15 * p + 2.0 * rounding, "pressure at {line}");

@@ -146,8 +146,7 @@ impl World {
     fn advance_fingers(&mut self, time_s: f64) {
         for (index, finger) in self.fingers.iter_mut().enumerate() {
             let [from, to] = [&self.body_before, &self.body].map(|body| surface_mm(&finger.setup, index, body));
-            let end =
-                finger.solve(|contact: &Contact, from_mm, to_mm| contact.law().mean_n(from_mm - from, to_mm - to));
+            let end = finger.solve(|contact: &Contact, from_mm, to_mm| contact.law.mean_n(from_mm - from, to_mm - to));
             finger.finish(&end, to);
         }
         if !self.bare {
@@ -165,7 +164,7 @@ impl World {
                 let lifted_mm = self.around.hand_mm(until_s) - self.around.hand_mm(time_s);
                 let way_mm = grip.drift_mm_per_s * drawn_s - lifted_mm;
                 let surface_mm = surface_mm(&finger.setup, index, &self.body);
-                let force_n = finger.contact.law().force_n(finger.flank_mm() - surface_mm);
+                let force_n = finger.contact.law.force_n(finger.flank_mm() - surface_mm);
                 (_, finger.contact.along) = finger.contact.along.moved(&grip, force_n, way_mm, self.dt_s);
             }
         }
@@ -186,7 +185,7 @@ impl World {
             let (mut force_n, mut changed_mm) = ([0.0; 2], 0.0_f64);
             for (index, finger) in self.fingers.iter_mut().enumerate() {
                 let [from, to] = [&body, &next].map(|body| surface_mm(&finger.setup, index, body));
-                let law = finger.contact.law();
+                let law = &finger.contact.law;
                 let mean_n = law.mean_n(finger.flank_mm() - from, flanks[index] - to);
                 force_n[0] += side(index) * mean_n;
                 if let Some(grip) = &grips[index] {
@@ -224,11 +223,11 @@ impl World {
 
     /// Energy of the contact of a finger, mJ: elastic and along the surface.
     pub fn contact_mj(&self, index: usize) -> f64 {
-        self.fingers[index].contact.law().energy_mj(self.overlap_mm(index))
+        self.fingers[index].contact.law.energy_mj(self.overlap_mm(index))
     }
 
     pub fn force_n(&self, finger: usize) -> f64 {
-        self.fingers[finger].contact.law().force_n(self.overlap_mm(finger))
+        self.fingers[finger].contact.law.force_n(self.overlap_mm(finger))
     }
 
     /// Returns what the control step of a finger receives beside the frame.
@@ -251,7 +250,7 @@ impl World {
         let finger = &self.fingers[index];
         let wall = &finger.setup.wall;
         let along = &finger.contact.along;
-        let depth_mm = finger.contact.law().depth_mm(self.overlap_mm(index)).max(0.0);
+        let depth_mm = finger.contact.law.depth_mm(self.overlap_mm(index)).max(0.0);
         let [x, y] = finger.contact.centre_mm(depth_mm);
         let mut truth = Truth {
             force_n,

@@ -216,7 +216,7 @@ impl Finger {
                         }
                         deepest = deepest.max(depth_mm);
                         let highest = codes.iter().flatten().copied().fold(0.0, f64::max);
-                        if way > 0.0 && (highest > 3_300.0 || self.contact.law().force_n(depth_mm) > force_max_n) {
+                        if way > 0.0 && (highest > 3_300.0 || self.contact.law.force_n(depth_mm) > force_max_n) {
                             most_mm = depth_mm;
                             break;
                         }

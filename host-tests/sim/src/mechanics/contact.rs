@@ -13,9 +13,7 @@ pub struct Contact {
     pub effects: Named,
     pub along: Along,
     /// Law of the force for the next step.
-    law: Law,
-    /// Indentations, each with the centre of pressure; empty on a plane.
-    centres: Vec<[f64; 3]>,
+    pub law: Law,
     pressures: Pressures,
     /// Contact at the last sample of each row, and its pressures.
     rows: [(Place, [f64; COLUMNS]); ROWS],
@@ -50,10 +48,10 @@ impl Contact {
     pub fn new(setup: &Setup, mut effects: Named) -> Self {
         // The tables of the shape count as a call of its effects.
         effects.shape.each(|_| ());
-        let (elastic, centres) = if effects.shaped() {
+        let elastic = if effects.shaped() {
             shaped(&effects, &setup.tip)
         } else {
-            (Elastic::Plane { n_per_mm2: setup.tip.force_per_mm2() }, Vec::new())
+            Elastic::Plane { n_per_mm2: setup.tip.force_per_mm2() }
         };
         let centre_mm = [setup.wall.centre_x_mm, setup.wall.centre_y_mm];
         let pressures = Pressures::new(setup.tip, setup.array.pitch_mm, centre_mm);
@@ -66,12 +64,7 @@ impl Contact {
         };
         let n_per_mm_along = effects.grip().map_or(0.0, |grip| grip.n_per_mm);
         let rows = [(Place::NOWHERE, [0.0; COLUMNS]); ROWS];
-        Self { n_per_mm_along, effects, along: Along::default(), law, centres, pressures, rows }
-    }
-
-    /// Returns the law of the force for the next step.
-    pub fn law(&self) -> &Law {
-        &self.law
+        Self { n_per_mm_along, effects, along: Along::default(), law, pressures, rows }
     }
 
     /// Lets the tip relax for a time at an overlap.
@@ -94,7 +87,6 @@ impl Contact {
         }
     }
 
-    #[inline]
     pub fn place(&self, x_mm: f64) -> Place {
         if x_mm <= 0.0 {
             return Place::NOWHERE;
@@ -110,7 +102,6 @@ impl Contact {
         Place { between, share: if elastic_n > 0.0 { law.left * law.net_n(d_mm) / elastic_n } else { law.left } }
     }
 
-    #[inline]
     pub fn row_kpa(&mut self, place: &Place, row: usize) -> [f64; COLUMNS] {
         let (before, kpa) = &mut self.rows[row];
         if before != place {
@@ -125,10 +116,12 @@ impl Contact {
 
     /// Returns the centre of pressure at an indentation, from where the axis of the tip meets the surface.
     pub fn centre_mm(&self, d_mm: f64) -> [f64; 2] {
-        let above = self.centres.partition_point(|[knot_mm, ..]| *knot_mm < d_mm);
-        let [x, y] = match self.centres.get(above.min(self.centres.len().saturating_sub(1))) {
-            Some([_, x, y]) => [*x, *y],
-            None => [0.0, 0.0],
+        let [x, y] = match &self.law.elastic {
+            Elastic::Plane { .. } => [0.0; 2],
+            Elastic::Table(Table { knots, .. }) => {
+                let above = knots.partition_point(|knot| knot.d_mm < d_mm);
+                knots[above.min(knots.len() - 1)].centre_mm
+            }
         };
         [x, y + self.along.stretch_mm]
     }
@@ -189,7 +182,6 @@ pub struct Law {
 
 impl Law {
     /// Indentation of the tip at an overlap; negative without contact.
-    #[inline]
     pub fn depth_mm(&self, x_mm: f64) -> f64 {
         if self.mm_per_n == 0.0 || x_mm <= 0.0 { x_mm } else { self.yielding_mm(x_mm) }
     }
@@ -224,7 +216,6 @@ impl Law {
     }
 
     /// Mean force between two overlaps: the difference in energy over the distance.
-    #[inline]
     pub fn mean_n(&self, x0: f64, x1: f64) -> f64 {
         if x0 <= 0.0 && x1 <= 0.0 {
             return 0.0;
@@ -246,7 +237,6 @@ impl Law {
         (self.elastic.force_n(d_mm) - self.forgotten_n).max(0.0)
     }
 
-    #[inline]
     fn tip_mean_n(&self, d0: f64, d1: f64) -> f64 {
         if self.forgotten_n == 0.0 {
             return self.elastic.mean_n(d0, d1);
@@ -272,91 +262,58 @@ pub enum Elastic {
 /// Knots of a force that rises ever more steeply, from 0 at 0.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
-    /// Knots per square root of the indentation, in which they are evenly spaced.
-    per_root: f64,
-    /// Indentation, mm; rising.
-    d_mm: Vec<f64>,
-    force_n: Vec<f64>,
-    energy_mj: Vec<f64>,
-    /// Slope of the force from each knot to the next, N/mm.
-    n_per_mm: Vec<f64>,
-    /// Segment of the last indentation: the next one is near.
+    knots: Vec<Knot>,
+    /// Segment of the last indentation, by its lower knot: the next one is near.
     last: Cell<usize>,
 }
 
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Knot {
+    /// Indentation; rising from knot to knot.
+    d_mm: f64,
+    force_n: f64,
+    energy_mj: f64,
+    /// Slope of the force up to the next knot.
+    n_per_mm: f64,
+    /// Centre of pressure, from where the axis of the tip meets the surface.
+    centre_mm: [f64; 2],
+}
+
 impl Table {
-    /// Creates a table of knots from d = 0 on: at least two, evenly spaced in the root of d, force not falling.
-    pub fn new(d_mm: Vec<f64>, force_n: Vec<f64>) -> Self {
-        let last = d_mm.len() - 1;
-        let (mut energy_mj, mut n_per_mm) = (vec![0.0; d_mm.len()], Vec::with_capacity(last));
-        for knot in 1..d_mm.len() {
-            let mean = 0.5 * (force_n[knot] + force_n[knot - 1]);
-            energy_mj[knot] = energy_mj[knot - 1] + mean * (d_mm[knot] - d_mm[knot - 1]);
-            n_per_mm.push((force_n[knot] - force_n[knot - 1]) / (d_mm[knot] - d_mm[knot - 1]));
+    /// Returns the segment in which `before` becomes false, by its lower knot. The first and the last one have no outer end.
+    fn segment(&self, before: impl Fn(&Knot) -> bool) -> usize {
+        let (line, last) = (self.last.get(), self.knots.len() - 2);
+        if (line == 0 || before(&self.knots[line])) && (line == last || !before(&self.knots[line + 1])) {
+            return line;
         }
-        Self { per_root: last as f64 / d_mm[last].sqrt(), d_mm, force_n, energy_mj, n_per_mm, last: Cell::new(0) }
-    }
-
-    /// True if an indentation lies in a segment. The first and the last one have no outer end.
-    #[inline]
-    fn holds(&self, line: usize, d_mm: f64) -> bool {
-        (line == 0 || self.d_mm[line] <= d_mm) && (line + 2 == self.d_mm.len() || d_mm < self.d_mm[line + 1])
-    }
-
-    /// Returns the segment of an indentation, by its lower knot.
-    fn line(&self, d_mm: f64) -> usize {
-        if self.holds(self.last.get(), d_mm) {
-            return self.last.get();
-        }
-        let last = self.d_mm.len() - 2;
-        let mut line = ((d_mm.max(0.0).sqrt() * self.per_root) as usize).min(last);
-        // The root may round to the segment beside it.
-        while line > 0 && self.d_mm[line] > d_mm {
-            line -= 1;
-        }
-        while line < last && self.d_mm[line + 1] <= d_mm {
-            line += 1;
-        }
+        let line = self.knots.partition_point(before).clamp(1, last + 1) - 1;
         self.last.set(line);
         line
     }
 
-    /// Solves d + c (F(d) - S) = x for d, where d > 0 and F(d) > S. The left side is convex, so each segment's solution
-    /// is at most the one before, and the search ends in the segment that contains its own.
-    fn yielding_mm(&self, x_mm: f64, mm_per_n: f64, forgotten_n: f64) -> f64 {
-        let solved_mm = |line: usize| {
-            let rise = mm_per_n * self.n_per_mm[line];
-            let from_mm = self.d_mm[line];
-            from_mm + (x_mm - from_mm - mm_per_n * (self.force_n[line] - forgotten_n)) / (1.0 + rise)
-        };
-        // Most often the segment is that of the last solution.
-        let mut d_mm = solved_mm(self.last.get());
-        if !self.holds(self.last.get(), d_mm) {
-            let mut line = self.line(x_mm);
-            d_mm = solved_mm(line);
-            while self.line(d_mm) < line {
-                line = self.line(d_mm);
-                d_mm = solved_mm(line);
-            }
-        }
-        d_mm
+    /// Returns the segment of an indentation, by its lower knot.
+    fn line(&self, d_mm: f64) -> usize {
+        self.segment(|knot| knot.d_mm <= d_mm)
     }
 
-    fn on_line(&self, line: usize, d_mm: f64) -> f64 {
-        self.force_n[line] + (d_mm - self.d_mm[line]) * self.n_per_mm[line]
+    /// Solves d + c (F(d) - S) = x for d, where d > 0 and F(d) > S. The left side rises with d.
+    fn yielding_mm(&self, x_mm: f64, mm_per_n: f64, forgotten_n: f64) -> f64 {
+        let left_mm = |knot: &Knot| x_mm - knot.d_mm - mm_per_n * (knot.force_n - forgotten_n);
+        let knot = &self.knots[self.segment(|knot| left_mm(knot) >= 0.0)];
+        knot.d_mm + left_mm(knot) / (1.0 + mm_per_n * knot.n_per_mm)
     }
 
     fn force_n(&self, d_mm: f64) -> f64 {
-        if d_mm <= 0.0 { 0.0 } else { self.on_line(self.line(d_mm), d_mm) }
+        if d_mm <= 0.0 { 0.0 } else { self.knots[self.line(d_mm)].force_beyond_n(d_mm) }
     }
 
     fn energy_mj(&self, d_mm: f64) -> f64 {
         if d_mm <= 0.0 {
             return 0.0;
         }
-        let line = self.line(d_mm);
-        let over = d_mm - self.d_mm[line];
-        self.energy_mj[line] + over * (self.force_n[line] + 0.5 * over * self.n_per_mm[line])
+        let knot = &self.knots[self.line(d_mm)];
+        let over = d_mm - knot.d_mm;
+        knot.energy_mj + over * (knot.force_n + 0.5 * over * knot.n_per_mm)
     }
 
     /// Mean force between two indentations. Within a segment it is the mean of the ends, exact at any distance.
@@ -367,23 +324,31 @@ impl Table {
         let (low, high) = (d0.min(d1), d0.max(d1));
         let (first, last) = (self.line(low), self.line(high));
         let part = |line: usize, from: f64, to: f64| {
-            let (from, to) = (from.max(0.0), to.max(0.0));
-            0.5 * (self.on_line(line, from) + self.on_line(line, to)) * (to - from)
+            let (knot, from, to) = (&self.knots[line], from.max(0.0), to.max(0.0));
+            0.5 * (knot.force_beyond_n(from) + knot.force_beyond_n(to)) * (to - from)
         };
         if first == last {
             return part(first, low, high) / (high - low);
         }
-        let inner = self.energy_mj[last] - self.energy_mj[first + 1];
-        (part(first, low, self.d_mm[first + 1]) + inner + part(last, self.d_mm[last], high)) / (high - low)
+        let [after, before] = [&self.knots[first + 1], &self.knots[last]];
+        let inner = before.energy_mj - after.energy_mj;
+        (part(first, low, after.d_mm) + inner + part(last, before.d_mm, high)) / (high - low)
     }
 
     fn depth_mm(&self, force_n: f64) -> f64 {
         if force_n <= 0.0 {
             return 0.0;
         }
-        let knots = self.force_n.partition_point(|knot_n| *knot_n <= force_n);
-        let line = knots.clamp(1, self.force_n.len() - 1) - 1;
-        self.d_mm[line] + (force_n - self.force_n[line]) / self.n_per_mm[line]
+        let above = self.knots.partition_point(|knot| knot.force_n <= force_n);
+        let knot = &self.knots[above.clamp(1, self.knots.len() - 1) - 1];
+        knot.d_mm + (force_n - knot.force_n) / knot.n_per_mm
+    }
+}
+
+impl Knot {
+    /// Force of an indentation in the segment that begins here.
+    fn force_beyond_n(&self, d_mm: f64) -> f64 {
+        self.force_n + (d_mm - self.d_mm) * self.n_per_mm
     }
 }
 
@@ -411,7 +376,6 @@ impl Elastic {
     }
 
     /// Mean force between two indentations: the difference in energy over the distance.
-    #[inline]
     pub fn mean_n(&self, d0: f64, d1: f64) -> f64 {
         match self {
             Self::Plane { n_per_mm2 } => mean_square(*n_per_mm2, d0, d1),
@@ -422,7 +386,7 @@ impl Elastic {
     pub fn n_per_mm(&self, d_mm: f64) -> f64 {
         match self {
             Self::Plane { n_per_mm2 } => 2.0 * n_per_mm2 * d_mm.max(0.0),
-            Self::Table(table) => table.n_per_mm[table.line(d_mm)],
+            Self::Table(table) => table.knots[table.line(d_mm)].n_per_mm,
         }
     }
 }
@@ -438,11 +402,11 @@ const KNOTS: usize = 2048;
 /// The local compression is `dL = sqrt(a^2 - r^2) - (a - d) + h(x, y)` and the pressure `Y dL / L`, `L = sqrt(a^2 -
 /// r^2)`, so with polar coordinates, as `r dr = -L dL`, the force is `Y` times the integral of `dL` over `L` and the
 /// angle: sample by sample, a ramp that begins at the clearance `a - L - h` of the sample.
-fn shaped(effects: &Named, tip: &Tip) -> (Elastic, Vec<[f64; 3]>) {
+fn shaped(effects: &Named, tip: &Tip) -> Elastic {
     let mut samples = samples(effects, tip);
     samples.sort_by(|a, b| a.clearance_mm.total_cmp(&b.clearance_mm));
     let deepest_mm = Tip::DEEPEST * tip.radius_mm;
-    let (mut d_mm, mut force_n, mut centres) = (Vec::new(), Vec::new(), Vec::new());
+    let mut knots: Vec<Knot> = Vec::with_capacity(KNOTS + 1);
     // Sums over the touching samples of weight and weight times clearance, alone and times the place.
     let mut sums = [[0.0; 2]; 3];
     let mut reached = samples.iter().peekable();
@@ -456,13 +420,19 @@ fn shaped(effects: &Named, tip: &Tip) -> (Elastic, Vec<[f64; 3]>) {
             }
         }
         let [force, x, y] = sums.map(|[weight, clearance]| (weight * depth_mm - clearance) * tip.modulus_kpa * 1e-3);
-        let before = force_n.last().copied().unwrap_or(0.0);
-        let force = if knot == 0 { 0.0 } else { f64::max(force, before) };
-        d_mm.push(depth_mm);
-        force_n.push(force);
-        centres.push([depth_mm, if force > 0.0 { x / force } else { 0.0 }, if force > 0.0 { y / force } else { 0.0 }]);
+        let mut next = Knot { d_mm: depth_mm, ..Knot::default() };
+        if let Some(before) = knots.last_mut() {
+            let further_mm = depth_mm - before.d_mm;
+            next.force_n = f64::max(force, before.force_n);
+            next.energy_mj = before.energy_mj + 0.5 * (next.force_n + before.force_n) * further_mm;
+            before.n_per_mm = (next.force_n - before.force_n) / further_mm;
+        }
+        if next.force_n > 0.0 {
+            next.centre_mm = [x, y].map(|moment| moment / next.force_n);
+        }
+        knots.push(next);
     }
-    (Elastic::Table(Table::new(d_mm, force_n)), centres)
+    Elastic::Table(Table { knots, last: Cell::new(0) })
 }
 
 /// Place on the tip: the indentation at which it touches, and its weight in the integral.

@@ -289,7 +289,7 @@ impl Fed {
 /// or, off the object, at that of its shape.
 fn relaxing_mj(world: &World) -> f64 {
     let finger = &world.fingers[0];
-    let forgotten_n = finger.contact.law().forgotten_n;
+    let forgotten_n = finger.contact.law.forgotten_n;
     let n_per_mm2 = finger.setup.tip.force_per_mm2();
     let elastic_mj = |d: f64| n_per_mm2 * d * d * d / 3.0;
     let d_mm = (finger.flank_mm() - WALL_MM).max((forgotten_n / n_per_mm2).sqrt());

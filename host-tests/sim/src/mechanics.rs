@@ -10,7 +10,7 @@ pub mod rotor;
 use crate::effects::contact::Named;
 use crate::effects::drive::{self, Circuit, Friction};
 use crate::mechanics::contact::Contact;
-use crate::mechanics::rotor::{Acts, Rotor, Shaft, resistive};
+use crate::mechanics::rotor::{Acting, Resistance, Rotor, Shaft, Source};
 use crate::metrics;
 use crate::plant::Faults;
 use crate::setup::Setup;
@@ -91,7 +91,6 @@ pub struct Motion {
     rad_per_s2: f64,
     winding_a: f64,
     pub tip_mm: f64,
-    bridge: Bridge,
     pub circuit: Circuit,
     dt_s: f64,
 }
@@ -108,7 +107,7 @@ pub struct End {
 impl Finger {
     /// Creates a finger at rest at travel 0, with the bridge open.
     pub fn new(setup: &Setup, mut drive: drive::Named, contact: Named) -> Self {
-        let mm_per_rad = setup.transmission.drum_radius_mm / setup.transmission.ratio;
+        let mm_per_rad = setup.transmission.mm_per_rad();
         let rotor = Rotor {
             inertia_kg_m2: setup.motor.inertia_kg_m2 + drive.inertia.map(|part| part(mm_per_rad * 1e-3)).sum::<f64>(),
             torque_nm_per_a: setup.motor.torque_nm_per_a,
@@ -123,7 +122,7 @@ impl Finger {
             setup: setup.clone(),
             rotor,
             mm_per_rad,
-            now: Motion { circuit: Circuit::of(setup, 0.0), ..Motion::default() },
+            now: Motion { circuit: Circuit::of(setup, Bridge::Coast), ..Motion::default() },
             friction: Friction::default(),
             slipped_counts: 0,
             fallen_v: None,
@@ -144,44 +143,28 @@ impl Finger {
     pub fn prepare(&mut self, dt_s: f64, bridge: Bridge) {
         self.now.before = self.now.shaft;
         self.now.dt_s = dt_s;
-        self.now.bridge = bridge;
-        let duty = match bridge {
-            Bridge::Coast => 0.0,
-            Bridge::Driven { duty } => duty.clamp(-1.0, 1.0),
-        };
-        self.now.circuit = Circuit::of(&self.setup, duty);
-        self.now.circuit.source_v = self.fallen_v.unwrap_or(self.now.circuit.source_v) - self.faults.supply_drop_v;
+        let circuit = &mut self.now.circuit;
+        *circuit = Circuit::of(&self.setup, bridge);
+        circuit.source_v = self.fallen_v.unwrap_or(circuit.source_v) - self.faults.supply_drop_v;
         if self.faults.leads_swapped {
-            self.now.circuit.duty = -duty;
+            circuit.duty = -circuit.duty;
         }
         self.friction = Friction::default();
-        if self.drive.any() {
-            self.drive.electric.each(|part| part(&mut self.now.circuit));
-            self.drive.heat.each(|part| part.apply(&mut self.now.circuit));
-            let middle = self.now.shaft.speed_rad_per_s + 0.5 * dt_s * self.now.rad_per_s2;
-            self.drive.resist.each(|part| part(middle, &mut self.friction));
-        }
+        self.drive.electric.each(|part| part(circuit));
+        self.drive.heat.each(|part| part.apply(circuit));
+        let middle = self.now.shaft.speed_rad_per_s + 0.5 * dt_s * self.now.rad_per_s2;
+        self.drive.resist.each(|part| part(middle, &mut self.friction));
         self.rotor.torque_nm_per_a = self.now.circuit.torque_nm_per_a;
     }
 
     /// Returns the end of the prepared step against a load: its mean between two places of the pressing flank.
     #[inline]
     pub fn solve(&mut self, load_n: impl Fn(&Contact, f64, f64) -> f64) -> End {
-        let mut acting = Acts {
-            alone: !self.drive.any(),
-            drive: &mut self.drive,
-            circuit: &self.now.circuit,
-            open: self.now.bridge == Bridge::Coast,
-            friction: &self.friction,
-            mm_per_rad: self.mm_per_rad,
-            load_n: |from_mm, to_mm| load_n(&self.contact, from_mm, to_mm),
-            torque_nm_per_a: self.rotor.torque_nm_per_a,
-            winding_a: self.now.winding_a,
-            square_a2_s: 0.0,
-        };
-        let shaft = self.rotor.advance(self.now.shaft, self.now.dt_s, &mut acting);
-        let flank_mm = shaft.angle_rad * self.mm_per_rad;
-        End { shaft, flank_mm, winding_a: acting.winding_a, square_a2_s: acting.square_a2_s }
+        let (rotor, shaft, dt_s) = (self.rotor, self.now.shaft, self.now.dt_s);
+        let mut acting = Acts { winding_a: self.now.winding_a, square_a2_s: 0.0, finger: self, load_n };
+        let shaft = rotor.advance(shaft, dt_s, &mut acting);
+        let Acts { winding_a, square_a2_s, .. } = acting;
+        End { shaft, flank_mm: shaft.angle_rad * self.mm_per_rad, winding_a, square_a2_s }
     }
 
     /// Moves to the end of the step, where the surface of the object is at this travel.
@@ -194,10 +177,8 @@ impl Finger {
         }
         self.stop_at_ends();
         self.now.tip_mm = self.flank_mm();
-        if self.drive.any() {
-            self.drive.heat.each(|part| part.after(self.now.dt_s, end.square_a2_s));
-            self.drive.play.each(|part| self.now.tip_mm = part(self.now.tip_mm, surface_mm));
-        }
+        self.drive.heat.each(|part| part.after(self.now.dt_s, end.square_a2_s));
+        self.drive.play.each(|part| self.now.tip_mm = part(self.now.tip_mm, surface_mm));
     }
 
     fn stop_at_ends(&mut self) {
@@ -273,8 +254,7 @@ impl Finger {
         if self.now.circuit.henry > 0.0 {
             return self.now.winding_a;
         }
-        let source = resistive(&self.now.circuit, self.now.bridge == Bridge::Coast);
-        self.rotor.current_a(&source, self.now.shaft.speed_rad_per_s)
+        self.rotor.current_a(&self.now.circuit.source(), self.now.shaft.speed_rad_per_s)
     }
 
     pub fn supply_v(&self) -> f64 {
@@ -288,5 +268,74 @@ impl Finger {
         let turning_j = 0.5 * self.rotor.inertia_kg_m2 * speed * speed;
         let potential_j: f64 = self.drive.potential.parts().map(|part| part.energy_j(self.now.shaft.angle_rad)).sum();
         1e3 * (turning_j + winding_j + potential_j)
+    }
+}
+
+/// Everything that acts on the shaft of a finger during a step.
+struct Acts<'a, L> {
+    finger: &'a mut Finger,
+    /// Load of the tip: its mean between two places of the pressing flank.
+    load_n: L,
+    /// Current in the winding, at the start and then at the end of the step.
+    winding_a: f64,
+    /// Integral of the square of the current over the step.
+    square_a2_s: f64,
+}
+
+impl<L> Acts<'_, L> {
+    /// exp(-x) and its mean from 0 to x, x the time in units of L / R; none if the current follows at once.
+    fn kept(&self, dt_s: f64, ohms: f64) -> Option<[f64; 2]> {
+        let circuit = &self.finger.now.circuit;
+        if circuit.henry == 0.0 || circuit.open {
+            return None;
+        }
+        let x = dt_s * ohms / circuit.henry;
+        let end = decay(x);
+        let mean = if x < 0.01 {
+            1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0)))
+        } else {
+            (1.0 - end) / x
+        };
+        Some([end, mean])
+    }
+}
+
+impl<L: Fn(&Contact, f64, f64) -> f64> Acting for Acts<'_, L> {
+    fn resistance(&mut self, from_rad: f64, to_rad: f64) -> Resistance {
+        let Finger { contact, drive, friction, mm_per_rad, .. } = &mut *self.finger;
+        let load_n = (self.load_n)(contact, from_rad * *mm_per_rad, to_rad * *mm_per_rad);
+        let load_nm = *mm_per_rad * 1e-3 * load_n;
+        let shared = friction.load_share * load_nm;
+        let potential_nm: f64 = drive.potential.map(|part| part.mean_nm(from_rad, to_rad)).sum();
+        Resistance {
+            load_nm: load_nm + potential_nm,
+            sliding_nm: friction.sliding_nm + shared,
+            holding_nm: friction.holding_nm + shared,
+        }
+    }
+
+    fn source(&self, dt_s: f64) -> Source {
+        let source = self.finger.now.circuit.source();
+        // Exact at a constant speed: i = i_end + (i_0 - i_end) exp(-t R / L).
+        self.kept(dt_s, source.ohms).map_or(source, |[_, mean]| {
+            let given = 1.0 - mean;
+            Source { ohms: source.ohms / given, kept_a: mean * self.winding_a, ..source }
+        })
+    }
+
+    fn viscous_nm_s(&self) -> f64 {
+        self.finger.friction.viscous_nm_s
+    }
+
+    fn took(&mut self, dt_s: f64, mean_rad_per_s: f64) {
+        let source = self.finger.now.circuit.source();
+        let end_a = (source.volts - self.finger.rotor.torque_nm_per_a * mean_rad_per_s) / source.ohms;
+        // Without an inductance no transient is left.
+        let [end, mean] = self.kept(dt_s, source.ohms).unwrap_or_default();
+        let over_a = self.winding_a - end_a;
+        self.winding_a = end_a + over_a * end;
+        // Mean of the square: the transient's own mean square is mean (1 + end) / 2.
+        let square = end_a * (end_a + 2.0 * over_a * mean) + over_a * over_a * mean * 0.5 * (1.0 + end);
+        self.square_a2_s += square * dt_s;
     }
 }

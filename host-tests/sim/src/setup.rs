@@ -153,6 +153,18 @@ pub struct Transmission {
     pub efficiency: f64,
 }
 
+impl Transmission {
+    /// Travel of the tip per angle of the motor.
+    pub fn mm_per_rad(&self) -> f64 {
+        self.drum_radius_mm / self.ratio
+    }
+
+    /// Friction of the gear, as a share of the load.
+    pub fn load_share(&self) -> f64 {
+        1.0 / self.efficiency - 1.0
+    }
+}
+
 impl Default for Transmission {
     fn default() -> Self {
         Self { ratio: 43.0, drum_radius_mm: 12.0, efficiency: 0.7 }

@@ -34,8 +34,6 @@ pub struct World {
     body_before: Body,
     dt_s: f64,
     happened: Happened,
-    /// True if no contact has an effect: a step then skips what only effects change.
-    bare: bool,
 }
 
 /// Direction in which a finger pushes.
@@ -50,17 +48,14 @@ impl World {
             effects.into_iter().map(|(drive, contact)| Finger::new(setup, drive, contact)).collect();
         let mass_kg =
             fingers[0].contact.effects.body.map(|kg| *kg).reduce(|all, more| all + more).filter(|kg| *kg > 0.0);
-        let body = Body::default();
-        let bare = fingers.iter().all(|finger| !finger.contact.effects.any());
         Self {
             fingers,
             around: around.clone(),
             mass_kg,
-            body,
-            body_before: body,
+            body: Body::default(),
+            body_before: Body::default(),
             dt_s: 0.0,
             happened: Happened::default(),
-            bare,
         }
     }
 
@@ -88,9 +83,7 @@ impl World {
     pub fn advance(&mut self, time_s: f64, dt_s: f64, bridges: &[Bridge]) {
         self.dt_s = dt_s;
         self.body_before = self.body;
-        if !self.bare {
-            self.relax(false);
-        }
+        self.relax(false);
         if !self.around.events.is_empty() {
             self.happen(time_s + dt_s);
         }
@@ -101,9 +94,7 @@ impl World {
             None => self.advance_fingers(time_s),
             Some(mass_kg) => self.advance_together(mass_kg, time_s),
         }
-        if !self.bare {
-            self.relax(true);
-        }
+        self.relax(true);
     }
 
     /// Applies the events of the scene up to a time. An object that is put back begins in front of the tips.
@@ -131,7 +122,7 @@ impl World {
     }
 
     /// Lets the tips relax for half a step. At the end of the step the object is then loaded.
-    #[inline(never)]
+    #[inline]
     fn relax(&mut self, ends: bool) {
         for index in 0..self.fingers.len() {
             let x_mm = self.overlap_mm(index);
@@ -149,13 +140,11 @@ impl World {
             let end = finger.solve(|contact: &Contact, from_mm, to_mm| contact.law.mean_n(from_mm - from, to_mm - to));
             finger.finish(&end, to);
         }
-        if !self.bare {
-            self.draw(time_s);
-        }
+        self.draw(time_s);
     }
 
     /// Moves a fixed object along the surfaces, as the scene requests.
-    #[inline(never)]
+    #[inline]
     fn draw(&mut self, time_s: f64) {
         let until_s = time_s + self.dt_s;
         for (index, finger) in self.fingers.iter_mut().enumerate() {
@@ -247,12 +236,14 @@ impl World {
     /// Returns the true state of a finger, with the pressures if requested.
     pub fn truth(&mut self, index: usize, pressures: bool) -> Truth {
         let force_n = self.force_n(index);
+        let row_kpa = |row| self.row_kpa(index, f64::INFINITY, row);
+        let pressures_kpa = if pressures { core::array::from_fn(row_kpa) } else { Default::default() };
         let finger = &self.fingers[index];
         let wall = &finger.setup.wall;
         let along = &finger.contact.along;
         let depth_mm = finger.contact.law.depth_mm(self.overlap_mm(index)).max(0.0);
         let [x, y] = finger.contact.centre_mm(depth_mm);
-        let mut truth = Truth {
+        Truth {
             force_n,
             indentation_mm: depth_mm,
             centre_mm: [wall.centre_x_mm + x, wall.centre_y_mm + y],
@@ -269,13 +260,9 @@ impl World {
             disturbed: self.happened.disturbed,
             defective: self.happened.defective,
             friction_n: finger.friction_n(),
-            ..Truth::default()
-        };
-        truth.broken = finger.contact.effects.strength.parts().any(|part| part.broken);
-        if pressures {
-            truth.pressures_kpa = core::array::from_fn(|row| self.row_kpa(index, f64::INFINITY, row));
+            broken: finger.contact.effects.strength.parts().any(|part| part.broken),
+            pressures_kpa,
         }
-        truth
     }
 }
 

@@ -7,7 +7,8 @@
 //! friction, a winding that is a resistance, an ideal source, and a rigid transmission.
 
 use crate::effects::{Description, Metered, Stage};
-use crate::mechanics::decay;
+use crate::mechanics::rotor::Source;
+use crate::mechanics::{Bridge, decay};
 use crate::scene::tables::Key;
 use crate::setup::Setup;
 use crate::watch::Cost;
@@ -18,6 +19,8 @@ pub struct Circuit {
     pub source_v: f64,
     /// Resistance of the source. The motor sees duty^2 of it.
     pub source_ohm: f64,
+    /// True if both half bridges are open.
+    pub open: bool,
     /// Share of the supply at the motor, -1 to 1.
     pub duty: f64,
     pub winding_ohm: f64,
@@ -31,15 +34,29 @@ pub struct Circuit {
 
 impl Circuit {
     /// Circuit of a setup, before any effect.
-    pub fn of(setup: &Setup, duty: f64) -> Self {
+    pub fn of(setup: &Setup, bridge: Bridge) -> Self {
+        let (open, duty) = match bridge {
+            Bridge::Coast => (true, 0.0),
+            Bridge::Driven { duty } => (false, duty.clamp(-1.0, 1.0)),
+        };
         Self {
             source_v: setup.supply.source_v,
+            open,
             duty,
             winding_ohm: setup.motor.resistance_ohm,
             bridge_ohm: setup.supply.bridge_ohm,
             torque_nm_per_a: setup.motor.torque_nm_per_a,
             ..Self::default()
         }
+    }
+
+    /// Source of the winding, without the effect of an inductance.
+    pub(crate) fn source(&self) -> Source {
+        if self.open {
+            return Source::OPEN;
+        }
+        let ohms = self.winding_ohm + self.bridge_ohm + self.duty * self.duty * self.source_ohm;
+        Source { volts: self.duty * self.source_v, ohms, ..Source::OPEN }
     }
 }
 

@@ -5,8 +5,6 @@
 //! friction and the winding remove energy. If the shaft comes to rest inside a step, the step is cut there. From rest
 //! it moves only if the drive exceeds friction.
 
-use crate::effects::drive::{Circuit, Friction, Named};
-use crate::mechanics::decay;
 use crate::setup::Setup;
 
 /// Angle and speed of the motor's shaft.
@@ -85,34 +83,32 @@ impl Rotor {
     pub fn advance(&self, mut shaft: Shaft, dt_s: f64, acting: &mut impl Acting) -> Shaft {
         let mut left_s = dt_s;
         for _ in 0..RESTS_MAX {
-            let Some(direction) = self.direction(&shaft, left_s, acting) else { break };
-            let (next, mean_speed) = self.slide(&shaft, left_s, direction, acting);
-            if next.speed_rad_per_s * direction >= 0.0 {
-                acting.took(left_s, mean_speed);
-                return next;
+            let Some((next, taken_s)) = self.advance_to_rest(&shaft, left_s, acting) else { break };
+            shaft = next;
+            if shaft.speed_rad_per_s != 0.0 {
+                return shaft;
             }
-            let (rest, taken_s) = self.come_to_rest(&shaft, left_s, direction, acting);
-            acting.took(taken_s, 0.5 * shaft.speed_rad_per_s);
-            shaft = rest;
             left_s -= taken_s;
         }
         acting.took(left_s, 0.0);
-        Shaft { speed_rad_per_s: 0.0, ..shaft }
+        shaft
     }
 
-    /// Advances as [`Rotor::advance`] while the shaft moves. The time taken is less than `dt_s` if it comes to rest.
-    pub fn advance_to_rest(&self, shaft: Shaft, dt_s: f64, acting: &mut impl Acting) -> (Shaft, f64) {
-        let Some(direction) = self.direction(&shaft, dt_s, acting) else { return (shaft, 0.0) };
-        let (next, _) = self.slide(&shaft, dt_s, direction, acting);
-        if next.speed_rad_per_s * direction > 0.0 {
-            (next, dt_s)
-        } else {
-            self.come_to_rest(&shaft, dt_s, direction, acting)
+    /// Advances until the shaft comes to rest, at most for `dt_s`. Returns the time taken; none while friction holds it.
+    fn advance_to_rest(&self, shaft: &Shaft, dt_s: f64, acting: &mut impl Acting) -> Option<(Shaft, f64)> {
+        let direction = self.direction(shaft, dt_s, acting)?;
+        let (mut next, mut mean_speed) = self.slide(shaft, dt_s, direction, acting);
+        let mut taken_s = dt_s;
+        if next.speed_rad_per_s * direction < 0.0 {
+            (next, taken_s) = self.come_to_rest(shaft, dt_s, direction, acting);
+            mean_speed = 0.5 * shaft.speed_rad_per_s;
         }
+        acting.took(taken_s, mean_speed);
+        Some((next, taken_s))
     }
 
     /// Direction in which the shaft moves or starts to move; none while friction holds it.
-    pub fn direction(&self, shaft: &Shaft, dt_s: f64, acting: &mut impl Acting) -> Option<f64> {
+    fn direction(&self, shaft: &Shaft, dt_s: f64, acting: &mut impl Acting) -> Option<f64> {
         if shaft.speed_rad_per_s != 0.0 {
             return Some(shaft.speed_rad_per_s.signum());
         }
@@ -179,94 +175,6 @@ pub(crate) fn mean_square(factor: f64, x0: f64, x1: f64) -> f64 {
     factor * (d0 * d0 + d0 * d1 + d1 * d1) / 3.0 * share
 }
 
-/// Returns the source without the effect of an inductance.
-pub(crate) fn resistive(circuit: &Circuit, open: bool) -> Source {
-    if open {
-        return Source::OPEN;
-    }
-    let ohms = circuit.winding_ohm + circuit.bridge_ohm + circuit.duty * circuit.duty * circuit.source_ohm;
-    Source { volts: circuit.duty * circuit.source_v, ohms, ..Source::OPEN }
-}
-
-/// Everything that acts on the shaft of a finger.
-pub(crate) struct Acts<'a, L> {
-    pub drive: &'a mut Named,
-    /// True if the drive has no effects.
-    pub alone: bool,
-    pub circuit: &'a Circuit,
-    pub open: bool,
-    pub friction: &'a Friction,
-    pub mm_per_rad: f64,
-    /// Load of the tip: its mean between two places of the pressing flank.
-    pub load_n: L,
-    pub torque_nm_per_a: f64,
-    /// Current in the winding, at the start and then at the end of the step.
-    pub winding_a: f64,
-    /// Integral of the square of the current over the step.
-    pub square_a2_s: f64,
-}
-
-impl<L> Acts<'_, L> {
-    /// exp(-x) and its mean from 0 to x, x the time in units of L / R.
-    fn kept(&self, dt_s: f64, ohms: f64) -> [f64; 2] {
-        let x = dt_s * ohms / self.circuit.henry;
-        let end = decay(x);
-        let mean = if x < 0.01 {
-            1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0)))
-        } else {
-            (1.0 - end) / x
-        };
-        [end, mean]
-    }
-}
-
-impl<L: Fn(f64, f64) -> f64> Acting for Acts<'_, L> {
-    fn resistance(&mut self, from_rad: f64, to_rad: f64) -> Resistance {
-        let load_n = (self.load_n)(from_rad * self.mm_per_rad, to_rad * self.mm_per_rad);
-        let load_nm = self.mm_per_rad * 1e-3 * load_n;
-        let shared = self.friction.load_share * load_nm;
-        let potential = &mut self.drive.potential;
-        let potential_nm =
-            if self.alone { 0.0 } else { potential.map(|part| part.mean_nm(from_rad, to_rad)).sum::<f64>() };
-        Resistance {
-            load_nm: load_nm + potential_nm,
-            sliding_nm: self.friction.sliding_nm + shared,
-            holding_nm: self.friction.holding_nm + shared,
-        }
-    }
-
-    fn source(&self, dt_s: f64) -> Source {
-        let source = resistive(self.circuit, self.open);
-        if self.circuit.henry == 0.0 || self.open {
-            return source;
-        }
-        // Exact at a constant speed: i = i_end + (i_0 - i_end) exp(-t R / L).
-        let [_, mean] = self.kept(dt_s, source.ohms);
-        let given = 1.0 - mean;
-        Source { ohms: source.ohms / given, kept_a: mean * self.winding_a, ..source }
-    }
-
-    fn viscous_nm_s(&self) -> f64 {
-        self.friction.viscous_nm_s
-    }
-
-    fn took(&mut self, dt_s: f64, mean_rad_per_s: f64) {
-        let source = resistive(self.circuit, self.open);
-        let end_a = (source.volts - self.torque_nm_per_a * mean_rad_per_s) / source.ohms;
-        if self.circuit.henry == 0.0 || self.open {
-            self.winding_a = end_a;
-            self.square_a2_s += end_a * end_a * dt_s;
-            return;
-        }
-        let [end, mean] = self.kept(dt_s, source.ohms);
-        let over_a = self.winding_a - end_a;
-        self.winding_a = end_a + over_a * end;
-        // Mean of the square: the transient's own mean square is mean (1 + end) / 2.
-        let square = end_a * (end_a + 2.0 * over_a * mean) + over_a * over_a * mean * 0.5 * (1.0 + end);
-        self.square_a2_s += square * dt_s;
-    }
-}
-
 /// Step of the shooting. Its error is of second order.
 const STEP_S: f64 = 20e-6;
 /// Duration from which on a motion counts as impossible.
@@ -284,8 +192,6 @@ pub struct Profile {
     pub switch_s: f64,
     /// Time at which the tip is at rest.
     pub total_s: f64,
-    /// Place of the tip at rest.
-    pub end_mm: f64,
 }
 
 /// Reason why the motor cannot reach a place within its limits.
@@ -313,11 +219,12 @@ pub fn profile(
     current_limit: f64,
 ) -> Result<Profile, Unreachable> {
     if d_from_mm == d_to_mm {
-        return Ok(Profile { switch_s: 0.0, total_s: 0.0, end_mm: d_to_mm });
+        return Ok(Profile { switch_s: 0.0, total_s: 0.0 });
     }
     let shooting = Shooting::new(setup, d_from_mm, d_to_mm, voltage_limit, current_limit);
+    let reaches = |switch_s| Ok(shooting.passed(&shooting.shoot(switch_s)?.0));
     let (mut short_s, mut long_s) = (0.0, STEP_S);
-    while !shooting.shoot(long_s)?.far_enough {
+    while !reaches(long_s)? {
         short_s = long_s;
         long_s *= 2.0;
         if long_s > LONGEST_S {
@@ -326,43 +233,28 @@ pub fn profile(
     }
     for _ in 0..HALVINGS {
         let middle_s = 0.5 * (short_s + long_s);
-        if shooting.shoot(middle_s)?.far_enough {
-            long_s = middle_s;
-        } else {
-            short_s = middle_s;
-        }
+        *(if reaches(middle_s)? { &mut long_s } else { &mut short_s }) = middle_s;
     }
-    let hit = shooting.shoot(short_s)?;
-    let end_mm = shooting.indentation_mm(hit.end_rad);
-    if (end_mm - d_to_mm).abs() > END_MM {
+    let (end, total_s) = shooting.shoot(short_s)?;
+    if (shooting.indentation_mm(end.angle_rad) - d_to_mm).abs() > END_MM {
         return Err(Unreachable::RunsAway);
     }
-    Ok(Profile { switch_s: short_s, total_s: hit.total_s, end_mm })
+    Ok(Profile { switch_s: short_s, total_s })
 }
 
 /// Motions against a rigid wall, in SI units at the shaft of the motor and mm at the tip.
-struct Shooting {
+struct Shooting<'a> {
+    setup: &'a Setup,
     rotor: Rotor,
-    friction_nm: f64,
-    friction_share: f64,
     mm_per_rad: f64,
-    wall_mm: f64,
-    force_per_mm2: f64,
     drive: Source,
     from_rad: f64,
     to_rad: f64,
 }
 
-struct Hit {
-    end_rad: f64,
-    total_s: f64,
-    far_enough: bool,
-}
-
-impl Shooting {
-    fn new(setup: &Setup, d_from_mm: f64, d_to_mm: f64, voltage_limit: f64, current_limit: f64) -> Self {
-        let (gear, supply) = (&setup.transmission, &setup.supply);
-        let (mm_per_rad, wall_mm) = (gear.drum_radius_mm / gear.ratio, setup.wall.distance_mm);
+impl<'a> Shooting<'a> {
+    fn new(setup: &'a Setup, d_from_mm: f64, d_to_mm: f64, voltage_limit: f64, current_limit: f64) -> Self {
+        let (supply, mm_per_rad) = (&setup.supply, setup.transmission.mm_per_rad());
         let duty = (voltage_limit / supply.source_v).min(1.0);
         let drive = Source {
             volts: duty * supply.source_v * (d_to_mm - d_from_mm).signum(),
@@ -370,51 +262,43 @@ impl Shooting {
             limit_a: current_limit,
             kept_a: 0.0,
         };
-        Self {
-            rotor: Rotor {
-                inertia_kg_m2: setup.motor.inertia_kg_m2,
-                torque_nm_per_a: setup.motor.torque_nm_per_a,
-                rounds: ROUNDS,
-                tolerance: 0.0,
-            },
-            friction_nm: setup.motor.friction_nm,
-            friction_share: 1.0 / gear.efficiency - 1.0,
-            mm_per_rad,
-            wall_mm,
-            force_per_mm2: setup.tip.force_per_mm2(),
-            drive,
-            from_rad: (wall_mm + d_from_mm) / mm_per_rad,
-            to_rad: (wall_mm + d_to_mm) / mm_per_rad,
-        }
+        let rotor = Rotor {
+            inertia_kg_m2: setup.motor.inertia_kg_m2,
+            torque_nm_per_a: setup.motor.torque_nm_per_a,
+            rounds: ROUNDS,
+            tolerance: 0.0,
+        };
+        let [from_rad, to_rad] = [d_from_mm, d_to_mm].map(|d_mm| (setup.wall.distance_mm + d_mm) / mm_per_rad);
+        Self { setup, rotor, mm_per_rad, drive, from_rad, to_rad }
     }
 
     fn indentation_mm(&self, angle_rad: f64) -> f64 {
-        angle_rad * self.mm_per_rad - self.wall_mm
+        angle_rad * self.mm_per_rad - self.setup.wall.distance_mm
     }
 
-    /// Drives until `switch_s`, brakes to rest.
-    fn shoot(&self, switch_s: f64) -> Result<Hit, Unreachable> {
+    /// Drives until `switch_s`, then brakes. Returns the shaft at rest or past the target, and the time.
+    fn shoot(&self, switch_s: f64) -> Result<(Shaft, f64), Unreachable> {
         let mut shaft = Shaft { angle_rad: self.from_rad, speed_rad_per_s: 0.0 };
         let mut time_s = 0.0;
         while time_s < switch_s && !self.passed(&shaft) {
             let step_s = STEP_S.min(switch_s - time_s);
-            let (next, taken_s) = self.rotor.advance_to_rest(shaft, step_s, &mut (self, &self.drive));
-            if taken_s < step_s {
+            let moved = self.rotor.advance_to_rest(&shaft, step_s, &mut (self, &self.drive));
+            let Some((next, _)) = moved.filter(|(_, taken_s)| *taken_s == step_s) else {
                 return Err(Unreachable::TooWeak);
-            }
+            };
             shaft = next;
             time_s += step_s;
         }
         let brake = Source { volts: -self.drive.volts, ..self.drive };
         while shaft.speed_rad_per_s != 0.0 && !self.passed(&shaft) {
-            let (next, taken_s) = self.rotor.advance_to_rest(shaft, STEP_S, &mut (self, &brake));
+            let Some((next, taken_s)) = self.rotor.advance_to_rest(&shaft, STEP_S, &mut (self, &brake)) else { break };
             shaft = next;
             time_s += taken_s;
             if time_s > 2.0 * LONGEST_S {
                 return Err(Unreachable::RunsAway);
             }
         }
-        Ok(Hit { end_rad: shaft.angle_rad, total_s: time_s, far_enough: self.passed(&shaft) })
+        Ok((shaft, time_s))
     }
 
     fn passed(&self, shaft: &Shaft) -> bool {
@@ -422,12 +306,12 @@ impl Shooting {
     }
 }
 
-impl Acting for (&Shooting, &Source) {
+impl Acting for (&Shooting<'_>, &Source) {
     fn resistance(&mut self, from_rad: f64, to_rad: f64) -> Resistance {
-        let Shooting { friction_nm, friction_share, force_per_mm2, mm_per_rad, .. } = *self.0;
+        let Shooting { setup: Setup { tip, motor, transmission, .. }, mm_per_rad, .. } = self.0;
         let [from_mm, to_mm] = [from_rad, to_rad].map(|angle_rad| self.0.indentation_mm(angle_rad));
-        let load_nm = mean_square(mm_per_rad * 1e-3 * force_per_mm2, from_mm, to_mm);
-        let friction = friction_nm + friction_share * load_nm;
+        let load_nm = mean_square(mm_per_rad * 1e-3 * tip.force_per_mm2(), from_mm, to_mm);
+        let friction = motor.friction_nm + transmission.load_share() * load_nm;
         Resistance { load_nm, sliding_nm: friction, holding_nm: friction }
     }
 

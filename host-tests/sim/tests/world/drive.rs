@@ -124,6 +124,7 @@ fn the_winding_warms_up_like_its_closed_form() {
     for step_s in [1e-4, 0.1, 3.0] {
         let mut drive = parts(text, 1).drive;
         let cold = Circuit {
+            open: false,
             source_v: 6.0,
             source_ohm: 0.0,
             duty: 1.0,

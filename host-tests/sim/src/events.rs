@@ -14,10 +14,10 @@ use fingertip::shipped::{COLUMNS, ROWS, SLOTS};
 
 /// Largest code of the converter.
 const CODE_MAX: i64 = 4095;
-/// Times of the requests for a tare and for a recovery after their event's start, s: torque off, the request itself, torque
-/// on. The controller accepts both requests with torque off only.
-const TARE_S: [f64; 3] = [0.0, 0.02, 0.1];
-const RECOVER_S: [f64; 3] = [0.0, 0.02, 0.04];
+/// Times of a request for a tare or a recovery, and of torque on, after their event's start, s. Torque goes off at the start:
+/// the controller accepts both requests with torque off only.
+const TARE_S: [f64; 2] = [0.02, 0.1];
+const RECOVER_S: [f64; 2] = [0.02, 0.04];
 /// Time that the controller needs afterwards, s: until then the finger is not judged as undisturbed.
 const REQUEST_S: f64 = 0.02;
 /// Time after a defect for which it may still be the cause of a fault, s.
@@ -91,18 +91,12 @@ enum What {
     Move { by_mm: f64 },
     Oscillate { amplitude_mm: f64, rate_hz: f64 },
     Removed,
-    TorqueOff,
-    Tare,
-    Recover,
+    // Torque off, after the first time the request, after the second time torque on.
+    Ask { request: Option<Request>, after_s: [f64; 2] },
     Slip { counts: i32 },
     Supply { volts: f64 },
-    Array(Defect),
     Silent,
-}
-
-/// Action of an event on the codes of the array.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Defect {
+    // The codes of the array.
     Stuck { row: usize, column: Option<usize>, code: u16 },
     Gain { factor: f64 },
     Blank,
@@ -114,7 +108,7 @@ impl Event {
     /// Creates an event of a kind from the checked values of its table.
     pub fn new(kind: &Table, values: Values) -> Self {
         let (at_s, number) = (values.number("at_s"), |name: &str| values.number(name));
-        let stuck = |column| Defect::Stuck { row: number("row") as usize, column, code: number("to_codes") as u16 };
+        let stuck = |column| What::Stuck { row: number("row") as usize, column, code: number("to_codes") as u16 };
         let for_s = values.optional("for_s").unwrap_or_default();
         let (what, for_s) = match kind.name {
             "object_move" => (What::Move { by_mm: number("by_mm") }, number("by_mm").abs() / number("speed_mm_per_s")),
@@ -124,17 +118,17 @@ impl Event {
                 (What::Oscillate { amplitude_mm: number("amplitude_mm"), rate_hz }, periods / rate_hz)
             }
             "object_removed" => (What::Removed, for_s),
-            "torque_off" => (What::TorqueOff, for_s),
-            "tare" => (What::Tare, TARE_S[2] + REQUEST_S),
-            "recover" => (What::Recover, RECOVER_S[2] + REQUEST_S),
+            "torque_off" => (What::Ask { request: None, after_s: [0.0, for_s] }, for_s),
+            "tare" => (What::Ask { request: Some(Request::Tare), after_s: TARE_S }, TARE_S[1] + REQUEST_S),
+            "recover" => (What::Ask { request: Some(Request::Clear), after_s: RECOVER_S }, RECOVER_S[1] + REQUEST_S),
             "encoder_slip" => (What::Slip { counts: number("by_counts") as i32 }, 0.0),
             "brown_out" => (What::Supply { volts: number("to_v") }, for_s),
-            "taxel_stuck" => (What::Array(stuck(Some(number("column") as usize))), for_s),
-            "row_stuck" => (What::Array(stuck(None)), for_s),
-            "gain_change" => (What::Array(Defect::Gain { factor: number("factor") }), for_s),
-            "array_blank" => (What::Array(Defect::Blank), for_s),
-            "array_frozen" => (What::Array(Defect::Frozen), for_s),
-            "interference" => (What::Array(Defect::Random), for_s),
+            "taxel_stuck" => (stuck(Some(number("column") as usize)), for_s),
+            "row_stuck" => (stuck(None), for_s),
+            "gain_change" => (What::Gain { factor: number("factor") }, for_s),
+            "array_blank" => (What::Blank, for_s),
+            "array_frozen" => (What::Frozen, for_s),
+            "interference" => (What::Random, for_s),
             _ => (What::Silent, for_s),
         };
         let defect = KINDS.iter().skip(FIRST_DEFECT).any(|table| table.name == kind.name);
@@ -147,7 +141,7 @@ impl Event {
 
     /// True if the event draws random numbers.
     pub fn is_random(&self) -> bool {
-        self.what == What::Array(Defect::Random) && self.until_s > self.at_s
+        self.what == What::Random && self.until_s > self.at_s
     }
 
     pub fn moves_object(&self) -> bool {
@@ -202,7 +196,7 @@ impl Happened {
 
 /// Defects of the array of one finger, with the codes that some of them repeat.
 #[derive(Clone, Debug)]
-pub(crate) struct ArrayEvents {
+pub struct ArrayEvents {
     events: Vec<Event>,
     untouched: [[u16; COLUMNS]; SLOTS],
     last: [[u16; COLUMNS]; SLOTS],
@@ -211,33 +205,35 @@ pub(crate) struct ArrayEvents {
 
 impl ArrayEvents {
     /// Returns the defects of a scene; `None` if it has none.
-    pub fn of(scene: &Scene, finger: usize) -> Option<Box<Self>> {
-        let events = scene.events.iter().filter(|event| matches!(event.what, What::Array(_)));
-        let events: Vec<Event> = events.cloned().collect();
+    pub fn of(scene: &Scene, finger: usize) -> Option<Self> {
+        let changes_codes = |event: &&Event| {
+            matches!(event.what, What::Stuck { .. } | What::Gain { .. } | What::Blank | What::Frozen | What::Random)
+        };
+        let events: Vec<Event> = scene.events.iter().filter(changes_codes).cloned().collect();
         let codes = [[0; COLUMNS]; SLOTS];
         let rng = Rng::with_seed(stream(scene.seed, "interference", finger));
-        (!events.is_empty()).then(|| Box::new(Self { events, untouched: codes, last: codes, rng }))
+        (!events.is_empty()).then_some(Self { events, untouched: codes, last: codes, rng })
     }
 
-    pub fn change(&mut self, slot: usize, time_s: f64, codes: &mut [u16; COLUMNS]) {
+    pub(crate) fn change(&mut self, slot: usize, time_s: f64, codes: &mut [u16; COLUMNS]) {
         if time_s < 0.0 {
             self.untouched[slot] = *codes;
         }
         for event in self.events.iter().filter(|event| event.active(time_s)) {
             match event.what {
-                What::Array(Defect::Stuck { row, column, code }) if row == slot => match column {
+                What::Stuck { row, column, code } if row == slot => match column {
                     Some(column) => codes[column] = code,
                     None => codes.fill(code),
                 },
-                What::Array(Defect::Gain { factor }) => {
+                What::Gain { factor } => {
                     for (code, untouched) in codes.iter_mut().zip(self.untouched[slot]) {
                         let [code_now, rest] = [*code, untouched].map(f64::from);
                         *code = (rest + factor * (code_now - rest)).clamp(0.0, CODE_MAX as f64) as u16;
                     }
                 }
-                What::Array(Defect::Blank) => *codes = self.untouched[slot],
-                What::Array(Defect::Frozen) => *codes = self.last[slot],
-                What::Array(Defect::Random) => codes.fill_with(|| self.rng.u16(0..=CODE_MAX as u16)),
+                What::Blank => *codes = self.untouched[slot],
+                What::Frozen => *codes = self.last[slot],
+                What::Random => codes.fill_with(|| self.rng.u16(0..=CODE_MAX as u16)),
                 _ => {}
             }
         }
@@ -256,19 +252,13 @@ pub enum Request {
 impl Request {
     /// Returns the requests of the events of a scene, sorted by time.
     pub fn all(events: &[Event]) -> Vec<(f64, Self)> {
-        let asked = |at_s: f64, after_s: [f64; 3], request: Self| {
-            let requests = [Self::Torque(false), request, Self::Torque(true)];
-            after_s.map(|after_s| at_s + after_s).into_iter().zip(requests)
-        };
         let mut all = Vec::new();
         for event in events {
-            match event.what {
-                What::TorqueOff => {
-                    all.extend([(event.at_s, Self::Torque(false)), (event.until_s, Self::Torque(true))]);
-                }
-                What::Tare => all.extend(asked(event.at_s, TARE_S, Self::Tare)),
-                What::Recover => all.extend(asked(event.at_s, RECOVER_S, Self::Clear)),
-                _ => {}
+            if let What::Ask { request, after_s } = event.what {
+                let [request_s, on_s] = after_s.map(|after_s| event.at_s + after_s);
+                all.push((event.at_s, Self::Torque(false)));
+                all.extend(request.map(|request| (request_s, request)));
+                all.push((on_s, Self::Torque(true)));
             }
         }
         all.sort_by(|(a_s, _), (b_s, _)| a_s.total_cmp(b_s));

@@ -10,6 +10,7 @@ pub mod served;
 
 use crate::effects::sensor::{self, Readout};
 use crate::effects::{Parts, link};
+use crate::events::ArrayEvents;
 use crate::host::{Host, Reading};
 use crate::mechanics::Bridge;
 use crate::mechanics::contact::Place;
@@ -107,10 +108,10 @@ impl Board {
         let (mut units, mut effects) = (Vec::new(), Vec::new());
         for (finger, parts) in fingers.enumerate() {
             effects.push((parts.drive, parts.contact));
-            let readout = Readout::new(&setup.array).with_events(scene, finger);
+            let readout = Readout::new(&setup.array, ArrayEvents::of(scene, finger));
             units.push(Unit {
                 pipeline: Pipeline::new(config),
-                repeats: scene.effects.iter().all(sensor::repeats) && !readout.eventful(),
+                repeats: scene.effects.iter().all(sensor::repeats) && readout.events.is_none(),
                 readout,
                 sensor: parts.sensor,
                 link: parts.link,

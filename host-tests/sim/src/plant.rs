@@ -27,7 +27,7 @@ impl Plant {
     pub fn new(setup: &Setup) -> Self {
         let Parts { sensor, contact, drive, .. } = parts(setup);
         let world = World::new(setup, &Surroundings::default(), vec![(drive, contact)]);
-        let readout = Readout::new(&setup.array);
+        let readout = Readout::new(&setup.array, None);
         Self { faults: Faults::default(), world, sensor, readout }
     }
 

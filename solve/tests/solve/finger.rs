@@ -128,7 +128,7 @@ impl Finger {
         let scene = draw.scene(&Place::default());
         let parts = Parts::of(&scene, 0);
         let setup = scene.setup();
-        let (readout, contact) = (Readout::new(&setup.array), Contact::new(&setup, parts.contact));
+        let (readout, contact) = (Readout::new(&setup.array, None), Contact::new(&setup, parts.contact));
         let tare = [[0.0; COLUMNS]; ROWS];
         Self {
             draw: draw.clone(),

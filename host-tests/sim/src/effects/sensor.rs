@@ -10,7 +10,6 @@ use crate::effects::{Description, Metered, NamedEffect, Stage, family_of, normal
 use crate::events::ArrayEvents;
 use crate::mechanics::decay;
 use crate::plant::{self, ArrayFaults};
-use crate::scene::Scene;
 use crate::scene::tables::{Key, Kind};
 use crate::setup::Array;
 use crate::watch::Cost;
@@ -73,64 +72,39 @@ impl Named {
 /// Readout of the array of one finger.
 pub struct Readout {
     array: Array,
-    volts_per_siemens: f64,
-    codes_per_volt: f64,
     siemens: [Row; ROWS],
-    events: Option<Box<ArrayEvents>>,
+    pub events: Option<ArrayEvents>,
     /// Defects; none if the array is sound.
     pub faults: Option<ArrayFaults>,
 }
 
 impl Readout {
-    /// Readout with perfect row switches. Effects decide on `row_ohm` and `settle_tau_s` of the array.
-    pub fn new(array: &Array) -> Self {
-        let volts_per_siemens = array.feedback_ohm * array.drive_v;
-        let codes_per_volt = Array::CODES / array.reference_v;
+    /// Readout with perfect row switches, with the events of the scene that change codes. Effects decide on `row_ohm` and
+    /// `settle_tau_s` of the array.
+    pub fn new(array: &Array, events: Option<ArrayEvents>) -> Self {
         let siemens = [[array.preload_siemens; COLUMNS]; ROWS];
-        Self { array: *array, volts_per_siemens, codes_per_volt, siemens, events: None, faults: None }
-    }
-
-    /// Adds the events of a scene that change the codes of a finger.
-    pub fn with_events(self, scene: &Scene, finger: usize) -> Self {
-        Self { events: ArrayEvents::of(scene, finger), ..self }
-    }
-
-    /// True if events of the scene change codes.
-    pub fn eventful(&self) -> bool {
-        self.events.is_some()
+        Self { array: *array, siemens, events, faults: None }
     }
 
     /// Returns the codes of a slot sampled at a time, for the pressures on its row (unused where no row is driven).
     pub fn codes(&mut self, stages: &mut Named, slot: usize, time_s: f64, kpa: &Row) -> [u16; COLUMNS] {
-        let mut codes =
-            if stages.any() { self.through(stages, slot, time_s, kpa) } else { self.ideal(slot, time_s, kpa) };
+        let mut volts = [self.array.ground_v; COLUMNS];
+        if slot < ROWS {
+            self.add_row(stages, slot, time_s, kpa, &mut volts);
+        }
+        stages.volts.each(|part| part(slot, time_s, &mut volts));
+        let codes_per_volt = Array::CODES / self.array.reference_v;
+        let mut codes = volts.map(|volts| volts * codes_per_volt);
+        stages.codes.each(|part| part(slot, time_s, &mut codes));
+        // The conversion to an integer rounds down, and negative values become 0.
+        let mut codes = codes.map(|code| (code as u16).min(Array::CODES as u16 - 1));
         if let Some(events) = &mut self.events {
             events.change(slot, time_s, &mut codes);
         }
         codes
     }
 
-    /// Without effects a row stays in registers through all stages.
-    #[inline(never)]
-    fn ideal(&mut self, slot: usize, time_s: f64, kpa: &Row) -> [u16; COLUMNS] {
-        self.through(&mut Named::default(), slot, time_s, kpa)
-    }
-
-    #[inline(always)]
-    fn through(&mut self, stages: &mut Named, slot: usize, time_s: f64, kpa: &Row) -> [u16; COLUMNS] {
-        let mut volts = [self.array.ground_v; COLUMNS];
-        if slot < ROWS {
-            self.add_row(stages, slot, time_s, kpa, &mut volts);
-        }
-        stages.volts.each(|part| part(slot, time_s, &mut volts));
-        let mut codes = volts.map(|volts| volts * self.codes_per_volt);
-        stages.codes.each(|part| part(slot, time_s, &mut codes));
-        // The conversion to an integer rounds down, and negative values become 0.
-        codes.map(|code| (code as u16).min(Array::CODES as u16 - 1))
-    }
-
     /// Adds the voltages of a driven row under these pressures.
-    #[inline(always)]
     pub fn add_row(&mut self, stages: &mut Named, row: usize, time_s: f64, kpa: &Row, volts: &mut Row) {
         let (array, mut kpa) = (&self.array, *kpa);
         stages.pressure.each(|part| part(row, time_s, &mut kpa));
@@ -148,10 +122,11 @@ impl Readout {
                 };
             }
         }
+        let volts_per_siemens = array.feedback_ohm * array.drive_v;
         let mut seen = self.siemens[row];
         stages.network.each(|part| part(row, &self.siemens, &mut seen));
         for (volts, siemens) in volts.iter_mut().zip(seen) {
-            *volts += siemens * self.volts_per_siemens;
+            *volts += siemens * volts_per_siemens;
         }
     }
 }

@@ -28,7 +28,7 @@ fn names() -> Vec<&'static str> {
 /// Scans frames of a random world.
 fn scan(stages: &mut sensor::Named, frames: usize, seed: u64) -> Vec<[u16; COLUMNS]> {
     let mut rng = fastrand::Rng::with_seed(seed);
-    let mut readout = Readout::new(&Array::default());
+    let mut readout = Readout::new(&Array::default(), None);
     let mut codes = Vec::new();
     let mut time_s = -0.01;
     for _ in 0..frames {

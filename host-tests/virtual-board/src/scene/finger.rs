@@ -7,6 +7,7 @@ use fingertip::shipped::{COLUMNS, Frame, ROWS, SLOTS};
 use sim::SimError;
 use sim::effects::Parts;
 use sim::effects::sensor::{self, Readout};
+use sim::events::ArrayEvents;
 use sim::mechanics::Bridge;
 use sim::scene::Scene;
 use sim::setup::Array;
@@ -107,7 +108,7 @@ impl Finger {
             from_s: moves_from_s,
             joint,
             sensor,
-            readout: Readout::new(&setup.array).with_events(scene, number),
+            readout: Readout::new(&setup.array, ArrayEvents::of(scene, number)),
             reference_v: setup.array.reference_v,
             expected: VecDeque::new(),
             sampled: VecDeque::new(),

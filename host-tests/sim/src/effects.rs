@@ -144,7 +144,6 @@ impl<T: ?Sized> Stage<T> {
     }
 
     /// Calls each effect.
-    #[inline]
     pub fn each(&mut self, mut f: impl FnMut(&mut T)) {
         self.0.iter_mut().for_each(|effect| effect.call(&mut f));
     }

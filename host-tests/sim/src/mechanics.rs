@@ -72,7 +72,7 @@ pub struct Finger {
     pub counts: i32,
     /// Setup; the surface of the object may be moved.
     pub setup: Setup,
-    rotor: Rotor,
+    pub rotor: Rotor,
     mm_per_rad: f64,
     /// State of the motion. A finger of the same setup continues from it to the bit.
     pub now: Motion,
@@ -134,12 +134,7 @@ impl Finger {
         self.rotor.inertia_kg_m2 / (self.mm_per_rad * 1e-3) / (self.mm_per_rad * 1e-3)
     }
 
-    pub fn inertia_kg_m2(&self) -> f64 {
-        self.rotor.inertia_kg_m2
-    }
-
     /// Sets what holds during the next step.
-    #[inline]
     pub fn prepare(&mut self, dt_s: f64, bridge: Bridge) {
         self.now.before = self.now.shaft;
         self.now.dt_s = dt_s;
@@ -158,7 +153,6 @@ impl Finger {
     }
 
     /// Returns the end of the prepared step against a load: its mean between two places of the pressing flank.
-    #[inline]
     pub fn solve(&mut self, load_n: impl Fn(&Contact, f64, f64) -> f64) -> End {
         let (rotor, shaft, dt_s) = (self.rotor, self.now.shaft, self.now.dt_s);
         let mut acting = Acts { winding_a: self.now.winding_a, square_a2_s: 0.0, finger: self, load_n };
@@ -168,7 +162,6 @@ impl Finger {
     }
 
     /// Moves to the end of the step, where the surface of the object is at this travel.
-    #[inline]
     pub fn finish(&mut self, end: &End, surface_mm: f64) {
         self.now.shaft = end.shaft;
         self.now.winding_a = end.winding_a;

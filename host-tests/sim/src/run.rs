@@ -43,6 +43,12 @@ impl Outcome {
     pub fn json(&self, scene: &Scene, board: &str, ablated: &[Without]) -> Value {
         let ablated =
             ablated.iter().map(|without| json!({ "effect": without.effect, "metrics": without.measured.json() }));
+        // Without the rest of the run.
+        let cost = |(effect, evaluations, wall_s, share_percent): (_, Option<u64>, _, _)| {
+            Some(
+                json!({ "effect": effect, "evaluations": evaluations?, "wall_s": wall_s, "share_percent": share_percent }),
+            )
+        };
         json!({
             "scene": scene.name,
             "about": scene.about,
@@ -56,7 +62,7 @@ impl Outcome {
             "passed": self.passed(),
             "metrics": self.measured.json(),
             "bounds": self.verdicts,
-            "ledger": ledger_json(&self.summary),
+            "ledger": ledger_rows(&self.summary).into_iter().filter_map(cost).collect::<Vec<_>>(),
             "without": ablated.collect::<Vec<_>>(),
         })
     }
@@ -157,15 +163,6 @@ pub fn ledger_rows(summary: &Summary) -> Vec<(&'static str, Option<u64>, f64, f6
     let effects = effects.map(|cost| (cost.effect, Some(cost.evaluations), cost.seconds, percent(cost.seconds)));
     let rest_s = (summary.wall_s - summary.ledger.iter().map(|cost| cost.seconds).sum::<f64>()).max(0.0);
     effects.chain([("everything else", None, rest_s, percent(rest_s))]).collect()
-}
-
-/// Returns the ledger for scripts, without the rest of the run.
-#[cfg(feature = "files")]
-pub fn ledger_json(summary: &Summary) -> Value {
-    let row = |(effect, evaluations, wall_s, share_percent): (_, Option<u64>, _, _)| {
-        Some(json!({ "effect": effect, "evaluations": evaluations?, "wall_s": wall_s, "share_percent": share_percent }))
-    };
-    ledger_rows(summary).into_iter().filter_map(row).collect()
 }
 
 /// Metrics without an effect.

@@ -1,7 +1,7 @@
 //! Components of the simulated board: plain data in the units of their names.
 
 /// Everything around the microcontroller. The defaults are the reference finger of `docs/board.md`.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Setup {
     pub tip: Tip,
     pub wall: Wall,
@@ -10,6 +10,26 @@ pub struct Setup {
     /// Transmission from the shaft of the motor to the tip.
     pub transmission: Transmission,
     pub supply: Supply,
+}
+
+impl Default for Setup {
+    fn default() -> Self {
+        Self {
+            tip: Tip::default(),
+            wall: Wall { distance_mm: 5.0, centre_x_mm: 0.0, centre_y_mm: 0.0 },
+            array: Array::default(),
+            // The data sheet of the FAULHABER 1331 T 006 SR with an IE2-400.
+            motor: Motor {
+                resistance_ohm: 2.83,
+                torque_nm_per_a: 5.35e-3,
+                inertia_kg_m2: 0.71e-7,
+                friction_nm: 0.12e-3,
+                encoder_counts_per_turn: 1600.0,
+            },
+            transmission: Transmission { ratio: 43.0, drum_radius_mm: 12.0, efficiency: 0.7 },
+            supply: Supply { source_v: 6.0, source_ohm: 0.1, bridge_ohm: 0.7 },
+        }
+    }
 }
 
 /// The hemispherical fingertip of Park, Kim and Hirai (2003).
@@ -35,12 +55,6 @@ pub struct Wall {
     pub centre_x_mm: f64,
     /// Contact centre from the array's middle, along the rows.
     pub centre_y_mm: f64,
-}
-
-impl Default for Wall {
-    fn default() -> Self {
-        Self { distance_mm: 5.0, centre_x_mm: 0.0, centre_y_mm: 0.0 }
-    }
 }
 
 /// A resistive array read at zero potential: one row driven, each column into a transimpedance amplifier.
@@ -118,7 +132,7 @@ impl Default for Array {
     }
 }
 
-/// A brushed motor with its encoder. The defaults are the data sheet of the FAULHABER 1331 T 006 SR with an IE2-400.
+/// A brushed motor with its encoder.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motor {
     pub resistance_ohm: f64,
@@ -128,18 +142,6 @@ pub struct Motor {
     /// Friction torque, independent of speed.
     pub friction_nm: f64,
     pub encoder_counts_per_turn: f64,
-}
-
-impl Default for Motor {
-    fn default() -> Self {
-        Self {
-            resistance_ohm: 2.83,
-            torque_nm_per_a: 5.35e-3,
-            inertia_kg_m2: 0.71e-7,
-            friction_nm: 0.12e-3,
-            encoder_counts_per_turn: 1600.0,
-        }
-    }
 }
 
 /// Gearhead, drum and tendon, rigid and without play.
@@ -165,12 +167,6 @@ impl Transmission {
     }
 }
 
-impl Default for Transmission {
-    fn default() -> Self {
-        Self { ratio: 43.0, drum_radius_mm: 12.0, efficiency: 0.7 }
-    }
-}
-
 /// An ideal source behind a resistance, and the bridge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Supply {
@@ -186,11 +182,5 @@ impl Supply {
     /// Resistance of the whole circuit at a duty u, in which the motor sees u^2 of the resistance of the source.
     pub fn circuit_ohm(&self, motor: &Motor, duty: f64) -> f64 {
         motor.resistance_ohm + self.bridge_ohm + duty * duty * self.source_ohm
-    }
-}
-
-impl Default for Supply {
-    fn default() -> Self {
-        Self { source_v: 6.0, source_ohm: 0.1, bridge_ohm: 0.7 }
     }
 }

@@ -3,7 +3,7 @@
 use crate::effects::drive::Cogging;
 use crate::effects::{contact, drive};
 use crate::events::{Event, Happened};
-use crate::mechanics::contact::{Contact, Place};
+use crate::mechanics::contact::{Along, Contact, Place};
 use crate::mechanics::{Bridge, Finger};
 use crate::native::SimError;
 use crate::scene::Scene;
@@ -65,8 +65,8 @@ impl World {
             let n_per_mm = finger.contact.steepest_n_per_mm(Tip::DEEPEST * finger.setup.tip.radius_mm);
             // An object between two fingers is pushed back by both.
             let lightness = 1.0 / finger.mass_kg() + self.mass_kg.map_or(0.0, |kg| 2.0 / kg);
-            let potential =
-                finger.drive.potential.parts().map(Cogging::steepest_nm_per_rad).sum::<f64>() / finger.inertia_kg_m2();
+            let potential = finger.drive.potential.parts().map(Cogging::steepest_nm_per_rad).sum::<f64>()
+                / finger.rotor.inertia_kg_m2;
             let allowed_s = STEP_RAD / (n_per_mm * 1e3 * lightness + potential).sqrt();
             if step_s > allowed_s {
                 let (step_us, allowed_us, mass_g) = (step_s * 1e6, allowed_s * 1e6, 1e3 / lightness);
@@ -79,7 +79,6 @@ impl World {
     }
 
     /// Advances by one step from a time with constant bridges, one for each finger.
-    #[inline]
     pub fn advance(&mut self, time_s: f64, dt_s: f64, bridges: &[Bridge]) {
         self.dt_s = dt_s;
         self.body_before = self.body;
@@ -98,7 +97,6 @@ impl World {
     }
 
     /// Applies the events of the scene up to a time. An object that is put back begins in front of the tips.
-    #[inline(never)]
     fn happen(&mut self, time_s: f64) {
         let mut now = Happened::at(&self.around.events, time_s);
         for finger in &mut self.fingers {
@@ -122,7 +120,6 @@ impl World {
     }
 
     /// Lets the tips relax for half a step. At the end of the step the object is then loaded.
-    #[inline]
     fn relax(&mut self, ends: bool) {
         for index in 0..self.fingers.len() {
             let x_mm = self.overlap_mm(index);
@@ -133,38 +130,29 @@ impl World {
         }
     }
 
-    /// Advances each finger against a fixed object.
+    /// Advances each finger against a fixed object, which the scene may move along the surfaces.
     fn advance_fingers(&mut self, time_s: f64) {
+        let until_s = time_s + self.dt_s;
         for (index, finger) in self.fingers.iter_mut().enumerate() {
             let [from, to] = [&self.body_before, &self.body].map(|body| surface_mm(&finger.setup, index, body));
             let end = finger.solve(|contact: &Contact, from_mm, to_mm| contact.law.mean_n(from_mm - from, to_mm - to));
             finger.finish(&end, to);
-        }
-        self.draw(time_s);
-    }
-
-    /// Moves a fixed object along the surfaces, as the scene requests.
-    #[inline]
-    fn draw(&mut self, time_s: f64) {
-        let until_s = time_s + self.dt_s;
-        for (index, finger) in self.fingers.iter_mut().enumerate() {
             if let Some(grip) = finger.contact.effects.grip() {
                 let drawn_s = overlap_s([time_s, until_s], [grip.drift_from_s, f64::INFINITY]);
                 let lifted_mm = self.around.hand_mm(until_s) - self.around.hand_mm(time_s);
                 let way_mm = grip.drift_mm_per_s * drawn_s - lifted_mm;
-                let surface_mm = surface_mm(&finger.setup, index, &self.body);
-                let force_n = finger.contact.law.force_n(finger.flank_mm() - surface_mm);
+                let force_n = finger.contact.law.force_n(finger.flank_mm() - to);
                 (_, finger.contact.along) = finger.contact.along.moved(&grip, force_n, way_mm, self.dt_s);
             }
         }
     }
 
     /// Solves for fingers and object together until forces and ends agree: momentum and energy are conserved.
-    #[inline(never)]
     fn advance_together(&mut self, mass_kg: f64, time_s: f64) {
         let (dt_s, body) = (self.dt_s, self.body);
         let lifted_mm = self.around.hand_mm(time_s + dt_s) - self.around.hand_mm(time_s);
-        let (mut grips, mut flanks, mut along, mut ends) = ([None; 2], [0.0; 2], [None; 2], [None; 2]);
+        let (mut grips, mut flanks, mut ends) = ([None; 2], [0.0; 2], [None; 2]);
+        let mut along = [Along::default(); 2];
         for (index, finger) in self.fingers.iter_mut().enumerate() {
             grips[index] = finger.contact.effects.grip();
             flanks[index] = finger.flank_mm() + dt_s * finger.speed_mm_per_s();
@@ -180,9 +168,9 @@ impl World {
                 if let Some(grip) = &grips[index] {
                     let normal_n = law.force_n(flanks[index] - to);
                     let way_mm = next.place_mm[1] - body.place_mm[1] - lifted_mm;
-                    let (up_n, state) = finger.contact.along.moved(grip, normal_n, way_mm, dt_s);
+                    let up_n;
+                    (up_n, along[index]) = finger.contact.along.moved(grip, normal_n, way_mm, dt_s);
                     force_n[1] += up_n;
-                    along[index] = Some(state);
                 }
                 let end = finger.solve(|_, _, _| mean_n);
                 changed_mm = changed_mm.max((end.flank_mm - flanks[index]).abs());
@@ -201,7 +189,7 @@ impl World {
         self.body = next;
         for (index, (finger, end)) in self.fingers.iter_mut().zip(ends.iter().flatten()).enumerate() {
             finger.finish(end, surface_mm(&finger.setup, index, &next));
-            finger.contact.along = along[index].unwrap_or(finger.contact.along);
+            finger.contact.along = along[index];
         }
     }
 
@@ -278,7 +266,6 @@ impl World {
     }
 
     /// Returns the contact of a finger at a time within the last step, apart from its rows: several go in parallel.
-    #[inline]
     pub fn place(&self, index: usize, since_s: f64) -> Place {
         let mut body = self.body;
         if since_s < self.dt_s {
@@ -292,7 +279,6 @@ impl World {
     }
 
     /// Mean pressures on a row for a contact.
-    #[inline]
     pub fn placed_kpa(&mut self, index: usize, place: &Place, row: usize) -> [f64; COLUMNS] {
         self.fingers[index].contact.row_kpa(place, row)
     }

@@ -15,7 +15,6 @@ named! {
 
 impl Named {
     /// Duration of a second of the controller in the world.
-    #[inline]
     pub fn second_s(&mut self) -> f64 {
         self.clock.map(|part| *part).product()
     }

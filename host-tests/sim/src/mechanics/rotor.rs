@@ -62,7 +62,7 @@ pub(crate) trait Acting {
 
 /// Rotor, and how its step is solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Rotor {
+pub struct Rotor {
     pub inertia_kg_m2: f64,
     pub torque_nm_per_a: f64,
     /// Most iterations of the fixed point. Each gains a factor of (step x contact frequency)^2 / 4.
@@ -80,7 +80,7 @@ impl Rotor {
         ((source.volts - back_emf) / source.ohms + source.kept_a).clamp(-source.limit_a, source.limit_a)
     }
 
-    pub fn advance(&self, mut shaft: Shaft, dt_s: f64, acting: &mut impl Acting) -> Shaft {
+    pub(crate) fn advance(&self, mut shaft: Shaft, dt_s: f64, acting: &mut impl Acting) -> Shaft {
         let mut left_s = dt_s;
         for _ in 0..RESTS_MAX {
             let Some((next, taken_s)) = self.advance_to_rest(&shaft, left_s, acting) else { break };

@@ -265,11 +265,6 @@ impl Key {
             Kind::Optional { .. } | Kind::Text => None,
         }
     }
-
-    /// Returns the unit at the end of the name; none for a plain number, a word or a text.
-    pub fn unit(&self) -> Option<String> {
-        output::units::of(self.name)
-    }
 }
 
 /// Checked values of a table, with all defaults.

@@ -112,7 +112,7 @@ fn every_quantity_ends_with_its_unit() {
         // Those of the controller are the firmware's, which has its own.
         let quantity = matches!(key.kind, Kind::Number { .. } | Kind::Whole { .. } | Kind::Optional { .. });
         let plain = !quantity || PLAIN.contains(&key.name) || table == "controller";
-        without.extend((!plain && key.unit().is_none()).then_some((table, key.name)));
+        without.extend((!plain && output::units::of(key.name).is_none()).then_some((table, key.name)));
     }
     assert!(without.is_empty(), "these have no unit: {without:?}");
 }
@@ -127,7 +127,7 @@ fn no_unit_is_cut_short() {
     ];
     const RATES: [&str; 4] = ["curvature", "magnet", "max", "rate"];
     for (table, key) in described() {
-        let (unit, label) = (key.unit(), output::units::label(key.name));
+        let (unit, label) = (output::units::of(key.name), output::units::label(key.name));
         let word = label.split(',').next().and_then(|words| words.rsplit(' ').next()).unwrap_or_default();
         let known = match &unit {
             None => !key.name.contains("_per_"),

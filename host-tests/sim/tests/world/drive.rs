@@ -39,7 +39,7 @@ fn viscous_friction_stops_a_coasting_rotor_exponentially() {
 fn inertia_adds_up() {
     let world = world(&format!("{FAR}[effects.inertia]\ngear_g_cm2 = 0.29\nfinger_g = 50.0\n"));
     let m_per_rad = 12e-3_f64 / 43.0;
-    close(world.fingers[0].inertia_kg_m2(), 1.0e-7 + 0.05 * m_per_rad * m_per_rad, 1e-12);
+    close(world.fingers[0].rotor.inertia_kg_m2, 1.0e-7 + 0.05 * m_per_rad * m_per_rad, 1e-12);
 }
 
 #[test]

@@ -256,8 +256,6 @@ pub struct Description {
     /// Source of equations and magnitudes.
     pub reference: &'static str,
     pub keys: &'static [Key],
-    /// Values of keys at which the effect changes nothing. Other keys may have any value.
-    pub zero: &'static [(&'static str, f64)],
     /// Appends the effect to the list of its stage.
     pub build: fn(&Build, &mut Parts),
 }

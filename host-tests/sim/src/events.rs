@@ -24,12 +24,12 @@ const REQUEST_S: f64 = 0.02;
 const AFTERMATH_S: f64 = 1.0;
 
 const fn whole(name: &'static str, about: &'static str, min: i64, max: i64) -> Key {
-    Key { name, about, kind: Kind::Whole { min, max, default: None } }
+    Key::new(name, about, Kind::Whole { min, max, default: None })
 }
 
 const AT: Key = Key::required("at_s", "Time of the event, from the start.", 0.0, 1e6);
 const FOR: Key = Key::required("for_s", "Duration of the event.", 0.0, 1e6);
-const KIND: Key = Key { name: "kind", about: "Kind of the event, one of those below.", kind: Kind::Text };
+const KIND: Key = Key::new("kind", "Kind of the event, one of those below.", Kind::Text);
 const ROW: Key = whole("row", "Row of the array.", 0, ROWS as i64 - 1);
 const CODE: Key = whole("to_codes", "Code that is read instead.", 0, CODE_MAX);
 

@@ -217,8 +217,8 @@ pub fn set(text: &str, path: &str, value: &str) -> Result<String, String> {
 /// Writes the table of an effect with the values at which it changes nothing. Other keys have their defaults.
 pub fn zero(effect: &Description) -> String {
     let mut text = format!("[effects.{}]\n", effect.name);
-    for (name, value) in effect.zero {
-        text += &format!("{name} = {}\n", Value::Number(*value));
+    for (key, idle) in effect.keys.iter().filter_map(|key| Some((key.name, key.idle?))) {
+        text += &format!("{key} = {}\n", Value::Number(idle));
     }
     text
 }

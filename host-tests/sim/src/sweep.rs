@@ -13,6 +13,7 @@ use crate::events::Event;
 use crate::metrics::METRICS;
 use crate::part::{self, cannot_write, make_folder};
 use crate::run::{Run, RunError, run};
+use crate::scene::tables::Key;
 use crate::scene::{Bound, Scene};
 use crate::{cli, cores};
 use csv::{Reader, ReaderBuilder};
@@ -179,9 +180,12 @@ impl FromStr for Vary {
 /// True if another seed may give another run.
 fn is_random(scene: &Scene) -> bool {
     let effect_draws = |NamedEffect { effect, values }: &NamedEffect| {
-        let idle = |keys: &[(&str, f64)]| keys.iter().all(|(key, zero)| values.number(key) == *zero);
-        let zero = if effect.name == "tangential" { &[("spread_percent", 0.0)] } else { effect.zero };
-        draws(effect) && (zero.is_empty() || !idle(zero))
+        let idle = |key: &Key| key.idle.is_none_or(|idle| values.number(key.name) == idle);
+        draws(effect)
+            && match effect.name {
+                "tangential" => values.number("spread_percent") > 0.0,
+                _ => !effect.keys.iter().all(idle),
+            }
     };
     scene.effects.iter().any(effect_draws) || scene.events.iter().any(Event::is_random)
 }

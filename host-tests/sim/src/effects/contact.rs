@@ -92,10 +92,10 @@ pub const EFFECTS: &[Description] = &[
         state: "none",
         reference: "Park, Kim, Hirai 2003, eq. 13, with the surface's height h: dL = sqrt(a^2 - r^2) - (a - d) + h",
         keys: &[
-            Key::number("along_columns_deg", "Tilt along the columns; positive presses higher ones.", -45.0, 45.0, 5.0),
-            Key::number("along_rows_deg", "Tilt along the rows.", -45.0, 45.0, 0.0),
+            Key::number("along_columns_deg", "Tilt along the columns; positive presses higher ones.", -45.0, 45.0, 5.0)
+                .idle(0.0),
+            Key::number("along_rows_deg", "Tilt along the rows.", -45.0, 45.0, 0.0).idle(0.0),
         ],
-        zero: &[("along_columns_deg", 0.0), ("along_rows_deg", 0.0)],
         build: |build, parts| {
             let slope = |name| libm::tan(build.number(name) * (core::f64::consts::PI / 180.0));
             let (x, y) = (slope("along_columns_deg"), slope("along_rows_deg"));
@@ -111,8 +111,7 @@ pub const EFFECTS: &[Description] = &[
         equations: &["h = -(R - sqrt(R^2 - r^2)); nothing beyond R"],
         state: "none",
         reference: "as `tilted_plane`; Hertz compares with a radius 1 / (1/a + 1/R)",
-        keys: &[Key::number("curvature_per_mm", "1 / radius; 0 is a plane.", 0.0, 1.0, 0.05)],
-        zero: &[("curvature_per_mm", 0.0)],
+        keys: &[Key::number("curvature_per_mm", "1 / radius; 0 is a plane.", 0.0, 1.0, 0.05).idle(0.0)],
         build: |build, parts| {
             let per_mm = build.number("curvature_per_mm");
             Surface::add(build, parts, per_mm == 0.0, move |x, y, _| round(per_mm, x * x + y * y));
@@ -125,10 +124,9 @@ pub const EFFECTS: &[Description] = &[
         state: "none",
         reference: "as `tilted_plane`",
         keys: &[
-            Key::number("curvature_per_mm", "1 / radius; 0 is a plane.", 0.0, 1.0, 0.1),
+            Key::number("curvature_per_mm", "1 / radius; 0 is a plane.", 0.0, 1.0, 0.1).idle(0.0),
             Key::number("axis_deg", "Angle from the columns to the axis.", -180.0, 180.0, 90.0),
         ],
-        zero: &[("curvature_per_mm", 0.0)],
         build: |build, parts| {
             let angle = build.number("axis_deg") * (core::f64::consts::PI / 180.0);
             let (across, per_mm) = ([-libm::sin(angle), libm::cos(angle)], build.number("curvature_per_mm"));
@@ -145,10 +143,10 @@ pub const EFFECTS: &[Description] = &[
         state: "none",
         reference: "as `tilted_plane`",
         keys: &[
-            Key::number("offset_mm", "Distance from the centre of the contact to the edge.", -20.0, 20.0, 0.0),
+            Key::number("offset_mm", "Distance from the centre of the contact to the edge.", -20.0, 20.0, 0.0)
+                .idle(20.0),
             Key::number("towards_deg", "Direction: 0 along the columns, 90 along the rows.", -180.0, 180.0, 0.0),
         ],
-        zero: &[("offset_mm", 20.0)],
         build: |build, parts| {
             let angle = build.number("towards_deg") * (core::f64::consts::PI / 180.0);
             let (towards, offset_mm) = ([libm::cos(angle), libm::sin(angle)], build.number("offset_mm"));
@@ -168,10 +166,9 @@ pub const EFFECTS: &[Description] = &[
         state: "relaxed force, N",
         reference: "Fung, Biomechanics, 1993, 7.6; not in Park, Kim, Hirai 2003",
         keys: &[
-            Key::number("share", "Share of the force that is lost in the end.", 0.0, 0.95, 0.15),
+            Key::number("share", "Share of the force that is lost in the end.", 0.0, 0.95, 0.15).idle(0.0),
             Key::number("tau_s", "Time constant.", 0.0001, 10000.0, 0.5),
         ],
-        zero: &[("share", 0.0)],
         build: |build, parts| {
             let (share, tau_s) = (build.number("share"), build.number("tau_s"));
             let memory = Relaxation { share, tau_s, remembered_n: 0.0, last_s: 0.0, left: [1.0; 2] };
@@ -184,8 +181,7 @@ pub const EFFECTS: &[Description] = &[
         equations: &["x = d + yield_mm_per_n F: tip and object in series", "E = E_tip(d) + yield_mm_per_n F^2 / 2"],
         state: "none",
         reference: "two springs in series; a soft ball 0.1 to 2 mm/N",
-        keys: &[Key::number("yield_mm_per_n", "Compliance; 0 is rigid.", 0.0, 1000.0, 0.5)],
-        zero: &[("yield_mm_per_n", 0.0)],
+        keys: &[Key::number("yield_mm_per_n", "Compliance; 0 is rigid.", 0.0, 1000.0, 0.5).idle(0.0)],
         build: |build, parts| parts.contact.series.push(build.part(Box::new(build.number("yield_mm_per_n")))),
     },
     Description {
@@ -195,10 +191,9 @@ pub const EFFECTS: &[Description] = &[
         state: "broken or not",
         reference: "a raspberry is crushed by 1 to 2 N",
         keys: &[
-            Key::number("force_n", "Force at which it breaks.", 0.0, 1000000.0, 1.5),
+            Key::number("force_n", "Force at which it breaks.", 0.0, 1000000.0, 1.5).idle(1000000.0),
             Key::number("left", "Share of the force that remains afterwards.", 0.001, 1.0, 0.2),
         ],
-        zero: &[("force_n", 1000000.0)],
         build: |build, parts| {
             let (force_n, left) = (build.number("force_n"), build.number("left"));
             parts.contact.strength.push(build.part(Box::new(BreakableObject { force_n, left, broken: false })))
@@ -221,10 +216,9 @@ pub const EFFECTS: &[Description] = &[
             Key::number("still", "Friction coefficient at which it begins to slip.", 0.0, 10.0, 0.8),
             Key::number("slipping", "Friction coefficient while it slips, at most `still`.", 0.0, 10.0, 0.7),
             Key::number("spread_percent", "Deviation of both coefficients between fingers and seeds.", 0.0, 30.0, 0.0),
-            Key::number("drift_mm_per_s", "Speed of a fixed object along the surface.", -1000.0, 1000.0, 0.0),
+            Key::number("drift_mm_per_s", "Speed of a fixed object along the surface.", -1000.0, 1000.0, 0.0).idle(0.0),
             Key::number("drift_from_s", "Start of that motion.", 0.0, 1000000.0, 0.0),
         ],
-        zero: &[("drift_mm_per_s", 0.0)],
         build: |build, parts| {
             let number = |name| build.number(name);
             let spread = number("spread_percent") / 100.0;
@@ -249,8 +243,7 @@ pub const EFFECTS: &[Description] = &[
         ],
         state: "place and speed of the object along the fingers' motion and upwards",
         reference: "Newton; g = 9.80665 m/s^2",
-        keys: &[Key::number("mass_g", "Mass; 0 is a fixed object.", 0.0, 10000.0, 20.0)],
-        zero: &[("mass_g", 0.0)],
+        keys: &[Key::number("mass_g", "Mass; 0 is a fixed object.", 0.0, 10000.0, 20.0).idle(0.0)],
         build: |build, parts| parts.contact.body.push(build.part(Box::new(build.number("mass_g") * 1e-3))),
     },
 ];

@@ -109,10 +109,9 @@ pub const EFFECTS: &[Description] = &[
         state: "none",
         reference: "docs/runs.md: 30 g at the tip are 3 % of the rotor's inertia; the gear's is not published",
         keys: &[
-            Key::number("gear_g_cm2", "Inertia of the gear at the shaft of the motor.", 0.0, 100.0, 0.05),
-            Key::number("finger_g", "Mass that moves with the tip.", 0.0, 1000.0, 30.0),
+            Key::number("gear_g_cm2", "Inertia of the gear at the shaft of the motor.", 0.0, 100.0, 0.05).idle(0.0),
+            Key::number("finger_g", "Mass that moves with the tip.", 0.0, 1000.0, 30.0).idle(0.0),
         ],
-        zero: &[("gear_g_cm2", 0.0), ("finger_g", 0.0)],
         build: |build, parts| {
             let gear_kg_m2 = build.number("gear_g_cm2") * 1e-7;
             let finger_kg = build.number("finger_g") * 1e-3;
@@ -129,8 +128,7 @@ pub const EFFECTS: &[Description] = &[
         ],
         state: "none",
         reference: "docs/runs.md: 0.1 Ohm",
-        keys: &[Key::number("source_ohm", "Resistance of source, wires and connectors.", 0.0, 100.0, 0.1)],
-        zero: &[("source_ohm", 0.0)],
+        keys: &[Key::number("source_ohm", "Resistance of source, wires and connectors.", 0.0, 100.0, 0.1).idle(0.0)],
         build: |build, parts| {
             let ohm = build.number("source_ohm");
             parts.drive.electric.push(build.part(Box::new(move |circuit: &mut Circuit| circuit.source_ohm += ohm)))
@@ -147,12 +145,13 @@ pub const EFFECTS: &[Description] = &[
         state: "temperature of the winding, degC",
         reference: "copper 0.39 %/K (IEC 60034-1); FAULHABER data sheet 1331 ... SR, thermal resistance winding to ambient 20 + 26 K/W",
         keys: &[
-            Key::number("ambient_c", "Ambient temperature, and that of the winding at the start.", -40.0, 120.0, 25.0),
-            Key::number("k_per_w", "Thermal resistance from the winding to the surroundings.", 0.0, 1000.0, 46.0),
+            Key::number("ambient_c", "Ambient temperature, and that of the winding at the start.", -40.0, 120.0, 25.0)
+                .idle(25.0),
+            Key::number("k_per_w", "Thermal resistance from the winding to the surroundings.", 0.0, 1000.0, 46.0)
+                .idle(0.0),
             Key::number("tau_s", "Thermal time constant.", 0.1, 100000.0, 400.0),
             Key::number("magnet_per_k", "Change of the torque constant per K.", -0.01, 0.01, -0.001),
         ],
-        zero: &[("k_per_w", 0.0), ("ambient_c", 25.0)],
         build: |build, parts| {
             let [ambient_c, k_per_w, tau_s, magnet_per_k] =
                 ["ambient_c", "k_per_w", "tau_s", "magnet_per_k"].map(|name| build.number(name));
@@ -170,8 +169,7 @@ pub const EFFECTS: &[Description] = &[
         ],
         state: "current in the winding, A",
         reference: "FAULHABER data sheet 1331 T 006 SR: 70 uH",
-        keys: &[Key::number("inductance_uh", "Inductance of the winding.", 0.0, 100000.0, 70.0)],
-        zero: &[("inductance_uh", 0.0)],
+        keys: &[Key::number("inductance_uh", "Inductance of the winding.", 0.0, 100000.0, 70.0).idle(0.0)],
         build: |build, parts| {
             let henry = build.number("inductance_uh") * 1e-6;
             parts.drive.electric.push(build.part(Box::new(move |circuit: &mut Circuit| circuit.henry += henry)))
@@ -183,8 +181,7 @@ pub const EFFECTS: &[Description] = &[
         equations: &["T = -sign(w) torque_mnm while it turns", "at rest it holds any torque up to torque_mnm"],
         state: "none",
         reference: "FAULHABER data sheet 1331 ... SR: 0.12 mNm",
-        keys: &[Key::number("torque_mnm", "Friction torque at the motor's shaft.", 0.0, 20.0, 0.12)],
-        zero: &[("torque_mnm", 0.0)],
+        keys: &[Key::number("torque_mnm", "Friction torque at the motor's shaft.", 0.0, 20.0, 0.12).idle(0.0)],
         build: |build, parts| {
             let torque_nm = build.number("torque_mnm") * 1e-3;
             parts.drive.resist.push(build.part(Box::new(move |_, friction| {
@@ -204,10 +201,10 @@ pub const EFFECTS: &[Description] = &[
         state: "none",
         reference: "the Lorentzian form after Hess and Soom, J. Tribology 112 (1990); here without an exponential",
         keys: &[
-            Key::number("torque_mnm", "Additional torque at rest, at the shaft of the motor.", 0.0, 20.0, 0.06),
+            Key::number("torque_mnm", "Additional torque at rest, at the shaft of the motor.", 0.0, 20.0, 0.06)
+                .idle(0.0),
             Key::number("speed_rad_per_s", "Speed at which half of it remains.", 0.01, 10000.0, 5.0),
         ],
-        zero: &[("torque_mnm", 0.0)],
         build: |build, parts| {
             let torque_nm = build.number("torque_mnm") * 1e-3;
             let half_rad_per_s = build.number("speed_rad_per_s");
@@ -224,8 +221,7 @@ pub const EFFECTS: &[Description] = &[
         equations: &["T = -torque_unm_s w"],
         state: "none",
         reference: "grease and eddy currents; a tenth of k_t^2 / R of the reference motor is 1 uNm s",
-        keys: &[Key::number("torque_unm_s", "Torque per speed at the shaft of the motor.", 0.0, 10000.0, 0.1)],
-        zero: &[("torque_unm_s", 0.0)],
+        keys: &[Key::number("torque_unm_s", "Torque per speed at the shaft of the motor.", 0.0, 10000.0, 0.1).idle(0.0)],
         build: |build, parts| {
             let nm_s = build.number("torque_unm_s") * 1e-6;
             parts.drive.resist.push(build.part(Box::new(move |_, friction| friction.viscous_nm_s += nm_s)))
@@ -240,8 +236,7 @@ pub const EFFECTS: &[Description] = &[
         ],
         state: "none",
         reference: "docs/runs.md: FAULHABER 14/1 at 43:1, 70 %, github.com/ekrimsk/MGDB",
-        keys: &[Key::number("efficiency", "Share of the torque that drives the load.", 0.1, 1.0, 0.7)],
-        zero: &[("efficiency", 1.0)],
+        keys: &[Key::number("efficiency", "Share of the torque that drives the load.", 0.1, 1.0, 0.7).idle(1.0)],
         build: |build, parts| {
             let share = 1.0 / build.number("efficiency") - 1.0;
             parts.drive.resist.push(build.part(Box::new(move |_, friction| friction.load_share += share)))
@@ -257,10 +252,9 @@ pub const EFFECTS: &[Description] = &[
         state: "none",
         reference: "ironless motors such as the reference have none; a few percent of the stall torque in slotted ones",
         keys: &[
-            Key::number("torque_mnm", "Amplitude at the shaft of the motor.", 0.0, 20.0, 0.05),
+            Key::number("torque_mnm", "Amplitude at the shaft of the motor.", 0.0, 20.0, 0.05).idle(0.0),
             Key::whole("teeth", "Periods per turn of the motor, N.", 1, 1000, 12),
         ],
-        zero: &[("torque_mnm", 0.0)],
         build: |build, parts| {
             let (torque_nm, teeth) = (build.number("torque_mnm") * 1e-3, build.number("teeth"));
             parts.drive.potential.push(build.part(Box::new(Cogging { torque_nm, teeth })));
@@ -276,8 +270,7 @@ pub const EFFECTS: &[Description] = &[
         ],
         state: "place of the tip, mm",
         reference: "the play operator; FAULHABER 14/1: at most 3 degrees at the output without load, 0.6 mm on a drum of 12 mm radius",
-        keys: &[Key::number("play_um", "Play at the tip.", 0.0, 10000.0, 100.0)],
-        zero: &[("play_um", 0.0)],
+        keys: &[Key::number("play_um", "Play at the tip.", 0.0, 10000.0, 100.0).idle(0.0)],
         build: |build, parts| {
             let play_mm = build.number("play_um") * 1e-3;
             let mut tip_mm = 0.0_f64;
@@ -293,8 +286,7 @@ pub const EFFECTS: &[Description] = &[
         equations: &["n = step_counts floor(n_fine / step_counts)"],
         state: "none",
         reference: "an IE2-400 instead of one with 1600 counts per turn: 4",
-        keys: &[Key::whole("step_counts", "Counts by which the reading jumps.", 1, 4096, 4)],
-        zero: &[("step_counts", 1.0)],
+        keys: &[Key::whole("step_counts", "Counts by which the reading jumps.", 1, 4096, 4).idle(1.0)],
         build: |build, parts| {
             let step = build.values.whole("step_counts") as i32;
             parts.drive.encoder.push(build.part(Box::new(move |count| count.div_euclid(step).wrapping_mul(step))))

@@ -33,8 +33,9 @@ pub const EFFECTS: &[Description] = &[
         equations: &["a second of the controller lasts 1 / (1 + fast_ppm 10^-6) s"],
         state: "none",
         reference: "STM32F446 data sheet: internal oscillator +-1 % at 25 C; crystals some 50 ppm",
-        keys: &[Key::number("fast_ppm", "Deviation of the clock; negative is slow.", -50_000.0, 50_000.0, 50.0)],
-        zero: &[("fast_ppm", 0.0)],
+        keys: &[
+            Key::number("fast_ppm", "Deviation of the clock; negative is slow.", -50_000.0, 50_000.0, 50.0).idle(0.0)
+        ],
         build: |build, parts| {
             let second_s = 1.0 / (1.0 + build.number("fast_ppm") * 1e-6);
             parts.link.clock.push(build.part(Box::new(second_s)));
@@ -52,9 +53,8 @@ pub const EFFECTS: &[Description] = &[
         keys: &[
             Key::number("rate_per_s", "Bursts in a second, on average.", 0.0, 10_000.0, 10.0),
             Key::number("length_us", "Duration of each.", 1.0, 1e6, 300.0),
-            Key::number("amplitude_codes", "Largest deviation, 12-bit codes.", 0.0, 4096.0, 100.0),
+            Key::number("amplitude_codes", "Largest deviation, 12-bit codes.", 0.0, 4096.0, 100.0).idle(0.0),
         ],
-        zero: &[("amplitude_codes", 0.0)],
         build: |build, parts| {
             let [rate_per_s, length_us, amplitude_codes] =
                 ["rate_per_s", "length_us", "amplitude_codes"].map(|name| build.number(name));
@@ -81,14 +81,13 @@ pub const EFFECTS: &[Description] = &[
         state: "random numbers (8 bytes)",
         reference: "wake-up of a host without a real-time kernel, 0.1 to 10 ms; USB serial adapters add up to 16 ms",
         keys: &[
-            Key::number("delay_ms", "Largest delay (uniform) or its deviation (normal).", 0.0, 1000.0, 2.0),
-            Key {
-                name: "distribution",
-                about: "Distribution of the delays.",
-                kind: Kind::Word { words: SPREADS, default: Some("uniform") },
-            },
+            Key::number("delay_ms", "Largest delay (uniform) or its deviation (normal).", 0.0, 1000.0, 2.0).idle(0.0),
+            Key::new(
+                "distribution",
+                "Distribution of the delays.",
+                Kind::Word { words: &["uniform", "normal"], default: Some("uniform") },
+            ),
         ],
-        zero: &[("delay_ms", 0.0)],
         build: |build, parts| {
             let delay_s = build.number("delay_ms") * 1e-3;
             let is_normal = build.values.word("distribution") == "normal";
@@ -105,8 +104,7 @@ pub const EFFECTS: &[Description] = &[
         equations: &["each packet is lost with the probability lost_percent / 100, independent of the others"],
         state: "random numbers (8 bytes)",
         reference: "a Bernoulli channel",
-        keys: &[Key::number("lost_percent", "Share of the packets that are lost.", 0.0, 100.0, 1.0)],
-        zero: &[("lost_percent", 0.0)],
+        keys: &[Key::number("lost_percent", "Share of the packets that are lost.", 0.0, 100.0, 1.0).idle(0.0)],
         build: |build, parts| {
             let lost = build.number("lost_percent") / 100.0;
             let mut rng = build.rng();
@@ -122,8 +120,7 @@ pub const EFFECTS: &[Description] = &[
         ],
         state: "random numbers (8 bytes)",
         reference: "DYNAMIXEL Protocol 2.0, CRC-16/BUYPASS; a binary symmetric channel",
-        keys: &[Key::number("bit_error_ppm", "Probability per bit.", 0.0, 1e6, 100.0)],
-        zero: &[("bit_error_ppm", 0.0)],
+        keys: &[Key::number("bit_error_ppm", "Probability per bit.", 0.0, 1e6, 100.0).idle(0.0)],
         build: |build, parts| {
             let flips = build.number("bit_error_ppm") * 1e-6;
             let mut rng = build.rng();
@@ -136,8 +133,6 @@ pub const EFFECTS: &[Description] = &[
         },
     },
 ];
-
-const SPREADS: &[&str] = &["uniform", "normal"];
 
 /// Header, ID, length, instruction, address and goal of a packet, without its CRC.
 const BODY: [u8; 14] = {

@@ -143,8 +143,7 @@ pub const EFFECTS: &[Description] = &[
         state: "y of each taxel (100 numbers)",
         reference: "Interlink FSR 400 integration guide: hysteresis +10 %; the play operator: Brokate and Sprekels, Hysteresis and \
                 Phase Transitions, 1996, section 2.1",
-        keys: &[Key::number("width_percent", "Width of the loop, of the pressure.", 0.0, 100.0, 10.0)],
-        zero: &[("width_percent", 0.0)],
+        keys: &[Key::number("width_percent", "Width of the loop, of the pressure.", 0.0, 100.0, 10.0).idle(0.0)],
         build: |build, parts| {
             let half = build.number("width_percent") / 200.0;
             let mut held_kpa = [Row::default(); ROWS];
@@ -167,8 +166,7 @@ pub const EFFECTS: &[Description] = &[
         ],
         state: "9 numbers per taxel",
         reference: "Interlink FSR 400 integration guide: drift under 5 % per decade of time; a Prony series with a term per decade",
-        keys: &[Key::number("rate_percent_per_decade", "Growth of the reading.", 0.0, 50.0, 5.0)],
-        zero: &[("rate_percent_per_decade", 0.0)],
+        keys: &[Key::number("rate_percent_per_decade", "Growth of the reading.", 0.0, 50.0, 5.0).idle(0.0)],
         build: |build, parts| {
             let share = build.number("rate_percent_per_decade") / 100.0;
             let (mut sampled_s, mut crept_kpa) = ([None; ROWS], [[[0.0; COLUMNS]; TERMS]; ROWS]);
@@ -199,8 +197,7 @@ pub const EFFECTS: &[Description] = &[
         ],
         state: "none; 100 gains drawn at the start",
         reference: "Interlink FSR 400 integration guide: part to part +-6 %; Tekscan sensors differ by 5 to 32 %",
-        keys: &[Key::number("rms_percent", "Deviation of the taxels' gains.", 0.0, 50.0, 6.0)],
-        zero: &[("rms_percent", 0.0)],
+        keys: &[Key::number("rms_percent", "Deviation of the taxels' gains.", 0.0, 50.0, 6.0).idle(0.0)],
         build: |build, parts| {
             let mut rng = build.rng();
             let share = build.number("rms_percent") / 100.0;
@@ -222,7 +219,7 @@ pub const EFFECTS: &[Description] = &[
         state: "none: T is a function of time",
         reference: "Tekscan FlexiForce A201 data sheet: 0.36 %/K; the zero's drift is an assumption",
         keys: &[
-            Key::number("warming_k", "Final temperature above that at the start.", -60.0, 100.0, 20.0),
+            Key::number("warming_k", "Final temperature above that at the start.", -60.0, 100.0, 20.0).idle(0.0),
             Key::number("time_constant_s", "Time to 63 % of that.", 0.001, 1e6, 600.0),
             Key::number("gain_percent_per_k", "Change of the gain.", -1.0, 1.0, 0.36),
             Key::number("zero_kpa_per_k", "Change of the reading without pressure.", -1.0, 1.0, 0.01),
@@ -235,7 +232,6 @@ pub const EFFECTS: &[Description] = &[
                 0.0,
             ),
         ],
-        zero: &[("warming_k", 0.0)],
         build: |build, parts| {
             let [warming_k, time_constant_s, zero_kpa_per_k, chip_share] =
                 ["warming_k", "time_constant_s", "zero_kpa_per_k", "chip_share"].map(|name| build.number(name));
@@ -259,12 +255,11 @@ pub const EFFECTS: &[Description] = &[
         state: "conductance of each stuck taxel",
         reference: "docs/runs.md, Readout: defects of the array",
         keys: &[
-            Key { name: "dead", about: "Open circuits, by row and column.", kind: Kind::Taxels },
-            Key { name: "shorted", about: "Short circuits, by row and column.", kind: Kind::Taxels },
-            Key { name: "stuck", about: "Taxels that no longer change, by row and column.", kind: Kind::Taxels },
+            Key::new("dead", "Open circuits, by row and column.", Kind::Taxels),
+            Key::new("shorted", "Short circuits, by row and column.", Kind::Taxels),
+            Key::new("stuck", "Taxels that no longer change, by row and column.", Kind::Taxels),
             Key::number("at_s", "Time of the defect; -10 is before the tare.", -10.0, 1e6, -10.0),
         ],
-        zero: &[],
         build: |build, parts| {
             let mut taxels = [[Taxel::Sound; COLUMNS]; ROWS];
             let shorted = Taxel::Fixed(Array::default().short_siemens);
@@ -299,8 +294,7 @@ pub const EFFECTS: &[Description] = &[
         ],
         state: "none; other rows have the values of their last sample, at most a frame ago",
         reference: "D'Alessio, Measurement errors in the scanning of piezoresistive sensors arrays, Sensors and Actuators A 72 (1999)",
-        keys: &[Key::number("hold_ohm", "Resistance to the virtual ground; 0 is perfect.", 0.0, 1e12, 1000.0)],
-        zero: &[("hold_ohm", 0.0)],
+        keys: &[Key::number("hold_ohm", "Resistance to the virtual ground; 0 is perfect.", 0.0, 1e12, 1000.0).idle(0.0)],
         build: |build, parts| {
             let hold_ohm = build.number("hold_ohm");
             let mut floating = Floating::new(1.0 / hold_ohm);
@@ -317,8 +311,7 @@ pub const EFFECTS: &[Description] = &[
         equations: &["G' = G / (1 + R_on S), S = the row's sum of G: a loss of R_on S / (1 + R_on S)"],
         state: "none",
         reference: "docs/board.md: 30 Ohm; R_min 1 kOhm in all ten columns loses 41 % at 70 Ohm and 4.8 % at 5 Ohm",
-        keys: &[Key::number("switch_ohm", "Resistance of switch and trace, R_on.", 0.0, 300.0, 30.0)],
-        zero: &[("switch_ohm", 0.0)],
+        keys: &[Key::number("switch_ohm", "Resistance of switch and trace, R_on.", 0.0, 300.0, 30.0).idle(0.0)],
         build: |build, parts| {
             let switch_ohm = build.number("switch_ohm");
             parts.sensor.network.push(build.part(Box::new(move |_, _, seen| {
@@ -337,10 +330,9 @@ pub const EFFECTS: &[Description] = &[
         state: "voltage of each column at the last edge, and its final voltage (20 numbers)",
         reference: "docs/runs.md, Readout: 0.2 us; half a bit of 12 takes 9.0 tau",
         keys: &[
-            Key::number("tau_us", "Time constant.", 0.0, 100.0, 0.2),
+            Key::number("tau_us", "Time constant.", 0.0, 100.0, 0.2).idle(0.0),
             Key::number("after_us", "Time from the edge to the sample.", 0.1, 1000.0, 2.4),
         ],
-        zero: &[("tau_us", 0.0)],
         build: |build, parts| {
             let [tau_s, after_s] = ["tau_us", "after_us"].map(|key| build.number(key) * 1e-6);
             let mut settling = Settling::new(tau_s, after_s);
@@ -359,8 +351,8 @@ pub const EFFECTS: &[Description] = &[
             0.0,
             3000.0,
             50.0,
-        )],
-        zero: &[("headroom_mv", 0.0)],
+        )
+        .idle(0.0)],
         build: |build, parts| {
             let rail_v = Array::default().reference_v - build.number("headroom_mv") * 1e-3;
             parts.sensor.volts.push(
@@ -374,8 +366,7 @@ pub const EFFECTS: &[Description] = &[
         equations: &["code' = code + rms_codes g, g normal, drawn for each conversion"],
         state: "random numbers (8 bytes)",
         reference: "ST application note AN4073, averaging against converter noise: a few codes",
-        keys: &[Key::number("rms_codes", "Deviation, 12-bit codes.", 0.0, 500.0, 1.5)],
-        zero: &[("rms_codes", 0.0)],
+        keys: &[Key::number("rms_codes", "Deviation, 12-bit codes.", 0.0, 500.0, 1.5).idle(0.0)],
         build: |build, parts| {
             let rms_codes = build.number("rms_codes");
             let mut rng = build.rng();
@@ -391,8 +382,7 @@ pub const EFFECTS: &[Description] = &[
         equations: &["code' = code + rms_codes g, g of each taxel normal, drawn once, within 3 deviations"],
         state: "none; 110 levels drawn at the start",
         reference: "docs/board.md: the preload's spread and the amplifiers' offsets",
-        keys: &[Key::number("rms_codes", "Deviation of the levels, 12-bit codes.", 0.0, 200.0, 5.0)],
-        zero: &[("rms_codes", 0.0)],
+        keys: &[Key::number("rms_codes", "Deviation of the levels, 12-bit codes.", 0.0, 200.0, 5.0).idle(0.0)],
         build: |build, parts| {
             let mut rng = build.rng();
             let rms_codes = build.number("rms_codes");
@@ -412,10 +402,10 @@ pub const EFFECTS: &[Description] = &[
         state: "none",
         reference: "Tekscan I-Scan, the paper's kind of sensor: 8 bits; STM32F446 data sheet: INL 2 to 3 codes of 12 bits",
         keys: &[
-            Key::whole("bits", "Resolution.", 1, 12, 8),
-            Key::number("inl_codes", "Largest deviation from the line, in the middle, 12-bit codes.", -50.0, 50.0, 0.0),
+            Key::whole("bits", "Resolution.", 1, 12, 8).idle(12.0),
+            Key::number("inl_codes", "Largest deviation from the line, in the middle, 12-bit codes.", -50.0, 50.0, 0.0)
+                .idle(0.0),
         ],
-        zero: &[("bits", 12.0), ("inl_codes", 0.0)],
         build: |build, parts| {
             let step = f64::from(1 << (12 - build.values.whole("bits")));
             let inl_codes = build.number("inl_codes");

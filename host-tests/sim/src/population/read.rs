@@ -464,7 +464,7 @@ fn own_text(root: &Table, name: &str) -> Vec<Range<usize>> {
     }
 }
 
-const COUNT: Key = Key { name: "count", about: "", kind: Kind::Whole { min: 0, max: 100, default: None } };
+const COUNT: Key = Key::new("count", "", Kind::Whole { min: 0, max: 100, default: None });
 
 fn is_table(key: &str) -> bool {
     match key.split_once('.') {

@@ -37,7 +37,7 @@ pub const ROOT: Table = Table {
     name: "",
     about: "Keys before the first table.",
     keys: &[
-        Key { name: "about", about: "Description of the scene in one line.", kind: Kind::Text },
+        Key::new("about", "Description of the scene in one line.", Kind::Text),
         Key::required("duration_s", "Virtual time from the end of the tare, when torque is enabled.", 1e-3, 1e6),
         Key::whole("seed", "Seed of all random numbers.", 0, i64::MAX, 1),
     ],
@@ -56,14 +56,14 @@ pub const EXPECT: Table = Table {
     name: "expect",
     about: "Bound on a metric by `min`, `max` or both; may occur many times.",
     keys: &[
-        Key { name: "metric", about: "Name of the metric.", kind: Kind::Text },
-        Key { name: "min", about: "Lower limit, in the unit of the metric.", kind: ANY },
-        Key { name: "max", about: "Upper limit, in the unit of the metric.", kind: ANY },
-        Key {
-            name: "max_per_goal_n",
-            about: "Increase of `max` per N of the goal, for over_force_mn, over_force_defective_mn, hold_swing_mn and hold_error_mn.",
-            kind: Kind::Optional { min: 0.0, max: 1e6, whole: false },
-        },
+        Key::new("metric", "Name of the metric.", Kind::Text),
+        Key::new("min", "Lower limit, in the unit of the metric.", ANY),
+        Key::new("max", "Upper limit, in the unit of the metric.", ANY),
+        Key::new(
+            "max_per_goal_n",
+            "Increase of `max` per N of the goal, for over_force_mn, over_force_defective_mn, hold_swing_mn and hold_error_mn.",
+            Kind::Optional { min: 0.0, max: 1e6, whole: false },
+        ),
     ],
 };
 const ANY: Kind = Kind::Optional { min: -1e12, max: 1e12, whole: false };
@@ -177,7 +177,7 @@ const CONTROLLER: [Key; Params::COUNT] = {
     while place < Params::COUNT {
         let (name, _, min, max) = Params::RANGES[place];
         let kind = Kind::Optional { min: min as f64, max: max as f64, whole: true };
-        keys[place] = Key { name, about: Params::DOCS[place], kind };
+        keys[place] = Key::new(name, Params::DOCS[place], kind);
         place += 1;
     }
     keys
@@ -189,6 +189,8 @@ pub struct Key {
     pub name: &'static str,
     pub about: &'static str,
     pub kind: Kind,
+    /// Value at which an effect changes nothing, if all such keys of the effect have theirs. Other keys may have any value.
+    pub idle: Option<f64>,
 }
 
 /// Allowed values of a key. A default of `None` makes the key required.
@@ -222,19 +224,28 @@ pub enum Kind {
 }
 
 impl Key {
+    pub const fn new(name: &'static str, about: &'static str, kind: Kind) -> Self {
+        Self { name, about, kind, idle: None }
+    }
+
     /// A number within bounds, required.
     pub const fn required(name: &'static str, about: &'static str, min: f64, max: f64) -> Self {
-        Self { name, about, kind: Kind::Number { min, max, default: None } }
+        Self::new(name, about, Kind::Number { min, max, default: None })
     }
 
     /// A number within bounds, with a default.
     pub const fn number(name: &'static str, about: &'static str, min: f64, max: f64, default: f64) -> Self {
-        Self { name, about, kind: Kind::Number { min, max, default: Some(default) } }
+        Self::new(name, about, Kind::Number { min, max, default: Some(default) })
     }
 
     /// A whole number within bounds, with a default.
     pub const fn whole(name: &'static str, about: &'static str, min: i64, max: i64, default: i64) -> Self {
-        Self { name, about, kind: Kind::Whole { min, max, default: Some(default) } }
+        Self::new(name, about, Kind::Whole { min, max, default: Some(default) })
+    }
+
+    /// Adds the value at which the effect of the key changes nothing.
+    pub const fn idle(self, value: f64) -> Self {
+        Self { idle: Some(value), ..self }
     }
 
     /// Describes the allowed values: "number, 0 to 5, default 1".

@@ -99,9 +99,8 @@ fn advance<F: Finger>(finger: &mut F, pace: &mut Pace) -> Result<(), F::Error> {
 const BEHIND_MAX_S: f64 = 0.1;
 /// Share of real time below which a finger is reported to be behind.
 const KEEPS_UP: f64 = 0.98;
-/// Interval of the checks, and of the reports while nothing changes.
-const LOOK: Duration = Duration::from_secs(1);
-const LOOKS_BETWEEN: u32 = 5;
+/// Interval of the checks and of their reports.
+const LOOK: Duration = Duration::from_secs(5);
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Served {
@@ -127,30 +126,16 @@ pub struct Pace {
     always: bool,
     asked: Option<Instant>,
     all: Served,
-    look: Look,
-    /// Number of checks until the next report; 0 while it keeps up.
-    silent: u32,
-}
-
-struct Look {
-    at: Instant,
-    virtual_s: f64,
-    late: u64,
-    longest_s: f64,
-}
-
-impl Look {
-    fn at(virtual_s: f64) -> Self {
-        Self { at: Instant::now(), virtual_s, late: 0, longest_s: 0.0 }
-    }
+    /// Instant, time of the finger and number of late answers at the last check.
+    looked: (Instant, f64, u64),
 }
 
 impl Pace {
     /// Begins now, at this time of the finger.
     pub fn new(begun_s: f64, late: Duration, always: bool) -> Self {
         let begun = Instant::now();
-        let look = Look::at(begun_s);
-        Self { begun, begun_s, lost_s: 0.0, late, always, asked: None, all: Served::default(), look, silent: 0 }
+        let looked = (begun, begun_s, 0);
+        Self { begun, begun_s, lost_s: 0.0, late, always, asked: None, all: Served::default(), looked }
     }
 
     /// Time of a finger that keeps up, s.
@@ -180,37 +165,26 @@ impl Pace {
         let Some(asked) = self.asked.take() else { return };
         self.all.answers += 1;
         let took = asked.elapsed();
-        self.look.longest_s = self.look.longest_s.max(took.as_secs_f64());
         self.all.longest_s = self.all.longest_s.max(took.as_secs_f64());
-        if took > self.late {
-            self.all.late += 1;
-            self.look.late += 1;
-        }
+        self.all.late += u64::from(took > self.late);
     }
 
-    /// Returns the report on the time since the last one, if one is due.
+    /// Returns the report on the time since the last check, if one is due.
     pub fn tell(&mut self, now_s: f64) -> Option<String> {
-        let wall_s = self.look.at.elapsed();
+        let (at, virtual_s, late) = self.looked;
+        let wall_s = at.elapsed();
         if wall_s < LOOK {
             return None;
         }
-        let look = std::mem::replace(&mut self.look, Look::at(now_s));
-        let ratio = (now_s - look.virtual_s) / wall_s.as_secs_f64();
-        let well = ratio >= KEEPS_UP && look.late == 0;
-        if well && !self.always {
-            let was_behind = std::mem::take(&mut self.silent) > 0;
-            return was_behind.then(|| format!("pace     {ratio:.2} of real time again"));
-        }
-        self.silent = self.silent.checked_sub(1).unwrap_or(LOOKS_BETWEEN);
-        if self.silent != LOOKS_BETWEEN {
-            return None;
-        }
+        self.looked = (Instant::now(), now_s, self.all.late);
+        let (ratio, late) = ((now_s - virtual_s) / wall_s.as_secs_f64(), self.all.late - late);
         let mut text = format!("pace     {ratio:.2} of real time");
-        if look.late > 0 {
-            let (late, allowed_ms, longest_ms) = (look.late, self.late.as_secs_f64() * 1e3, look.longest_s * 1e3);
-            text += &format!("; {late} answers later than {allowed_ms:.1} ms, the longest took {longest_ms:.1} ms");
+        if late > 0 {
+            let [allowed_ms, longest_ms] = [self.late.as_secs_f64(), self.all.longest_s].map(|s| s * 1e3);
+            text +=
+                &format!("; {late} answers later than {allowed_ms:.1} ms, the longest so far took {longest_ms:.1} ms");
         }
-        Some(text)
+        (self.always || ratio < KEEPS_UP || late > 0).then_some(text)
     }
 
     pub fn end(&self, now_s: f64) -> Served {

@@ -9,7 +9,6 @@ use rustix::io::Errno;
 use rustix::process::getpgrp;
 use rustix::termios::{tcgetattr, tcgetpgrp};
 use serial2::SerialPort;
-use std::collections::VecDeque;
 use std::ffi::OsStr;
 use std::io::{self, ErrorKind, IsTerminal as _, PipeReader, PipeWriter, Write as _};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
@@ -19,8 +18,6 @@ use std::sync::Arc;
 use std::time::Duration;
 
 const BUFFER: usize = 4096;
-/// Bytes of the longest command line; longer ones are ignored.
-const LINE_MAX: usize = 1000;
 
 /// Kind and name of the port that offers a finger.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -68,8 +65,8 @@ enum Opened {
 /// Commands, a line each.
 #[derive(Default)]
 struct Side {
-    begun: Vec<u8>,
-    lines: VecDeque<String>,
+    /// Bytes of the lines that were not passed on yet.
+    bytes: Vec<u8>,
     ended: bool,
 }
 
@@ -101,7 +98,7 @@ impl Port {
 
     /// Waits for input, at most for this time. Drops bytes at another speed, if the port has one.
     pub fn wait(&mut self, within: Duration, baud: Option<u32>) -> Event {
-        if let Some(line) = self.side.as_mut().and_then(|side| side.lines.pop_front()) {
+        if let Some(line) = self.side.as_mut().and_then(Side::line) {
             return Event::Command(line);
         }
         let input = io::stdin();
@@ -152,28 +149,19 @@ impl Port {
 impl Side {
     fn read(&mut self) {
         let bytes = read(io::stdin()).unwrap_or_default();
-        bytes.iter().for_each(|byte| self.take(*byte));
-        if bytes.is_empty() {
+        self.ended = bytes.is_empty();
+        self.bytes.extend(bytes);
+        if self.ended {
             // The last line may lack its end.
-            self.take(b'\n');
-            self.ended = true;
+            self.bytes.push(b'\n');
         }
     }
 
-    fn take(&mut self, byte: u8) {
-        if byte != b'\n' {
-            // What is too long is kept as far as it takes to tell.
-            if self.begun.len() <= LINE_MAX {
-                self.begun.push(byte);
-            }
-            return;
-        }
-        let line = std::mem::take(&mut self.begun);
-        if line.len() > LINE_MAX {
-            say::aside(format_args!("a line of more than {LINE_MAX} bytes is no command"));
-        } else {
-            self.lines.push_back(String::from_utf8_lossy(&line).trim().to_owned());
-        }
+    /// Returns the next whole line.
+    fn line(&mut self) -> Option<String> {
+        let end = self.bytes.iter().position(|byte| *byte == b'\n')?;
+        let line: Vec<u8> = self.bytes.drain(..=end).collect();
+        Some(String::from_utf8_lossy(&line).trim().to_owned())
     }
 }
 

@@ -13,6 +13,7 @@ use crate::metrics::finger::{DROPPED_MM, Response};
 use crate::scene::Bound;
 use crate::watch::{Controller, Step, Watch};
 use Worst::{FirstFault, Largest, Least, Sum};
+use fingertip::params::Params;
 use fingertip::state::Limits;
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
@@ -118,12 +119,12 @@ impl Meter {
 
 impl Watch for Meter {
     fn begin(&mut self, controllers: &[Controller]) {
-        self.0 = controllers.iter().map(Finger::of).collect();
+        self.0 = controllers.iter().map(|controller| Finger::of(&controller.params)).collect();
     }
 
     fn step(&mut self, step: &Step) {
         if self.0.len() <= step.finger {
-            self.0.resize_with(step.finger + 1, Finger::default);
+            self.0.resize_with(step.finger + 1, || Finger::of(&Params::DEFAULT));
         }
         self.0[step.finger].step(step);
     }

@@ -41,17 +41,12 @@ pub struct Hold {
     pub faulty: bool,
 }
 
-/// Limits by the parameters of the controller.
-#[derive(Clone, Copy, Debug)]
-struct Allowed {
+#[derive(Clone, Debug, Default)]
+pub struct Conduct {
+    /// Parameters of the controller: approach speed, clearance and largest travel.
     approach_mm_per_s: f64,
     clearance_mm: f64,
     travel_mm: f64,
-}
-
-#[derive(Clone, Debug, Default)]
-pub struct Conduct {
-    allowed: Allowed,
     goal_n: f64,
     /// Time since which the goal and an active motor are unchanged.
     since_s: f64,
@@ -97,24 +92,12 @@ pub(super) struct Ended {
     pub duty: Option<f64>,
 }
 
-impl Default for Allowed {
-    fn default() -> Self {
-        Self::of(&Params::DEFAULT)
-    }
-}
-
-impl Allowed {
-    fn of(params: &Params) -> Self {
-        let [approach_mm_per_s, clearance_mm, travel_mm] =
-            [params.approach_um_per_s, params.clearance_um, params.travel_max_um].map(|um| f64::from(um) * 1e-3);
-        Self { approach_mm_per_s, clearance_mm, travel_mm }
-    }
-}
-
 impl Conduct {
     /// Conduct under the limits of these parameters.
     pub fn of(params: &Params) -> Self {
-        Self { allowed: Allowed::of(params), ..Self::default() }
+        let [approach_mm_per_s, clearance_mm, travel_mm] =
+            [params.approach_um_per_s, params.clearance_um, params.travel_max_um].map(|um| f64::from(um) * 1e-3);
+        Self { approach_mm_per_s, clearance_mm, travel_mm, ..Self::default() }
     }
 
     /// Adds a control step after the start of the scene.
@@ -205,8 +188,8 @@ impl Conduct {
         }
         self.nearest_mm = self.nearest_mm.min(self.place_mm);
         let deepest_mm = self.nearest_mm - self.indentation_max_mm;
-        let rear_mm = self.touch_mm.map_or(0.0, |touch_mm| touch_mm + deepest_mm) - self.allowed.clearance_mm;
-        let beyond_mm = (rear_mm - truth.travel_mm).max(truth.travel_mm - self.allowed.travel_mm);
+        let rear_mm = self.touch_mm.map_or(0.0, |touch_mm| touch_mm + deepest_mm) - self.clearance_mm;
+        let beyond_mm = (rear_mm - truth.travel_mm).max(truth.travel_mm - self.travel_mm);
         self.runaway_mm = self.runaway_mm.max(beyond_mm);
     }
 
@@ -238,7 +221,7 @@ impl Conduct {
 
     /// Returns the largest speed without a contact, as a share of the approach speed.
     pub(super) fn air_share(&self) -> f64 {
-        self.air_mm_per_s / self.allowed.approach_mm_per_s
+        self.air_mm_per_s / self.approach_mm_per_s
     }
 }
 

@@ -1,7 +1,8 @@
 //! Measurements of one finger, step by step. No trace is kept, so memory grows with the number of goals only.
 
 use crate::metrics::conduct::Conduct;
-use crate::watch::{Controller, Step};
+use crate::watch::Step;
+use fingertip::params::Params;
 use fingertip::pipeline::Status;
 use fingertip::state::{Fault, Mode};
 use fingertip::units::{Duty, Millimetres, Newtons};
@@ -84,8 +85,8 @@ pub struct Finger {
 }
 
 impl Finger {
-    pub(super) fn of(controller: &Controller) -> Self {
-        Self { conduct: Conduct::of(&controller.params), ..Self::default() }
+    pub(super) fn of(params: &Params) -> Self {
+        Self { conduct: Conduct::of(params), ..Self::default() }
     }
 
     pub(super) fn step(&mut self, step: &Step) {

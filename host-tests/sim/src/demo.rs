@@ -22,14 +22,11 @@ const SCENE: &str = "demo";
 const QUICK_S: [f64; 2] = [0.5, 0.25];
 
 /// Array at the end of a hold, with the contact that the controller sensed.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct HeldImage {
     pub goal_n: f64,
     pub force_n: f64,
-    /// Centre of the contact, along columns and rows.
-    pub centre_mm: [f64; 2],
-    pub radius_mm: f64,
-    pub pressures_kpa: Pressures,
+    pub map: Map,
 }
 
 #[derive(Clone, Debug)]
@@ -152,9 +149,12 @@ impl Watch for Trace {
         self.last = Some(HeldImage {
             goal_n,
             force_n: newtons(contact.force),
-            centre_mm: [contact.centre_x.0.to_num(), contact.centre_y.0.to_num()],
-            radius_mm: contact.radius.0.to_num(),
-            pressures_kpa: self.array.kilopascals(step.frame),
+            map: Map {
+                title: format!("{goal_n} N"),
+                pressures_kpa: self.array.kilopascals(step.frame),
+                centre_mm: [contact.centre_x.0.to_num(), contact.centre_y.0.to_num()],
+                radius_mm: contact.radius.0.to_num(),
+            },
         });
     }
 }
@@ -409,15 +409,9 @@ pub fn draw(run: &Run, forces: &Forces, folder: &Path) -> Result<Vec<PathBuf>, R
         let title = format!("{:.1} to {:.1} N", step.from_n, step.to_n);
         panels.push(panel(title, asked.at_s, Some(step.time_optimal_ms)));
     }
-    let map = |picture: &HeldImage| Map {
-        title: format!("{} N", picture.goal_n),
-        pressures_kpa: picture.pressures_kpa,
-        centre_mm: picture.centre_mm,
-        radius_mm: picture.radius_mm,
-    };
-    let mut maps: Vec<_> = run.pictures.iter().collect();
-    maps.sort_by(|a, b| a.goal_n.total_cmp(&b.goal_n));
-    let maps: Vec<_> = maps.into_iter().map(map).collect();
+    let mut images = run.pictures.clone();
+    images.sort_by(|a, b| a.goal_n.total_cmp(&b.goal_n));
+    let maps: Vec<Map> = images.into_iter().map(|image| image.map).collect();
     let pictures = [
         ("run.svg", plot::overview(&run.trace)?),
         ("steps.svg", plot::steps(&panels)?),

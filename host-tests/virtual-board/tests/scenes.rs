@@ -189,8 +189,8 @@ fn every_bound_of_the_demonstration_holds() {
     for picture in &run.pictures {
         assert!((picture.force_n - picture.goal_n).abs() < 0.01 * picture.goal_n, "{picture:?}");
         let d = (picture.goal_n / (std::f64::consts::PI * 0.25)).sqrt();
-        assert!((picture.radius_mm - (d * (20.0 - d)).sqrt()).abs() < 0.05, "{picture:?}");
-        let sum_n: f64 = picture.pressures_kpa.iter().flatten().sum::<f64>() * 1.5 * 1.5 * 1e-3;
+        assert!((picture.map.radius_mm - (d * (20.0 - d)).sqrt()).abs() < 0.05, "{picture:?}");
+        let sum_n: f64 = picture.map.pressures_kpa.iter().flatten().sum::<f64>() * 1.5 * 1.5 * 1e-3;
         assert!((sum_n - picture.goal_n).abs() < 0.03 * picture.goal_n, "{sum_n} N in {picture:?}");
     }
 }

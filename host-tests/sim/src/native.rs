@@ -47,15 +47,14 @@ pub fn board(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, RunError> 
 /// Runs a scene with the effects that it names.
 pub fn simulate(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, SimError> {
     let started = Instant::now();
-    Board::new(scene)?.whole(scene, started, watch)
+    Board::new(scene)?.whole(scene, started, None, watch)
 }
 
 /// Runs a scene as [`simulate`], with gains of the taxels of the first finger, Q14.
 pub fn simulate_calibrated(scene: &Scene, gains: &Gains, watch: &mut dyn Watch) -> Result<Summary, SimError> {
     let mut board = Board::new(scene)?;
     board.units[0].pipeline.calibrate(&Calibration::of(gains));
-    board.calibration = Some(*gains.rows());
-    board.whole(scene, Instant::now(), watch)
+    board.whole(scene, Instant::now(), Some(*gains.rows()), watch)
 }
 
 /// Controller of a finger, and everything between it and the world.
@@ -80,15 +79,13 @@ struct Board {
     units: Vec<Unit>,
     bridges: Vec<Bridge>,
     params: fingertip::params::Params,
+    /// Time from the start of the scene; negative while the fingers are tared.
     clock: Clock,
-    start: Clock,
     slot_s: f64,
     longest_s: f64,
     digest: Digest,
     /// True once the finger is tared: from then on the host sends.
     runs: bool,
-    /// Gain of each taxel of the first finger, Q14.
-    calibration: Option<[[u16; COLUMNS]; ROWS]>,
 }
 
 impl Board {
@@ -134,16 +131,24 @@ impl Board {
             bridges,
             params: config.params,
             clock: Clock::default(),
-            start: Clock::default(),
             slot_s,
             longest_s,
             digest: Digest::new(),
             runs: false,
-            calibration: None,
         })
     }
 
-    fn whole(mut self, scene: &Scene, started: Instant, watch: &mut dyn Watch) -> Result<Summary, SimError> {
+    /// Runs the scene. The calibration is the gain of each taxel of the first finger, Q14.
+    fn whole(
+        mut self,
+        scene: &Scene,
+        started: Instant,
+        calibration: Option<[[u16; COLUMNS]; ROWS]>,
+        watch: &mut dyn Watch,
+    ) -> Result<Summary, SimError> {
+        let mut controllers = vec![Controller { params: self.params, calibration: None }; self.units.len()];
+        controllers[0].calibration = calibration;
+        watch.begin(&controllers);
         self.tare(watch);
         let set_up_s = started.elapsed().as_secs_f64();
         self.run(scene, watch);
@@ -157,19 +162,17 @@ impl Board {
     }
 
     fn tare(&mut self, watch: &mut dyn Watch) {
-        let mut controllers = vec![Controller { params: self.params, calibration: None }; self.units.len()];
-        controllers[0].calibration = self.calibration.take();
-        watch.begin(&controllers);
         let tare_frames = TARE_FRAMES + 2;
-        self.start = self.clock;
-        self.start.go_on(f64::from(tare_frames) * self.slot_s * SLOTS as f64);
+        let mut tare = Clock::default();
+        tare.go_on(f64::from(tare_frames) * self.slot_s * SLOTS as f64);
+        self.clock = Clock(-tare.0);
         for unit in &mut self.units {
             unit.command.tare_request = 1;
         }
         for _ in 0..tare_frames {
             self.frame(watch);
         }
-        self.start = self.clock;
+        self.clock = Clock::default();
     }
 
     fn run(&mut self, scene: &Scene, watch: &mut dyn Watch) {
@@ -184,9 +187,8 @@ impl Board {
         }
     }
 
-    /// Time from the start of the scene; negative while the fingers are tared.
     fn time_s(&self) -> f64 {
-        self.clock.since(self.start)
+        self.clock.time_s()
     }
 
     /// Scans one frame of each finger and takes its control step.
@@ -304,7 +306,7 @@ impl Board {
                     // The effects remember the last slot.
                     let row = row_of((slots.start + SLOTS - 1) % SLOTS);
                     let kpa = self.world.placed_kpa(finger, &unit.shown, row.min(ROWS - 1));
-                    unit.readout.codes(&mut unit.sensor, row, self.clock.since(self.start), &kpa);
+                    unit.readout.codes(&mut unit.sensor, row, self.clock.time_s(), &kpa);
                     unit.sensor.repeat(-i64::from(row < ROWS), -1);
                 }
             }
@@ -314,7 +316,7 @@ impl Board {
                 clock.go_on(slot_s);
                 let row = row_of(slot);
                 let kpa = if row < ROWS { self.world.placed_kpa(finger, &places[slot], row) } else { [0.0; COLUMNS] };
-                let codes = unit.readout.codes(&mut unit.sensor, row, clock.since(self.start), &kpa);
+                let codes = unit.readout.codes(&mut unit.sensor, row, clock.time_s(), &kpa);
                 for (column, code) in codes.into_iter().enumerate() {
                     unit.frame.set_code(row, column, code);
                 }
@@ -346,35 +348,16 @@ impl Clock {
         self.0 += units(seconds);
     }
 
-    /// Returns the time from another instant to this one; negative if this one is earlier.
-    pub fn since(self, other: Self) -> f64 {
-        let units = self.0 - other.0;
-        // Both ways give the same number. The short one is much faster, and covers seven minutes.
-        i64::try_from(units).map_or_else(|_| long(units), |units| units as f64) / UNITS as f64
-    }
-
     pub fn time_s(self) -> f64 {
-        self.since(Self(0))
+        // Both ways give the same number. The short one is much faster, and covers seven minutes.
+        i64::try_from(self.0).map_or_else(|_| self.0 as f64, |units| units as f64) / UNITS as f64
     }
-}
-
-/// Out of line, as it is rarely called.
-#[cold]
-#[inline(never)]
-fn long(units: i128) -> f64 {
-    units as f64
 }
 
 fn units(seconds: f64) -> i128 {
     let units = seconds * UNITS as f64 + 0.5;
     // Both ways give the same number.
-    if units.abs() < i64::MAX as f64 { i128::from(units as i64) } else { long_units(units) }
-}
-
-#[cold]
-#[inline(never)]
-fn long_units(units: f64) -> i128 {
-    units as i128
+    if units.abs() < i64::MAX as f64 { i128::from(units as i64) } else { units as i128 }
 }
 
 /// XXH3 of 128 bits over the inputs and outputs of every control step, in order: equal if two runs are.

@@ -37,7 +37,7 @@ impl Bench {
     pub fn exchange(&mut self, scene: &Scene) -> Result<(), SimError> {
         let mut before = core::mem::replace(&mut self.board, Board::new(&scene.without_events())?);
         let now = &mut self.board;
-        (now.clock, now.start, now.bridges) = (before.clock, before.start, before.bridges);
+        (now.clock, now.bridges) = (before.clock, before.bridges);
         let finger = &mut now.world.fingers[0];
         let finger_before = &mut before.world.fingers[0];
         (finger.now, finger.faults) = (finger_before.now, finger_before.faults);
@@ -61,7 +61,7 @@ impl Bench {
         now.pipeline = before.pipeline.clone();
         (now.frame, now.command, now.next) = (before.frame, before.command, before.next);
         to.bridges.clone_from(&from.bridges);
-        (to.clock, to.start) = (from.clock, from.start);
+        to.clock = from.clock;
         fork.sense = self.sense;
         Ok(fork)
     }

@@ -28,9 +28,9 @@ use output::kept::Whole;
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
+use std::fs;
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
-use std::{fmt, fs};
 
 /// Metadata record of the scene and the controllers, and the one at the end of a complete recording.
 const SETUP: &str = "fingertip.setup";
@@ -76,7 +76,6 @@ pub fn schemas() -> [(&'static str, &'static str, String); 4] {
 /// A scalar of a recording: name, description and value.
 type Scalar = (&'static str, &'static str, fn(&Step) -> f64);
 
-/// Scalars in the order in which they are written.
 pub const SCALARS: [Scalar; 20] = [
     ("time_s", "Virtual time from the scene's start", |s| s.time_s),
     ("goal_n", "Requested force", |s| s.command.goal.0.to_num()),
@@ -174,35 +173,10 @@ fn damage(error: McapError) -> String {
 pub struct Replay {
     /// Steps of all fingers, up to the first difference.
     pub steps: u64,
-    /// First answer of the core that differs.
-    pub difference: Option<Difference>,
+    /// Description of the first answer of the core that differs.
+    pub difference: Option<String>,
 }
 
-/// First difference between a replay and its recording.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Difference {
-    /// Number of the finger, from 0.
-    pub finger: usize,
-    /// Frame of the finger, from 0.
-    pub frame: u64,
-    /// Nanoseconds after the recording's first step.
-    pub time_ns: u64,
-    pub recorded: (i16, String),
-    /// Duty and digest of the replay.
-    pub replayed: (i16, String),
-}
-
-impl fmt::Display for Difference {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { finger, frame, time_ns, recorded, replayed } = self;
-        let ms = *time_ns as f64 * 1e-6;
-        write!(f, "finger {finger} differs first at frame {frame}, {ms:.3} ms in: ")?;
-        write!(f, "recorded duty {} and digest {}, ", recorded.0, recorded.1)?;
-        write!(f, "replayed duty {} and digest {}", replayed.0, replayed.1)
-    }
-}
-
-/// A message of the topic `core`.
 #[derive(Deserialize)]
 struct Core {
     record: String,
@@ -256,7 +230,11 @@ fn replay_bytes(bytes: &[u8]) -> Result<Replay, RunError> {
         digest.add(duty, status);
         let (recorded, replayed) = ((core.duty, core.digest), (duty.0, format!("{:016x}", digest.value())));
         if recorded != replayed {
-            let difference = Difference { finger, frame: *frame, time_ns: message.log_time, recorded, replayed };
+            let ms = message.log_time as f64 * 1e-6;
+            let difference = format!(
+                "finger {finger} differs first at frame {frame}, {ms:.3} ms in: recorded duty {} and digest {}, replayed duty {} and digest {}",
+                recorded.0, recorded.1, replayed.0, replayed.1
+            );
             return Ok(Replay { steps, difference: Some(difference) });
         }
         *frame += 1;
@@ -297,7 +275,6 @@ pub struct Recorder {
 
 #[derive(Default)]
 struct Finger {
-    /// Channels of scalars, frame, image and core.
     channels: [u16; 4],
     steps: u64,
     next_frame_s: f64,

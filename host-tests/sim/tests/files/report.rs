@@ -363,8 +363,7 @@ fn a_recording_replays_to_the_bit_and_one_flipped_bit_is_found_at_its_frame() {
     });
     fs::write(&path, changed).unwrap();
     let difference = replay(&path).unwrap().difference.expect("a changed encoder changes the core's answer");
-    assert_eq!((difference.finger, difference.frame), (0, 300));
-    assert!(difference.to_string().contains("differs first at frame 300"), "{difference}");
+    assert!(difference.starts_with("finger 0 differs first at frame 300, "), "{difference}");
 
     // A duty that was not answered.
     let changed = rewritten(&bytes, |number, core| {
@@ -373,7 +372,7 @@ fn a_recording_replays_to_the_bit_and_one_flipped_bit_is_found_at_its_frame() {
         }
     });
     fs::write(&path, changed).unwrap();
-    assert_eq!(replay(&path).unwrap().difference.unwrap().frame, 200);
+    assert!(replay(&path).unwrap().difference.unwrap().contains("at frame 200, "));
 }
 
 #[test]

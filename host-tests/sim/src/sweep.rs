@@ -25,7 +25,6 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::{fmt, fs};
 
-/// Arguments of a sweep.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Plan {
     /// The scene: a file, or a name out of the library
@@ -76,7 +75,7 @@ pub fn sweep(plan: &Plan, board: Run) -> Result<(Table, PathBuf), RunError> {
     }
     let head = head(plan, first, all);
     let out = plan.out.clone().unwrap_or_else(|| Path::new(FOLDER).join(&head.id));
-    let mut rows = Rows::open(plan, &out, head)?;
+    let mut rows = Rows::open(plan, &out, &head)?;
     say::aside(match rows.done.len() {
         0 => format!("the runs go to {}", out.display()),
         count => format!("goes on in {}, where {count} runs are done", out.display()),
@@ -87,14 +86,14 @@ pub fn sweep(plan: &Plan, board: Run) -> Result<(Table, PathBuf), RunError> {
     let work = |run: usize| {
         let (values, scene) = &points[run / seeds];
         let scene = Scene { seed: scene.seed + (run % seeds) as u64, ..scene.clone() };
-        Ok((run + 1, row(run + 1, values, scene, board)?))
+        Ok((run + 1, row(&head, run + 1, values, scene, board)?))
     };
     cores::each(tasks, work, |(number, row)| {
         progress.inc(1);
         rows.add(number, row)
     })?;
     progress.finish_and_clear();
-    Ok((rows.finish(plan, &out)?, out))
+    Ok((rows.finish(head.columns, plan, &out)?, out))
 }
 
 pub fn progress(all: usize, things: &str) -> Result<ProgressBar, RunError> {
@@ -102,16 +101,18 @@ pub fn progress(all: usize, things: &str) -> Result<ProgressBar, RunError> {
     Ok(ProgressBar::new(all as u64).with_style(ProgressStyle::with_template(&template)?))
 }
 
-/// Row of a run after its number: values, seed, verdict, digest and metrics.
-fn row(number: usize, values: &[String], scene: Scene, board: Run) -> Result<Vec<String>, RunError> {
+/// Row of a run: numbers, values, seed, verdict, digest, metrics and bounds.
+fn row(head: &Head, number: usize, values: &[String], scene: Scene, board: Run) -> Result<Vec<String>, RunError> {
     let seed = scene.seed;
     let outcome =
         run(&scene, board, &mut []).map_err(|error| format!("run {number} (seed {seed}, {values:?}): {error}"))?;
-    let mut row = values.to_vec();
+    let mut row = vec![head.id.clone(), number.to_string(), head.runs.to_string()];
+    row.extend_from_slice(values);
     row.extend([seed.to_string(), u8::from(outcome.passed()).to_string(), outcome.summary.digest.clone()]);
     // Infinite values are left out, as in JSON.
     let value = |name| outcome.measured.get(name).filter(|value| value.is_finite());
     row.extend(METRICS.iter().map(|metric| value(metric.name).map_or(String::new(), |value| value.to_string())));
+    row.extend_from_slice(&head.expected);
     Ok(row)
 }
 
@@ -136,11 +137,9 @@ fn points(plan: &Plan) -> Result<Vec<(Vec<String>, Scene)>, RunError> {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Vary {
     pub key: String,
-    /// Values from the first to the last.
     pub values: Vec<String>,
 }
 
-/// Number of values if none is given.
 const VALUES: usize = 5;
 /// Most values: more are probably a typing error.
 const MOST_VALUES: usize = 100_000;
@@ -225,7 +224,6 @@ fn head(plan: &Plan, scene: &Scene, runs: usize) -> Head {
 
 /// Rows so far, also on disk, so that a sweep that is stopped can continue.
 struct Rows {
-    head: Head,
     /// Rows by the number of their run, from 1.
     done: BTreeMap<usize, Vec<String>>,
     part: part::Part,
@@ -233,7 +231,7 @@ struct Rows {
 
 impl Rows {
     /// Resumes from the rows of an earlier try of the same sweep.
-    fn open(plan: &Plan, out: &Path, head: Head) -> Result<Self, RunError> {
+    fn open(plan: &Plan, out: &Path, head: &Head) -> Result<Self, RunError> {
         let file = out.join(runs_name(plan));
         let name = format!("the sweep {} of {} runs", head.id, head.runs);
         refuse_others(&file, &head.id)?;
@@ -249,13 +247,10 @@ impl Rows {
                 number.ok_or_else(|| format!("{}.part has a row of another form: remove it", file.display()))?;
             rows.insert(number, row);
         }
-        Ok(Self { done: rows, part, head })
+        Ok(Self { done: rows, part })
     }
 
-    fn add(&mut self, number: usize, values: Vec<String>) -> Result<(), RunError> {
-        let Head { id, runs, expected, .. } = &self.head;
-        let first = [id.clone(), number.to_string(), runs.to_string()];
-        let row: Vec<String> = first.into_iter().chain(values).chain(expected.iter().cloned()).collect();
+    fn add(&mut self, number: usize, row: Vec<String>) -> Result<(), RunError> {
         let line = summary::csv([&row])?;
         self.part.add(String::from_utf8(line)?.trim_end())?;
         self.done.insert(number, row);
@@ -263,8 +258,8 @@ impl Rows {
     }
 
     /// Writes the files and then removes the rows so far.
-    fn finish(self, plan: &Plan, out: &Path) -> Result<Table, RunError> {
-        let table = Table { head: self.head.columns, rows: self.done.into_values().collect() };
+    fn finish(self, head: Vec<String>, plan: &Plan, out: &Path) -> Result<Table, RunError> {
+        let table = Table { head, rows: self.done.into_values().collect() };
         self.part.write(table.csv()?)?;
         if plan.shard.is_whole() {
             table.write_rest(out, self.part.lock())?;

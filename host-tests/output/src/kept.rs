@@ -68,7 +68,6 @@ impl Lock {
         }
     }
 
-    /// The file that it is for.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -134,7 +133,6 @@ impl Whole {
         Ok(Self { file: File::create(&new)?, new, path: path.into(), finished: false, _lock: lock })
     }
 
-    /// Puts it in its place.
     pub fn finish(mut self) -> io::Result<()> {
         self.file.sync_all()?;
         fs::rename(&self.new, &self.path)?;

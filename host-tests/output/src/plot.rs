@@ -90,15 +90,12 @@ fn fine_picture(
 /// Content of a panel.
 #[derive(Clone, Debug)]
 pub enum Curve {
-    /// A solid line through points.
     Solid(Vec<(f64, f64)>),
     /// A thin, pale line through points.
     Pale(Vec<(f64, f64)>),
-    /// A dashed line through points.
     Dashed(Vec<(f64, f64)>),
     /// A thin dotted line through points.
     Dotted(Vec<(f64, f64)>),
-    /// A circle at each point.
     Circles(Vec<(f64, f64)>),
 }
 
@@ -143,9 +140,7 @@ pub struct Curves<'a> {
     pub x: &'a str,
     /// The vertical axis, with its unit.
     pub y: &'a str,
-    /// Left and right end.
     pub x_range: [f64; 2],
-    /// Lower and upper end.
     pub y_range: [f64; 2],
     /// First to last, the last on top.
     pub curves: Vec<Curve>,

@@ -8,7 +8,6 @@ use std::sync::OnceLock;
 /// Why nothing more is said.
 static LOST: OnceLock<io::Error> = OnceLock::new();
 
-/// Says a line.
 pub fn line(text: impl Display) {
     show(format_args!("{text}\n"));
 }

@@ -22,7 +22,6 @@ pub const TICK: Duration = Duration::from_millis(1);
 pub trait Finger {
     type Error;
 
-    /// Time of the finger, s.
     fn now_s(&self) -> f64;
 
     /// Advances the finger to a time, or beyond it to the end of a step.
@@ -104,7 +103,6 @@ const LOOK: Duration = Duration::from_secs(5);
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Served {
-    /// Time of the finger, s.
     pub virtual_s: f64,
     pub wall_s: f64,
     pub received: u64,
@@ -116,7 +114,6 @@ pub struct Served {
     pub longest_s: f64,
 }
 
-/// A finger's time against the clock.
 pub struct Pace {
     begun: Instant,
     begun_s: f64,
@@ -131,7 +128,6 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// Begins now, at this time of the finger.
     pub fn new(begun_s: f64, late: Duration, always: bool) -> Self {
         let begun = Instant::now();
         let looked = (begun, begun_s, 0);

@@ -191,7 +191,6 @@ struct Link {
 }
 
 impl Pty {
-    /// Opens one; it and its name.
     fn open(link: Option<&Path>) -> io::Result<(String, Self)> {
         let (near, far) = SerialPort::pair()?;
         let device = rustix::pty::ptsname(&near, Vec::new())?;
@@ -270,7 +269,6 @@ struct Tcp {
 const LAST_READS: usize = 64;
 
 impl Tcp {
-    /// Opens one; it and its name.
     fn open(port: u16) -> io::Result<(String, Self)> {
         let listener = TcpListener::bind(("127.0.0.1", port))
             .map_err(|why| io::Error::new(why.kind(), format!("cannot open TCP port {port}: {why}")))?;

@@ -35,14 +35,12 @@ pub struct Asked {
     pub at_s: f64,
     pub goal_n: f64,
     pub from_n: f64,
-    /// Measurement until the next goal.
     pub meter: Meter,
 }
 
 #[derive(Clone, Debug, Default)]
 pub struct Run {
     pub goals: Vec<Asked>,
-    /// State of the world at each frame.
     pub trace: Vec<Sample>,
     pub pictures: Vec<HeldImage>,
     /// Frames that the controller missed, by its own count.
@@ -84,13 +82,11 @@ pub struct Trace {
     array: Taxels,
     run: Run,
     controllers: Vec<Controller>,
-    /// Last tactile image under the last goal.
     last: Option<HeldImage>,
     fault: Option<Fault>,
 }
 
 impl Trace {
-    /// Creates the watcher of a run of this scene.
     pub fn new(scene: &Scene) -> Self {
         Self { array: Taxels::of(scene), run: Run::default(), controllers: Vec::new(), last: None, fault: None }
     }
@@ -191,7 +187,6 @@ impl Taxels {
 
 // Figures of a run against their bounds, as a table and as pictures.
 
-/// Figures of the true force.
 #[derive(Clone, Debug, Serialize)]
 pub struct Forces {
     pub touch: Touch,
@@ -202,9 +197,7 @@ pub struct Forces {
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Touch {
     pub goal_n: f64,
-    /// Time from the goal to the touch.
     pub touched_after_ms: f64,
-    /// Speed just before the touch.
     pub approach_mm_per_s: Option<f64>,
     pub distance_mm: f64,
     pub peak_n: f64,
@@ -230,7 +223,6 @@ pub struct StepFigures {
     pub steady_error_mn: Option<f64>,
     /// Shortest time in which the motor can do the step from rest to rest.
     pub time_optimal_ms: f64,
-    /// Settling time over the shortest possible time.
     pub settling_to_optimal_ratio: Option<f64>,
 }
 
@@ -238,7 +230,6 @@ pub struct StepFigures {
 pub struct Release {
     /// Time from the goal of 0 to the end of the last contact; none while something is touched.
     pub clear_after_ms: Option<f64>,
-    /// Distance of the tip from the object at the end.
     pub clearance_mm: f64,
 }
 
@@ -251,7 +242,6 @@ pub struct Check {
     /// Lower bound: a figure too good to be true fails too.
     pub at_least: Option<f64>,
     pub at_most: Option<f64>,
-    /// True if the figure lies within its bounds.
     pub pass: bool,
 }
 

@@ -30,7 +30,6 @@ pub struct Metric {
     pub group: &'static str,
     /// Value that counts if a scene has several fingers.
     pub of_several: Worst,
-    /// Value for a finger; none if the run has none.
     pub value: fn(&Finger) -> Option<f64>,
 }
 
@@ -148,7 +147,6 @@ impl Measured {
     }
 }
 
-/// Comparison of a metric with its bound.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
     pub metric: String,
@@ -175,7 +173,6 @@ impl Verdict {
     }
 }
 
-/// Returns the table as Markdown.
 pub fn page() -> String {
     let mut page = String::new();
     for Metric { name, about, of_several, .. } in METRICS {
@@ -232,7 +229,6 @@ const MOTOR: &str = "Motor and energy";
 /// Groups of metrics, in the order of a report.
 pub const GROUPS: [&str; 6] = [FORCE, MOTION, FAULTS, SENSING, OBJECT, MOTOR];
 
-/// Every metric, in the order of the output.
 #[rustfmt::skip]
 pub const METRICS: &[Metric] = &[
     metric("peak_force_n", FORCE, Largest, "largest true normal force", |f| Some(f.peak_n)),

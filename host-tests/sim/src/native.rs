@@ -34,7 +34,6 @@ use twox_hash::xxhash3_128::Hasher;
 pub enum SimError {
     #[error("[controller] {0}")]
     Controller(ConfigError),
-    /// The step is too long for what moves.
     #[error("{0}")]
     Step(String),
 }
@@ -412,7 +411,6 @@ mod tests {
     use fingertip::units::CoreCycles;
     use fingertip::units::Newtons;
 
-    /// Inputs and outputs of a step.
     type Step = (Frame, Sense, Command, Duty, Status);
 
     fn of(change: impl Fn(&mut Step)) -> String {

@@ -35,7 +35,6 @@ use std::time::Instant;
 
 #[derive(Clone, Debug)]
 pub struct Population {
-    /// The file's name without its ending.
     pub name: String,
     /// File as errors name it.
     pub file: String,
@@ -54,7 +53,6 @@ pub struct Population {
 struct Place {
     at: Range<usize>,
     key: String,
-    /// True if only whole numbers are allowed.
     whole: bool,
     /// Draw of the value; none if the scene has nothing there.
     draw: Option<Draw>,
@@ -73,7 +71,6 @@ struct Events {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Counted {
     pub metric: String,
-    /// Value above which a finger counts.
     pub above: f64,
 }
 
@@ -146,7 +143,6 @@ impl Population {
     }
 }
 
-/// Formats a value for the text of a scene.
 fn written(value: &Drawn, whole: bool) -> String {
     match value {
         Drawn::Number(number) if whole => format!("{number:.0}"),

@@ -23,7 +23,6 @@ pub struct Report<'a> {
     pub trace: &'a Trace,
     /// Metrics without each effect, if requested.
     pub ablated: &'a [Without],
-    /// Another run, drawn over this one.
     pub over: Option<&'a Over>,
 }
 
@@ -365,13 +364,11 @@ pub fn embedded(data: &Value) -> String {
 }
 
 impl Over {
-    /// Reads the run of another report.
     pub fn read(path: &Path) -> Result<Self, RunError> {
         let page = fs::read_to_string(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
         Self::of(&page).map_err(|why| format!("{}: {why}", path.display()).into())
     }
 
-    /// Reads the run from the text of a report.
     pub fn of(page: &str) -> Result<Self, String> {
         let again = "write it again with `--out`";
         let (_, rest) = page.split_once(BEGIN).ok_or(format!("this is no report with a run in it; {again}"))?;

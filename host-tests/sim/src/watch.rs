@@ -52,7 +52,6 @@ pub struct Truth {
     pub winding_c: f64,
     /// Tangential force on the object, upwards.
     pub tangential_n: f64,
-    /// Distance that the contact has slipped since the start.
     pub slip_mm: f64,
     /// Place of the object along the fingers' motion and upwards.
     pub object_mm: [f64; 2],

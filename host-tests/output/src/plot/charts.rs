@@ -9,7 +9,6 @@ const POINTS_MAX: usize = 1_800;
 const WIDTH_PX: u32 = 900;
 /// Narrow, so that the letters can be read on a phone.
 const STEPS_WIDTH_PX: u32 = 640;
-/// Width of the mean.
 const SMOOTH_S: f64 = 0.01;
 
 /// The world and the controller at one instant.
@@ -17,7 +16,6 @@ const SMOOTH_S: f64 = 0.01;
 pub struct Sample {
     pub time_s: f64,
     pub goal_n: f64,
-    /// The contact force as it is.
     pub true_force_n: f64,
     pub travel_mm: f64,
     pub indentation_mm: f64,

@@ -32,9 +32,7 @@ struct Sample {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hold {
     pub goal_n: f64,
-    /// Mean of the true force.
     pub mean_n: f64,
-    /// Range of the true force.
     pub swing_n: f64,
     pub missed: bool,
     /// True if a fault had stopped the motor.
@@ -93,7 +91,6 @@ pub(super) struct Ended {
 }
 
 impl Conduct {
-    /// Conduct under the limits of these parameters.
     pub fn of(params: &Params) -> Self {
         let [approach_mm_per_s, clearance_mm, travel_mm] =
             [params.approach_um_per_s, params.clearance_um, params.travel_max_um].map(|um| f64::from(um) * 1e-3);
@@ -237,13 +234,11 @@ impl Ended {
         self.holds.iter().map(|hold| AtGoal { goal_n: hold.goal_n, value: 1e3 * hold.swing_n }).collect()
     }
 
-    /// Returns the number of holds that touched nothing.
     pub fn missed(&self) -> usize {
         self.holds.iter().filter(|hold| hold.missed && !hold.faulty).count()
     }
 }
 
-/// Mean, deviation from it, and range.
 struct Spread {
     mean: f64,
     deviation: f64,

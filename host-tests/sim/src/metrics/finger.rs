@@ -28,7 +28,6 @@ fn sensed_n(status: &Status) -> f64 {
 pub(super) struct Squares {
     sum: f64,
     time_s: f64,
-    /// The largest magnitude.
     pub max: f64,
 }
 
@@ -217,7 +216,6 @@ impl Finger {
     }
 }
 
-/// True if a change of the goal is not a step to judge.
 pub(super) fn trimmed(from_n: f64, to_n: f64) -> bool {
     from_n > 0.0 && to_n > 0.0 && (to_n - from_n).abs() < STEP_N
 }
@@ -299,7 +297,6 @@ impl Response {
         Some(self.inside_since_s? - self.start_s?)
     }
 
-    /// True later than 100 ms after the start.
     pub fn is_steady(&self, time_s: f64) -> bool {
         self.start_s.is_some_and(|start_s| time_s >= start_s + STEADY_AFTER_S)
     }

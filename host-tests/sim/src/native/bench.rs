@@ -90,7 +90,6 @@ impl Bench {
         self.unit().pipeline.status()
     }
 
-    /// Returns the last frame, the sensed values and the command.
     pub fn record(&self) -> Record {
         Record { frame: self.unit().frame, sense: self.sense, command: self.unit().command }
     }
@@ -188,7 +187,6 @@ impl Bench {
         self.board.world.truth(0, false)
     }
 
-    /// Puts the tip at rest at a travel.
     pub fn place(&mut self, travel_mm: f64) {
         self.finger_mut().place(travel_mm);
     }
@@ -212,7 +210,6 @@ impl Bench {
 }
 
 impl Default for Bench {
-    /// The reference finger under a controller with the default parameters.
     fn default() -> Self {
         Self::of(&Setup::default(), &Config::shipped(&images::CONFIRMED).expect("the defaults are allowed"))
     }

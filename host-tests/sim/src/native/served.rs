@@ -24,7 +24,6 @@ use fingertip::state::{Fault, Mode};
 use fingertip::store::settle;
 use std::collections::VecDeque;
 
-/// Bytes for the host.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
     /// Virtual time at which they are due.
@@ -138,7 +137,6 @@ impl Bus {
         }
     }
 
-    /// Receives bytes of the host.
     pub fn hear(&mut self, bytes: &[u8]) {
         let now_s = self.now_s();
         let mut said: VecDeque<(usize, Answer)> = (0..self.devices.len())
@@ -155,7 +153,6 @@ impl Bus {
         }
     }
 
-    /// Time at which the next answer is due.
     pub fn due_s(&self) -> Option<f64> {
         self.answers.front().map(|answer| answer.due_s)
     }
@@ -236,7 +233,6 @@ impl Device {
         pipeline
     }
 
-    /// Time since the last good packet, ms.
     fn silent_ms(&mut self, now_s: f64) -> u16 {
         let packets = self.server.good_packets();
         if packets != self.packets.0 {
@@ -284,7 +280,6 @@ impl Device {
     }
 }
 
-/// Describes the true state of a finger and its status.
 pub fn line(truth: &Truth, status: &Status) -> String {
     let sensed_n = f64::from(status.contact.force.0);
     let fault = status.fault.map_or(String::new(), |fault| format!(", fault {} ({fault:?})", fault as u32));
@@ -303,7 +298,6 @@ const MM_PER_S_MAX: f64 = 500.0;
 /// Gap between an object that is put in place and a tip beyond that place.
 const GAP_MM: f64 = 0.2;
 
-/// Place and goal of the object.
 struct Object {
     scene_mm: f64,
     now_mm: f64,
@@ -317,7 +311,6 @@ impl Object {
         Self { scene_mm, now_mm: scene_mm, goal_mm: scene_mm, mm_per_s: MM_PER_S }
     }
 
-    /// Advances towards the goal.
     fn approach(&mut self, world: &mut World, dt_s: f64) {
         if self.now_mm != self.goal_mm {
             let most_mm = self.mm_per_s * dt_s;
@@ -423,7 +416,6 @@ fn number(text: &str, name: &str, least: f64, most: f64) -> Result<f64, String> 
     number.ok_or_else(|| format!("{name} of `{text}`: needs a number from {least} to {most}"))
 }
 
-/// Defect of a finger.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Kind {
     /// No frame arrives: fault 1.

@@ -12,14 +12,11 @@ use crate::watch::Watch;
 use fingertip::contact::FitLevel;
 use std::fmt::Write as _;
 
-/// Population that holds these forces.
 pub(super) const POPULATION: &str = "budget";
 /// Forces that it holds, N.
 pub const GOALS_N: [f64; 4] = [0.5, 1.0, 2.0, 5.0];
-/// Seed of the draws of the fingers.
 pub(super) const SEED: u64 = 1;
 
-/// Cause of an error of the force.
 #[derive(Clone, Copy, Debug)]
 pub struct Cause {
     pub about: &'static str,
@@ -67,7 +64,6 @@ const fn cause(about: &'static str, names: &'static [&'static str], answer: &'st
 pub type Errors = [f64; GOALS_N.len()];
 /// Errors of a finger for each goal, N; none if a fault ended the hold.
 pub(super) type Held = [Option<f64>; GOALS_N.len()];
-/// Errors of each finger.
 pub(super) type Off = Vec<Held>;
 
 /// Errors with all causes, without each of them, and without all.
@@ -141,7 +137,6 @@ fn cell(errors: &Errors, goal: usize) -> String {
     format!("{:.0}", 1e3 * errors[goal])
 }
 
-/// Errors of a finger's holds.
 pub(super) fn off_n(holds: &[Hold]) -> Held {
     GOALS_N.map(|goal_n| {
         let hold = holds.iter().find(|hold| hold.goal_n == goal_n && !hold.faulty)?;

@@ -14,9 +14,7 @@ pub enum Drawn {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Draw {
     Always(Drawn),
-    /// Uniform distribution between two values.
     Uniform([f64; 2]),
-    /// Log-uniform distribution between two values.
     LogUniform([f64; 2]),
     /// Normal distribution by mean and deviation, drawn again beyond three deviations.
     Normal([f64; 2]),
@@ -26,7 +24,6 @@ pub enum Draw {
     Is(String),
     /// Draw by the value of a variable that is a word.
     By(String, Vec<(String, Draw)>),
-    /// Draw, multiplied by a factor.
     Times(f64, Box<Draw>),
 }
 

@@ -146,12 +146,10 @@ impl Report {
         });
     }
 
-    /// Number of fingers that kept all promises.
     pub fn inside(&self) -> usize {
         self.fingers.iter().filter(|ran| ran.inside).count()
     }
 
-    /// Additional counts, with their numbers of fingers.
     pub fn counted(&self) -> impl Iterator<Item = (&Counted, usize)> {
         self.counted.iter().map(|counted| {
             let above = |ran: &&Ran| ran.metric(&counted.metric) > Some(counted.above);
@@ -159,7 +157,6 @@ impl Report {
         })
     }
 
-    /// Each promise over all fingers.
     pub fn promises(&self) -> Vec<Row> {
         let of = |place: usize| self.fingers.iter().filter_map(move |ran| ran.promises.get(place));
         let names =
@@ -188,7 +185,6 @@ impl Report {
         fingers
     }
 
-    /// Report for scripts.
     pub fn json(&self) -> Result<String, RunError> {
         Ok(serde_json::to_string_pretty(self)? + "\n")
     }

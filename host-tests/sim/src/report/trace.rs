@@ -19,7 +19,6 @@ const HELD_AFTER_S: f64 = 0.1;
 /// Pressure maps of a run.
 const MAPS: usize = 150;
 
-/// A quantity in a stretch of time.
 #[derive(Clone, Copy, Debug)]
 struct Stretch {
     number: u64,
@@ -30,7 +29,6 @@ struct Stretch {
     count: f64,
 }
 
-/// A quantity over time.
 #[derive(Clone, Debug, Default)]
 pub struct Track(Vec<Stretch>);
 
@@ -130,7 +128,6 @@ pub const QUANTITIES: [Quantity; 8] = [
     ("Height of the object", "mm", Drawn::IfItMoves, |s| s.truth.object_mm[1]),
 ];
 
-/// Quantities of a finger over time.
 #[derive(Clone, Debug, Default)]
 pub struct Tracks {
     /// Time, s.

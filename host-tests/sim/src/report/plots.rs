@@ -43,22 +43,16 @@ pub fn all(tracks: &Tracks) -> Vec<Plot> {
     // A goal is not averaged within a stretch: its last value counts.
     let mut goal_line = line("goal", Style::Goal, goal);
     goal_line.kept.iter_mut().flatten().for_each(|kept| kept.mean = kept.last);
-    let one = |title, unit, track| Plot {
-        title,
-        unit,
-        about: format!("{title}: its mean (solid), from the least to the largest (pale), in {unit}"),
-        range: None,
-        lines: vec![line(title, Style::Main, track)],
-    };
-    let smooth = |title, unit, track: &Track| {
+    let one = |title, unit, track: &Track, smooth: bool| {
         let mut line = line(title, Style::Main, track);
-        line.kept.iter_mut().flatten().zip(track.smooth()).for_each(|(kept, mean)| kept.mean = mean);
-        let about = format!(
-            "{title}: its mean over a hundredth of the run (solid), from the least to the largest (pale), in {unit}"
-        );
+        if smooth {
+            line.kept.iter_mut().flatten().zip(track.smooth()).for_each(|(kept, mean)| kept.mean = mean);
+        }
+        let over = if smooth { " over a hundredth of the run" } else { "" };
+        let about = format!("{title}: its mean{over} (solid), from the least to the largest (pale), in {unit}");
         Plot { title, unit, about, range: None, lines: vec![line] }
     };
-    let mut control_error = one("True force less the goal", "mN", control_error);
+    let mut control_error = one("True force less the goal", "mN", control_error, false);
     if held_error.ends().is_some() {
         control_error.about += "; the axis fits the holds, what is beyond it is cut off";
     }
@@ -77,11 +71,8 @@ pub fn all(tracks: &Tracks) -> Vec<Plot> {
     let others = others.map(|(title, unit)| (title, unit, Drawn::IfItMoves)).into_iter().zip(differences);
     let own = QUANTITIES.map(|(title, unit, drawn, _)| (title, unit, drawn)).into_iter().zip(quantities);
     for ((title, unit, drawn), track) in own.chain(others) {
-        match drawn {
-            Drawn::Smooth => plots.push(smooth(title, unit, track)),
-            Drawn::Plain => plots.push(one(title, unit, track)),
-            Drawn::IfItMoves if track.moves() => plots.push(one(title, unit, track)),
-            Drawn::IfItMoves => {}
+        if drawn != Drawn::IfItMoves || track.moves() {
+            plots.push(one(title, unit, track, drawn == Drawn::Smooth));
         }
     }
     plots

@@ -17,33 +17,27 @@ pub(super) const POPULATION: &str = "budget";
 pub const GOALS_N: [f64; 4] = [0.5, 1.0, 2.0, 5.0];
 pub(super) const SEED: u64 = 1;
 
-#[derive(Clone, Copy, Debug)]
-pub struct Cause {
-    pub about: &'static str,
-    /// Variables and keys that are 0 without the cause.
-    names: &'static [&'static str],
-    /// Remedy, and its cost.
-    answer: &'static str,
-}
+/// Cause of an error of the force: description, variables and keys that are 0 without it, remedy and its cost.
+pub type Cause = (&'static str, &'static [&'static str], &'static str);
 
 /// All causes, as the population names them.
 pub const CAUSES: [Cause; 12] = [
-    cause("taxels' gains, 0 to 10 % rms apart", &["effects.gain_spread.rms_percent"], "a better array"),
-    cause("the array's gain, known to 2 % rms", &["gain_off"], "a press on a scale"),
-    cause("the modulus, known to 5 % rms", &["modulus_off"], "a press, or a scale"),
-    cause("the radius, known to 1 % rms", &["radius_off"], "a calliper"),
-    cause("hysteresis, 0 to 10 %", &["effects.hysteresis.width_percent"], "none in the firmware"),
-    cause(
+    ("taxels' gains, 0 to 10 % rms apart", &["effects.gain_spread.rms_percent"], "a better array"),
+    ("the array's gain, known to 2 % rms", &["gain_off"], "a press on a scale"),
+    ("the modulus, known to 5 % rms", &["modulus_off"], "a press, or a scale"),
+    ("the radius, known to 1 % rms", &["radius_off"], "a calliper"),
+    ("hysteresis, 0 to 10 %", &["effects.hysteresis.width_percent"], "none in the firmware"),
+    (
         "creep, 0 to 4 % a decade",
         &["effects.creep.rate_percent_per_decade"],
         "a gain from the reading one second after a weight is put on; `creep_permille` for later creep",
     ),
-    cause("warming, 0 to 20 K", &["effects.temperature_drift.warming_k"], "repeated tares"),
-    cause("noise, 0.3 to 3 codes rms", &["effects.noise.rms_codes"], "the sum over the patch"),
-    cause("offsets, 0 to 5 codes rms", &["effects.offset.rms_codes"], "the tare"),
-    cause("relaxation of the tip, 0 to 15 %", &["effects.relaxation.share"], "none needed: the array measures it"),
-    cause("touched off the middle, by up to 3.5 mm", &["object.centre_x_mm", "object.centre_y_mm"], "the fit"),
-    cause(
+    ("warming, 0 to 20 K", &["effects.temperature_drift.warming_k"], "repeated tares"),
+    ("noise, 0.3 to 3 codes rms", &["effects.noise.rms_codes"], "the sum over the patch"),
+    ("offsets, 0 to 5 codes rms", &["effects.offset.rms_codes"], "the tare"),
+    ("relaxation of the tip, 0 to 15 %", &["effects.relaxation.share"], "none needed: the array measures it"),
+    ("touched off the middle, by up to 3.5 mm", &["object.centre_x_mm", "object.centre_y_mm"], "the fit"),
+    (
         "tilted, round or soft objects",
         &[
             "effects.tilted_plane.along_columns_deg",
@@ -55,10 +49,6 @@ pub const CAUSES: [Cause; 12] = [
         "the fit, in part",
     ),
 ];
-
-const fn cause(about: &'static str, names: &'static [&'static str], answer: &'static str) -> Cause {
-    Cause { about, names, answer }
-}
 
 /// Root mean squares over all fingers for each goal, N.
 pub type Errors = [f64; GOALS_N.len()];
@@ -84,7 +74,7 @@ impl Budget {
     pub fn of(fingers: usize, board: Run, calibrated: Run) -> Result<Self, RunError> {
         let population = load(POPULATION)?;
         let off_on = |board: Run, causes: &[Cause]| {
-            let less = causes.iter().try_fold(population.clone(), |less, cause| less.without(cause.names))?;
+            let less = causes.iter().try_fold(population.clone(), |less, (_, names, _)| less.without(names))?;
             let fingers = super::fingers(&less, SEED, fingers, Shard::WHOLE, board)?;
             Ok::<Off, RunError>(fingers.iter().map(|ran| off_n(&ran.holds)).collect())
         };
@@ -126,8 +116,8 @@ impl Budget {
         row("**all: the error itself**", &self.all, &self.none, "");
         let minutes = "[three presses on a plate, three holds on a scale](commissioning.md), in a quarter of an hour";
         row("**all, calibrated**", &self.calibrated, &self.none, minutes);
-        for (cause, (changes, left)) in causes {
-            row(cause.about, changes, left, cause.answer);
+        for ((about, _, answer), (changes, left)) in causes {
+            row(about, changes, left, answer);
         }
         text
     }

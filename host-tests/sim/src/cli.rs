@@ -151,11 +151,9 @@ pub fn run_scene(args: &Args, scene: &Scene, board: Run) -> Result<bool, RunErro
     let recorder = |out: &PathBuf| {
         make_folder(out)?;
         let path = out.join("run.mcap");
-        match args.board {
-            Board::Native => Recorder::new(&path, scene, args.every),
-            // The emulated board shows a step each millisecond.
-            Board::Virtual | Board::Both => Ok(Recorder::new(&path, scene, 1)?.seen_from_outside()),
-        }
+        // The emulated board shows a step each millisecond.
+        let whole = args.board == Board::Native;
+        Recorder::new(&path, scene, if whole { args.every } else { 1 }, whole)
     };
     let mut recorder = args.out.as_ref().map(recorder).transpose()?;
     let mut watchers: Vec<&mut dyn Watch> = Vec::new();

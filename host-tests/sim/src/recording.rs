@@ -282,8 +282,9 @@ struct Finger {
 
 impl Recorder {
     /// Records into a new file, which appears under its name when it is finished, with the scalars of each `every`-th
-    /// step.
-    pub fn new(path: &Path, scene: &Scene, every: u64) -> Result<Self, RunError> {
+    /// step. The steps of a board that is seen from outside are not `whole`: they lack inputs of the core, so a replay is
+    /// impossible.
+    pub fn new(path: &Path, scene: &Scene, every: u64, whole: bool) -> Result<Self, RunError> {
         let file = Whole::create(path).map_err(|error| cannot_write(path, &error))?;
         let library = concat!("fingertip-sim/", env!("CARGO_PKG_VERSION"));
         let options = WriteOptions::new().profile("").library(library).compression(Some(Compression::Lz4));
@@ -292,17 +293,11 @@ impl Recorder {
             out: options.create(BufWriter::new(file))?,
             scene: scene.clone(),
             every: every.max(1),
-            whole: true,
+            whole,
             fingers: Vec::new(),
             start_s: None,
             failed: Ok(()),
         })
-    }
-
-    /// Notes before the run that the steps lack inputs of the core, so a replay is impossible.
-    pub fn seen_from_outside(mut self) -> Self {
-        self.whole = false;
-        self
     }
 
     /// Closes the file after the run and moves it to its place. After a failure an earlier file remains.

@@ -239,7 +239,7 @@ fn a_report_lies_over_another_whatever_the_scenes_are_called() {
 /// Runs a scene with a recorder that writes every n-th frame as a message. Returns the file, the trace and the outcome.
 fn recorded(name: &str, scene: &Scene, every: u64) -> (PathBuf, (Trace, Outcome)) {
     let path = folder(&format!("recorded/{name}")).join("run.mcap");
-    let mut recorder = Recorder::new(&path, scene, every).unwrap();
+    let mut recorder = Recorder::new(&path, scene, every, true).unwrap();
     let mut trace = Trace::new(scene.duration_s);
     let outcome = run(scene, &native::board, &mut [&mut recorder, &mut trace]).unwrap();
     recorder.finish(&outcome.summary.digest).unwrap();

@@ -73,9 +73,6 @@ impl Lock {
     }
 
     /// Replaces the file.
-    ///
-    /// # Errors
-    /// The file cannot be written; then the old one remains.
     pub fn write(&self, bytes: impl AsRef<[u8]>) -> io::Result<()> {
         self.write_with(&self.path, bytes)
     }
@@ -121,9 +118,6 @@ pub struct Whole {
 
 impl Whole {
     /// Begins a file.
-    ///
-    /// # Errors
-    /// The file cannot be written, or another process writes it.
     pub fn create(path: &Path) -> io::Result<Self> {
         Self::begin(path, Some(Lock::take(path)?))
     }

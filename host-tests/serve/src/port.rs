@@ -19,7 +19,6 @@ use std::time::Duration;
 
 const BUFFER: usize = 4096;
 
-/// Kind and name of the port that offers a finger.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
     /// A pseudo-terminal, with a symbolic link to it where one is wanted.
@@ -157,7 +156,6 @@ impl Side {
         }
     }
 
-    /// Returns the next whole line.
     fn line(&mut self) -> Option<String> {
         let end = self.bytes.iter().position(|byte| *byte == b'\n')?;
         let line: Vec<u8> = self.bytes.drain(..=end).collect();

@@ -73,7 +73,6 @@ pub fn schemas() -> [(&'static str, &'static str, String); 4] {
     ]
 }
 
-/// A scalar of a recording: name, description and value.
 type Scalar = (&'static str, &'static str, fn(&Step) -> f64);
 
 pub const SCALARS: [Scalar; 20] = [

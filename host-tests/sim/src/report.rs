@@ -21,7 +21,6 @@ pub struct Report<'a> {
     pub board: &'a str,
     pub outcome: &'a Outcome,
     pub trace: &'a Trace,
-    /// Metrics without each effect, if requested.
     pub ablated: &'a [Without],
     pub over: Option<&'a Over>,
 }

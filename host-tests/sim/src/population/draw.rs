@@ -124,7 +124,6 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// Spread of values in any order.
     pub fn of(mut values: Vec<f64>) -> Self {
         values.sort_by(f64::total_cmp);
         let rank = |share: f64| values.get(((values.len() as f64 * share).ceil() as usize).max(1) - 1).copied();

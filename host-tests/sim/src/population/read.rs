@@ -166,7 +166,6 @@ fn check(sound: bool, value: &Value, message: &str, allowed: &str) -> Result<(),
     if sound { Ok(()) } else { Err(wrong(value, message, allowed)) }
 }
 
-/// Folder of the populations of the project.
 pub fn folder() -> PathBuf {
     Path::new(env!("FINGERTIP_ROOT")).join("host-tests/sim/populations")
 }
@@ -227,7 +226,6 @@ fn bounds(base: &mut ArrayOfTables, over: &ArrayOfTables) {
     }
 }
 
-/// A file's name without its ending.
 pub fn stem(file: &str) -> String {
     Path::new(file).file_stem().map_or(String::new(), |stem| stem.to_string_lossy().into_owned())
 }

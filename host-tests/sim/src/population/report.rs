@@ -28,7 +28,6 @@ pub struct Report {
     pub id: String,
     /// Additional counts, not part of the envelope.
     pub counted: Vec<Counted>,
-    /// Summary for scripts.
     pub summary: Value,
     pub fingers: Vec<Ran>,
 }
@@ -70,7 +69,6 @@ impl Ran {
         self.promises.iter().max_by(|a, b| a.excess().total_cmp(&b.excess()))
     }
 
-    /// Returns a metric; none if the run has none.
     pub fn metric(&self, name: &str) -> Option<f64> {
         self.metrics.get(name)?.as_f64()
     }

@@ -12,7 +12,6 @@ pub enum Style {
     Main,
     /// Thin, in a second colour, on top.
     Second,
-    /// Dashed.
     Goal,
 }
 

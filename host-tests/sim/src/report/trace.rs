@@ -89,7 +89,6 @@ impl Track {
         self.0.first().map(|first| self.0.iter().fold([first.low, first.high], wider))
     }
 
-    /// True if it has different values.
     pub fn moves(&self) -> bool {
         self.ends().is_some_and(|[low, high]| low < high)
     }
@@ -103,7 +102,6 @@ pub struct Instant {
     pub codes: [[i32; COLUMNS]; ROWS],
 }
 
-/// Way in which a quantity is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Drawn {
     Plain,
@@ -160,7 +158,6 @@ impl Tracks {
     }
 }
 
-/// Watches a run for a report.
 #[derive(Clone, Debug)]
 pub struct Trace {
     duration_s: f64,

@@ -59,7 +59,6 @@ pub fn rows(table: &Table) -> Vec<Vec<String>> {
     lines
 }
 
-/// All rows of a sweep or of a shard, in order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
     pub head: Vec<String>,

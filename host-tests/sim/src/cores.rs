@@ -2,7 +2,6 @@
 
 use std::convert::Infallible;
 use std::num::NonZero;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, mpsc};
 use std::thread;
 
@@ -29,21 +28,18 @@ pub fn each<T, R: Send, E: Send>(
 ) -> Result<(), E> {
     let tasks = Mutex::new(tasks.into_iter());
     let next = || tasks.lock().expect("a task is only taken there").next();
-    let stop = AtomicBool::new(false);
     let (sender, results) = mpsc::channel();
     thread::scope(|scope| {
         for _ in 0..thread::available_parallelism().map_or(1, NonZero::get) {
-            let (sender, next, stop, work) = (sender.clone(), &next, &stop, &work);
+            let (sender, next, work) = (sender.clone(), &next, &work);
             scope.spawn(move || {
-                while !stop.load(Ordering::Relaxed)
-                    && let Some(task) = next()
+                // After an error nobody receives.
+                while let Some(task) = next()
                     && sender.send(work(task)).is_ok()
                 {}
             });
         }
         drop(sender);
-        let finished = results.into_iter().try_for_each(|result| done(result?));
-        stop.store(finished.is_err(), Ordering::Relaxed);
-        finished
+        results.into_iter().try_for_each(|result| done(result?))
     })
 }

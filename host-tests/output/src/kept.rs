@@ -111,7 +111,6 @@ pub struct Whole {
     file: File,
     new: PathBuf,
     path: PathBuf,
-    finished: bool,
     /// Dropped last; none where the writer holds it.
     _lock: Option<Lock>,
 }
@@ -124,13 +123,12 @@ impl Whole {
 
     fn begin(path: &Path, lock: Option<Lock>) -> io::Result<Self> {
         let new = beside(path, "new");
-        Ok(Self { file: File::create(&new)?, new, path: path.into(), finished: false, _lock: lock })
+        Ok(Self { file: File::create(&new)?, new, path: path.into(), _lock: lock })
     }
 
-    pub fn finish(mut self) -> io::Result<()> {
+    pub fn finish(self) -> io::Result<()> {
         self.file.sync_all()?;
         fs::rename(&self.new, &self.path)?;
-        self.finished = true;
         // The folder holds the name. Not every system lets a folder be brought to the disk.
         let folder = self.path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let _ = File::open(folder).and_then(|folder| folder.sync_all());
@@ -156,9 +154,8 @@ impl Seek for Whole {
 
 impl Drop for Whole {
     fn drop(&mut self) {
-        if !self.finished {
-            let _ = fs::remove_file(&self.new);
-        }
+        // A finished file has another name by now, and nobody else begins one under this lock.
+        let _ = fs::remove_file(&self.new);
     }
 }
 

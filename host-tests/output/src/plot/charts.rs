@@ -27,6 +27,7 @@ pub struct Sample {
 #[derive(Clone, Debug)]
 pub struct Panel<'a> {
     pub title: String,
+    /// Those of the time that is shown.
     pub samples: &'a [Sample],
     /// The instant that counts as 0.
     pub zero_s: f64,
@@ -111,10 +112,8 @@ fn draw_key(area: &Area<'_>) -> Result<(), PlotError> {
 fn draw_panel(panel: &Panel<'_>, area: &Area<'_>) -> Result<(), PlotError> {
     let [before_ms, after_ms] = panel.shown_ms;
     let ms = |sample: &Sample| (sample.time_s - panel.zero_s) * 1e3;
-    let shown = |sample: &&Sample| (-before_ms..=after_ms).contains(&ms(sample));
-    let samples: Vec<Sample> = panel.samples.iter().filter(shown).copied().collect();
-    let force: Vec<_> = samples.iter().map(|s| (ms(s), s.true_force_n)).collect();
-    let goal = steps_of(&samples, |s| (ms(s), s.goal_n));
+    let force: Vec<_> = panel.samples.iter().map(|s| (ms(s), s.true_force_n)).collect();
+    let goal = steps_of(panel.samples, |s| (ms(s), s.goal_n));
     let high = top(force.iter().chain(&goal).map(|(_, n)| *n));
     let earliest = panel.time_optimal_ms.map(|optimal_ms| Curve::Dotted(vec![(optimal_ms, 0.0), (optimal_ms, high)]));
     let curves = earliest.into_iter().chain([Curve::Dashed(goal), Curve::Solid(force)]).collect();

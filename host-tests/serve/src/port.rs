@@ -201,7 +201,8 @@ impl Pty {
 
     fn read(&mut self, baud: Option<u32>) -> Vec<u8> {
         let bytes = read(&self.near).unwrap_or_default();
-        let (Some(baud), Some(set)) = (baud, self.baud()) else { return bytes };
+        let settings = tcgetattr(&self.far).ok();
+        let (Some(baud), Some(set)) = (baud, settings.map(|settings| settings.output_speed())) else { return bytes };
         if set == baud {
             self.unheard = None;
             return bytes;
@@ -215,10 +216,6 @@ impl Pty {
     fn write(&mut self, bytes: &[u8]) {
         // Without a reader it is lost.
         let _ = rustix::io::write(&self.near, bytes);
-    }
-
-    fn baud(&self) -> Option<u32> {
-        tcgetattr(&self.far).ok().map(|settings| settings.output_speed())
     }
 }
 

@@ -249,12 +249,8 @@ pub fn read(file: &str, text: &str) -> Result<Population, SceneErrors> {
     let events = parts.events(root);
     parts.unused(root);
     let counted = parts.counted(root);
-    for name in OWN {
-        if root.contains_key(name) {
-            let blanks = own_text(root, name);
-            parts.keys.extend(blanks.into_iter().map(|at| Place { at, key: String::new(), whole: false, draw: None }));
-        }
-    }
+    let blanks = OWN.iter().flat_map(|name| own_text(root, name));
+    parts.keys.extend(blanks.map(|at| Place { at, key: String::new(), whole: false, draw: None }));
     let Parts { variables, mut keys, wrong, .. } = parts;
     if !wrong.is_empty() {
         let mut errors: Vec<SceneError> = wrong.into_iter().map(error).collect();

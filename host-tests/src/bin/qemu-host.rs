@@ -49,14 +49,6 @@ fn compare(image: &Path, folder: &Path, failure: Option<&str>) -> Result<(), Box
     println!("steps                  {}", figure("steps")?);
     println!("digest, emulated       {emulated}");
     println!("digest, this machine   {host}");
-    println!(
-        "instructions a step    {} mean, {} to {} (to +-{} of the emulator's clock)",
-        figure("instructions_mean")?,
-        figure("instructions_min")?,
-        figure("instructions_max")?,
-        resolution(figure("ticks_per_million_instructions")?)?
-    );
-    println!("instructions in all    {}", figure("instructions_total")?);
     if figure("steps")? != records.len().to_string() || emulated != host {
         return Err("FAILED: the emulated core and this machine differ".into());
     }
@@ -69,9 +61,4 @@ fn compare(image: &Path, folder: &Path, failure: Option<&str>) -> Result<(), Box
     }
     println!("The emulated core gives the same bits as this machine.");
     Ok(())
-}
-
-/// Instructions in a tick, rounded up.
-fn resolution(ticks_per_million: &str) -> Result<u64, Box<dyn Error>> {
-    Ok(1_000_000_u64.div_ceil(ticks_per_million.parse::<u64>()?.max(1)))
 }

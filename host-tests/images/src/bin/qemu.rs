@@ -5,8 +5,7 @@
 //! recording, and a failure to cause in the middle. Each failure prints a line that begins with `FAILED:` and ends the
 //! emulator with an error.
 //!
-//! SysTick is stopwatch and watchdog in one: it restarts before each step, and if it ever runs out, the step hangs.
-//! A loop of known length measures the instructions in a tick, so the counts do not depend on the emulator's clocks.
+//! SysTick is the watchdog: it restarts before each step, and if it ever runs out, the step hangs.
 #![no_std]
 #![no_main]
 
@@ -18,9 +17,7 @@ mod host;
 use cortex_m::peripheral::{SYST, syst::SystClkSource};
 use cortex_m_rt::{ExceptionFrame, exception};
 use cortex_m_semihosting::debug;
-use embassy_executor::Spawner;
 use fingertip::shipped::{Config, Pipeline};
-use fingertip::units::Duty;
 use host::{File, command_line, fail, say};
 use images::record::{Digest, MAGIC, Record};
 use images::same_bits::{Comparison, INPUTS};
@@ -32,13 +29,11 @@ static CORRECTED: StaticCell<Pipeline> = StaticCell::new();
 
 /// SysTick counts down from here, 24 bits.
 const TICKS_MAX: u32 = 0x00ff_ffff;
-/// Instructions of the loop that measures the time of an instruction.
-const LOOP_INSTRUCTIONS: u64 = 1_000_000;
 /// Inputs that the functions take between two restarts of SysTick.
 const INPUTS_A_WATCH: u32 = 16;
 
-#[embassy_executor::main]
-async fn main(_spawner: Spawner) {
+#[cortex_m_rt::entry]
+fn main() -> ! {
     let Some(mut syst) = cortex_m::Peripherals::take().map(|peripherals| peripherals.SYST) else {
         fail("the peripherals are taken")
     };
@@ -50,9 +45,11 @@ async fn main(_spawner: Spawner) {
 
     let mut line = [0; 256];
     let (name, rest) = words(command_line(&mut line));
-    replay(name, rest, &mut syst).await;
+    replay(name, rest, &mut syst);
     compare(&mut syst);
-    debug::exit(debug::EXIT_SUCCESS);
+    loop {
+        debug::exit(debug::EXIT_SUCCESS);
+    }
 }
 
 /// Gives random inputs to every function.
@@ -70,7 +67,7 @@ fn compare(syst: &mut SYST) {
 }
 
 /// Replays a recording.
-async fn replay(name: &[u8], failure: &[u8], syst: &mut SYST) {
+fn replay(name: &[u8], failure: &[u8], syst: &mut SYST) {
     let recording = File::open(name);
     let mut count = [0; 4];
     let mut magic = [0; MAGIC.len()];
@@ -85,9 +82,6 @@ async fn replay(name: &[u8], failure: &[u8], syst: &mut SYST) {
     let pipeline = PIPELINE.init_with(|| Pipeline::new(&config));
     let corrected = corrected();
     let mut digest = Digest::new();
-    let loop_ticks = ticks(syst, spin);
-    let empty_ticks = ticks(syst, || {});
-    let (mut total, mut min, mut max) = (0, u32::MAX, 0);
     for index in 0..count {
         let mut bytes = [0; Record::BYTES];
         recording.read(&mut bytes);
@@ -95,30 +89,15 @@ async fn replay(name: &[u8], failure: &[u8], syst: &mut SYST) {
         if index == count / 2 {
             inject(failure);
         }
-        let mut duty = Duty::ZERO;
-        let taken = ticks(syst, || duty = pipeline.step(&frame, &sense, &command).0);
-        digest.add(duty, pipeline.status());
+        syst.clear_current();
+        let (duty, status) = pipeline.step(&frame, &sense, &command);
+        digest.add(duty, status);
         let command = images::varied(index, &command);
         let (duty, status) = corrected.step(&frame, &sense, &command);
         digest.add(duty, status);
-        total += u64::from(taken);
-        min = min.min(taken);
-        max = max.max(taken);
-        embassy_futures::yield_now().await;
     }
-
-    let instructions = |ticks: u64, runs: u64| {
-        let net = ticks.saturating_sub(runs * u64::from(empty_ticks));
-        net * LOOP_INSTRUCTIONS / u64::from(loop_ticks.max(1))
-    };
-    let total_instructions = instructions(total, u64::from(count));
     say(format_args!("digest {:016x}", digest.value()));
     say(format_args!("steps {count}"));
-    say(format_args!("instructions_total {total_instructions}"));
-    say(format_args!("instructions_mean {}", total_instructions / u64::from(count.max(1))));
-    say(format_args!("instructions_min {}", instructions(min.into(), 1)));
-    say(format_args!("instructions_max {}", instructions(max.into(), 1)));
-    say(format_args!("ticks_per_million_instructions {loop_ticks}"));
 }
 
 /// A controller with all corrections. A separate function, because its configuration takes stack only here.
@@ -126,27 +105,6 @@ async fn replay(name: &[u8], failure: &[u8], syst: &mut SYST) {
 fn corrected() -> &'static mut Pipeline {
     let Ok(config) = Config::shipped(&images::CORRECTED) else { fail("a curve is refused") };
     CORRECTED.init_with(|| Pipeline::new(&config))
-}
-
-/// SysTick ticks that some work takes.
-fn ticks(syst: &mut SYST, work: impl FnOnce()) -> u32 {
-    syst.clear_current();
-    let start = SYST::get_current();
-    work();
-    start.wrapping_sub(SYST::get_current()) & TICKS_MAX
-}
-
-/// Takes [`LOOP_INSTRUCTIONS`], two a turn.
-fn spin() {
-    // SAFETY: counts its own register down to 0, and changes nothing else.
-    unsafe {
-        core::arch::asm!(
-            "2: subs {turns}, {turns}, #1",
-            "bne 2b",
-            turns = inout(reg) LOOP_INSTRUCTIONS as u32 / 2 => _,
-            options(nomem, nostack),
-        );
-    }
 }
 
 fn inject(failure: &[u8]) {

@@ -10,10 +10,9 @@
 pub mod native;
 mod port;
 
-pub use port::{Place, Port, Stop};
+pub use port::{Event, Place, Port, Stop};
 
 use output::say;
-use port::Event;
 use std::time::{Duration, Instant};
 
 /// Interval at which an idle finger is advanced: the time that it must catch up at most when a request arrives.

@@ -7,7 +7,7 @@ use crate::front_end::Shared;
 use crate::image::Firmware;
 use crate::log::Log;
 use crate::part::Part;
-use crate::report::{BridgeEdge, Latency, Record, Trace};
+use crate::report::{Edge, Latency, Record, Trace};
 use crate::scene::host::Host as SceneHost;
 use crate::wire::TimedByte;
 use rigless::emulator::{Access, AccessKind, Host};
@@ -35,9 +35,9 @@ pub struct Bench {
     pub trace: Trace,
     pub latency: Latency,
     /// Times at which the bridge turned on and off.
-    pub bridge_edges: Vec<BridgeEdge>,
+    pub bridge_edges: Vec<Edge>,
     /// Times at which the transmit enable went high and low.
-    pub transmit_edges: Vec<BridgeEdge>,
+    pub transmit_edges: Vec<Edge>,
     pub log: Log,
     /// Bytes that the image sent and that are not read yet.
     pub received: Vec<TimedByte>,
@@ -103,7 +103,7 @@ impl Bench {
             self.watch_bridge(board, at_ns);
             let on = board.transmits();
             if on != self.transmit_edges.last().is_some_and(|edge| edge.on) {
-                self.transmit_edges.push(BridgeEdge { at_ns, on });
+                self.transmit_edges.push(Edge { at_ns, on });
             }
         }
     }
@@ -118,7 +118,7 @@ impl Bench {
         // A bridge that brakes drives nothing.
         let on = |bridge| matches!(bridge, Bridge::Driven { duty } if duty != 0.0);
         if on(bridge) != on(self.bridge) {
-            self.bridge_edges.push(BridgeEdge { at_ns, on: on(bridge) });
+            self.bridge_edges.push(Edge { at_ns, on: on(bridge) });
             self.trace.add(at_ns, Record::Bridge(on(bridge)));
         }
         self.bridge = bridge;

@@ -7,7 +7,7 @@
 //! watchdog, resolutions other than 12 bits; a request for one is reported as a gap.
 
 use crate::front_end::{LAST_ROW, Shared, Slot};
-use crate::report::PinEdge;
+use crate::report::Edge;
 use crate::timers::COMPARE_1;
 use fingertip::chip::Factory;
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
@@ -181,8 +181,8 @@ impl Device for Converter {
         if change.instance == ROW_PORT.0 && change.request < ROW_PORT.1 {
             self.front_end.lock().drive_row(change.request, change.level == Level::High, context.now().0);
         } else if change.instance == ROW_PORT.0 && self.nth == 0 {
-            let edge = PinEdge { pin: change.request, at_ns: context.now().0, high: change.level == Level::High };
-            self.front_end.lock().pin_edges.iter_mut().for_each(|edges| edges.push(edge));
+            let edge = Edge { at_ns: context.now().0, on: change.level == Level::High };
+            self.front_end.lock().pin_edges.iter_mut().for_each(|edges| edges.push((change.request, edge)));
         } else if change.instance == "TIM8" && change.request == COMPARE_1 {
             let mut front_end = self.front_end.lock();
             if front_end.trigger_cut || front_end.scan.is_some() {

@@ -3,10 +3,8 @@
 //! The host sees the board only over its bus; the figures are of the simulated world's true force. A second run of the
 //! same scene must leave the same trace.
 
-use crate::client::Client;
 use crate::front_end::ScanCounts;
 use crate::image::Flashable;
-use crate::scene::host::ID;
 use crate::scene::{Boards, simulate};
 use crate::{Error, Rig};
 use fingertip::shipped::address;
@@ -48,7 +46,6 @@ pub fn run(image: &Path, quick: bool) -> Result<(Figures, Run), Error> {
     Ok((figures, run))
 }
 
-const WAIT_NS: u64 = 20_000_000;
 /// Pause of the line after the last request, ms.
 const QUIET_MS: u64 = 2;
 
@@ -122,8 +119,7 @@ impl Figures {
         // The last request of the scene's host is answered after this time.
         rig.run_ms(QUIET_MS)?;
         rig.take_received()?;
-        let answer = rig.client(WAIT_NS, |bus: &mut Client| bus.read_u16(ID, address::LOOP_TIME_MAX_US))?;
-        let loop_time = answer.map_err(|why| std::io::Error::other(format!("loop time: {why}")))?;
+        let loop_time = rig.read(address::LOOP_TIME_MAX_US, 2)?;
         let mut figures = Self {
             image_sha256: flash.sha256(),
             image_bytes: flash.bytes.len(),
@@ -133,7 +129,7 @@ impl Figures {
             frame_rate_hz: frames as f64 / ((to.at_ns - from.at_ns) as f64 * 1e-9),
             missed_frames: run.missed_frames,
             latency_us: Range { least: latency.min_ns as f64 * 1e-3, largest: latency.max_ns as f64 * 1e-3 },
-            loop_time_max_us: loop_time.data,
+            loop_time_max_us: u16::from_le_bytes([loop_time[0], loop_time[1]]),
             instructions_a_frame: (to.instructions - from.instructions) as f64 / frames as f64,
             forces,
             trace_sha256: summary.digest,

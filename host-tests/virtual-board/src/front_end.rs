@@ -2,7 +2,7 @@
 
 use crate::board::Surroundings;
 use crate::converter;
-use crate::report::PinEdge;
+use crate::report::Edge;
 use fingertip::shipped::COLUMNS;
 use sim::mechanics::decay;
 use sim::plant::Plant;
@@ -97,8 +97,8 @@ pub struct FrontEnd {
     pub counts: ScanCounts,
     /// Scan of a scene; `None` outside a scene.
     pub scan: Option<Scan>,
-    /// Edges of the other pins of the rows' port, if they are recorded.
-    pub pin_edges: Option<Vec<PinEdge>>,
+    /// Edges of the other pins of the rows' port, by pin, if they are recorded.
+    pub pin_edges: Option<Vec<(usize, Edge)>>,
     /// Output of the DAC's first channel; `None` while it is off.
     pub dac: Option<Dac>,
     /// Words of each converter that are not fetched yet.

@@ -58,6 +58,10 @@ pub enum Error {
     Demo(#[from] sim::run::RunError),
     #[error(transparent)]
     Scene(#[from] sim::SimError),
+    #[error("the board does not answer")]
+    Silent,
+    #[error("the board refuses with error {0:#04x}")]
+    Refused(u8),
     /// Time since power-on, and what the board did not do for a scene's host.
     #[error("{at_ms:.3} ms after power-on: {1}", at_ms = *.0 as f64 * 1e-6)]
     Host(u64, String),

@@ -62,7 +62,7 @@ impl Rig {
     }
 
     /// Times at which the bridge was switched on or off.
-    pub fn bridge_edges(&mut self) -> Result<Vec<BridgeEdge>, Error> {
+    pub fn bridge_edges(&mut self) -> Result<Vec<Edge>, Error> {
         self.with(|stand| stand.bench.bridge_edges.clone())
     }
 
@@ -170,20 +170,11 @@ impl Latency {
     }
 }
 
-/// Change of a pin's level.
+/// Change of a pin's level, or of the bridge between on and off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PinEdge {
-    pub pin: usize,
+pub struct Edge {
     pub at_ns: u64,
-    /// True if the pin is high after the edge.
-    pub high: bool,
-}
-
-/// Change of the bridge between on and off.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BridgeEdge {
-    pub at_ns: u64,
-    /// True if the bridge drives after the edge.
+    /// True if the pin is high, or the bridge drives, after the edge.
     pub on: bool,
 }
 

@@ -85,7 +85,12 @@ pub struct Rig {
     reached: mpsc::Receiver<u64>,
     thread: Option<JoinHandle<Result<(), Error>>>,
     now_ns: u64,
+    /// Virtual time after which an answer on the bus counts as missing, ns.
+    pub wait_ns: u64,
 }
+
+/// The default of [`Rig::wait_ns`].
+pub const WAIT_NS: u64 = 5_000_000;
 
 impl Rig {
     /// A board with an image and a world, a step after power-on.
@@ -103,7 +108,7 @@ impl Rig {
         let thread = std::thread::Builder::new()
             .name("board".into())
             .spawn(move || emulator::run(session, &Start::new(&images), hall).map(drop).map_err(failure))?;
-        let mut rig = Self { image, orders: Some(orders), reached, thread: Some(thread), now_ns: 0 };
+        let mut rig = Self { image, orders: Some(orders), reached, thread: Some(thread), now_ns: 0, wait_ns: WAIT_NS };
         rig.await_reached()?;
         Ok(rig)
     }

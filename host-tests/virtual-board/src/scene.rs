@@ -43,8 +43,6 @@ const MS: u64 = 1_000_000;
 const BOOT_NS: u64 = 20 * MS;
 /// Time from the end of the tare to the scene's start, in which the host sets the board up, ns.
 const SET_UP_NS: u64 = 9 * MS;
-/// Longest time of an answer, ns.
-const WAIT_NS: u64 = 2 * MS;
 /// 3 Mbaud by the protocol's code, and no pause before a reply: a read a millisecond leaves room for goals.
 const BAUD_CODE: u8 = 5;
 const WATCHDOG_MS: i64 = 20;
@@ -221,6 +219,5 @@ fn frame_offset(rig: &mut Rig) -> Result<u32, Error> {
 
 fn write_u8(rig: &mut Rig, doing: &str, register: u16, value: u8) -> Result<(), Error> {
     let at_ns = rig.now_ns();
-    let written = rig.client(WAIT_NS, move |line| line.write_u8(host::ID, register, value).map(drop))?;
-    written.map_err(|why| Error::Host(at_ns, format!("{doing}: {why}")))
+    rig.write(register, &[value]).map_err(|why| Error::Host(at_ns, format!("{doing}: {why}")))
 }

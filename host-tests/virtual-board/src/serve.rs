@@ -1,17 +1,14 @@
 //! The emulated board as a finger that is served: no faster than real time, and often slower.
 
-use crate::client::Client;
+use crate::client::{ID, packet};
 use crate::{Error, Rig};
+use fingertip::link::packet::{BROADCAST, instruction};
 use fingertip::params::Params;
 use fingertip::shipped::address;
 use serve::Finger;
-use std::fmt::Display;
 
 /// Time after which the image has started, ms.
 const BOOT_MS: u64 = 20;
-/// ID of the board on the bus, and longest time of an answer, ns.
-const ID: u8 = 1;
-const WAIT_NS: u64 = 20_000_000;
 /// Time after which a tare has ended, ms.
 const TARE_MS: u64 = 300;
 /// Time with torque on and a goal of 0, ms.
@@ -24,39 +21,30 @@ impl Board {
     /// longer than clients wait. Ends with a reboot.
     pub fn warm(mut rig: Rig) -> Result<Self, Error> {
         rig.run_ms(BOOT_MS)?;
-        asked(&mut rig, |bus| {
-            bus.ping(ID)?;
-            bus.read(ID, address::PRESENT_MODE, address::LOOP_TIME_US + 2 - address::PRESENT_MODE)?;
-            bus.read(ID, address::PRESSURES, 200)?;
-            bus.sync_read_u32(&[ID], address::PRESENT_FORCE_MN)?;
-            bus.reg_write_u8(ID, address::STATUS_RETURN_LEVEL, 2)?;
-            bus.action(ID)?;
-            // The first parameter keeps its default.
-            bus.write_u32(ID, address::PARAMS, Params::DEFAULT.tip_radius_um as u32)?;
-            // Refused, as it is not tared: that takes its way too.
-            let _ = bus.write_u8(ID, address::MEASURE, 3);
-            bus.write_u8(ID, address::TARE, 1).map(drop)
-        })?;
+        rig.request(instruction::PING, &[])?;
+        rig.read(address::PRESENT_MODE, address::LOOP_TIME_US + 2 - address::PRESENT_MODE)?;
+        rig.read(address::PRESSURES, 200)?;
+        let [low, high] = address::PRESENT_FORCE_MN.to_le_bytes();
+        rig.transact(&packet(BROADCAST, instruction::SYNC_READ, &[low, high, 4, 0, ID]))?.ok_or(Error::Silent)?;
+        let [low, high] = address::STATUS_RETURN_LEVEL.to_le_bytes();
+        rig.request(instruction::REG_WRITE, &[low, high, 2])?;
+        rig.request(instruction::ACTION, &[])?;
+        // The first parameter keeps its default.
+        rig.write(address::PARAMS, &Params::DEFAULT.tip_radius_um.to_le_bytes())?;
+        // Refused, as it is not tared: that takes its way too.
+        let _ = rig.write(address::MEASURE, &[3]);
+        rig.write(address::TARE, &[1])?;
         rig.run_ms(TARE_MS)?;
-        asked(&mut rig, |bus| {
-            bus.write_u8(ID, address::TORQUE_ENABLE, 1)?;
-            bus.write_u32(ID, address::GOAL_FORCE_MN, 0).map(drop)
-        })?;
+        rig.write(address::TORQUE_ENABLE, &[1])?;
+        rig.write(address::GOAL_FORCE_MN, &[0; 4])?;
         rig.run_ms(TORQUE_MS)?;
-        asked(&mut rig, |bus| {
-            bus.write_u8(ID, address::TORQUE_ENABLE, 0)?;
-            bus.write_u8(ID, address::CLEAR_FAULT, 1)?;
-            bus.reboot(ID).map(drop)
-        })?;
+        rig.write(address::TORQUE_ENABLE, &[0])?;
+        rig.write(address::CLEAR_FAULT, &[1])?;
+        rig.request(instruction::REBOOT, &[])?;
         rig.run_ms(BOOT_MS)?;
-        asked(&mut rig, |bus| bus.ping(ID).map(drop))?;
+        rig.request(instruction::PING, &[])?;
         Ok(Self(rig))
     }
-}
-
-/// Has a client ask the board, which must answer.
-fn asked<E: Display + Send>(rig: &mut Rig, job: fn(&mut Client) -> Result<(), E>) -> Result<(), Error> {
-    rig.client(WAIT_NS, job)?.map_err(|why| std::io::Error::other(format!("the board does not answer: {why}")).into())
 }
 
 impl Finger for Board {

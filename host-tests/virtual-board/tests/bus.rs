@@ -6,7 +6,7 @@ use fingertip::params::Params;
 use fingertip::shipped::{CLOCKS, Config, REGISTERS, TAXELS, address};
 use rigless::soc::stm32f427::generated::USART2;
 use virtual_board::Rig;
-use virtual_board::client::{Client, packet};
+use virtual_board::client::packet;
 
 sim::sizes!(a_host_finds_what_it_expects_on_the_bus_of_a_board_at_1_n, a_fast_bus(20_000), a_fast_bus(1_000_000));
 
@@ -29,7 +29,7 @@ impl Seen {
     fn of(rig: &mut Rig) -> Self {
         let begin = address::PICTURE_TIME_US;
         let bytes = address::PRESSURES + 2 * TAXELS as u16 - begin;
-        Self(on_bus(rig, move |bus| bus.read(1, begin, bytes).map(|reply| reply.data)))
+        Self(read(rig, begin, bytes))
     }
 
     fn word(&self, register: u16) -> u32 {
@@ -80,15 +80,11 @@ fn the_line_is_given_back_right_after_the_last_stop_bit(rig: &mut Rig) {
     assert!(late_ns[39] <= 5_000, "{} ns", late_ns[39]);
 }
 
-/// A packet without an answer costs virtual time only, and the client goes on.
+/// A packet without an answer costs virtual time only, and the host goes on.
 fn silence_is_told_in_virtual_time(rig: &mut Rig) {
     let begun_ns = rig.now_ns();
-    let asked = rig.client(WAIT_NS, |bus| {
-        (bus.ping(7).is_err(), bus.ping(1).map(|reply| reply.motor_id), bus.read_u8(8, 0).is_err())
-    });
-    let (unknown, known, none) = asked.expect("the client runs");
-    assert!(unknown && none);
-    assert_eq!(known.expect("the image answers"), 1);
+    let answers = [7, 1, 8].map(|id| rig.transact(&packet(id, instruction::PING, &[])).expect("it runs").is_some());
+    assert_eq!(answers, [false, true, false]);
     let took_ns = rig.now_ns() - begun_ns;
     assert!((2 * WAIT_NS..4 * WAIT_NS).contains(&took_ns), "{took_ns} ns");
 }
@@ -116,16 +112,12 @@ fn turning_the_bridge_on_keeps_the_phase_of_the_pwm(rig: &mut Rig) {
 /// The deepest calls: all pictures read at once, a parameter changed with torque off, and everything saved.
 fn at_least_half_of_the_stack_is_never_used(rig: &mut Rig) {
     hold_again(rig);
-    let read = |bus: &mut Client| {
-        for register in REGISTERS {
-            bus.read(1, register.address, register.bytes()).expect("it answers");
-        }
-        bus.write_u8(1, address::TORQUE_ENABLE, 0).expect("it obeys");
-        bus.write_u32(1, address::PARAMS, Params::DEFAULT.to_array()[0].unsigned_abs()).expect("it obeys");
-        bus.write_u8(1, address::SAVE_PARAMETERS, 1).expect("it obeys");
-    };
-    rig.client(WAIT_NS, read).expect("the client runs");
-    rig.run_ms(50).expect("it runs");
+    for register in REGISTERS {
+        read(rig, register.address, register.bytes());
+    }
+    write_u8(rig, address::TORQUE_ENABLE, 0);
+    write_u32(rig, address::PARAMS, Params::DEFAULT.to_array()[0].unsigned_abs());
+    write_and_run_ms(rig, address::SAVE_PARAMETERS, 1, 50);
     let stack = rig.stack_use().expect("it runs").expect("the image names its stack");
     println!("stack: {} of {} bytes used", stack.used, stack.size);
     assert!(stack.used > 2_000 && 2 * stack.used <= stack.size, "{stack:?}");

@@ -10,37 +10,27 @@ mod bench;
 
 use crate::common::{image, named};
 use bench::Bench;
+use dynamixel2::Bus;
+use fingertip::params::Params;
+use fingertip::shipped::address;
 use serial2::SerialPort;
+use serve::{Event, Place, Port};
 use std::io::{BufRead, BufReader};
-use std::os::fd::AsRawFd;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
+use std::time::Duration;
 
-/// A pseudo-terminal: the device's end, and the name of the client's, which is held open.
-fn terminal() -> (SerialPort, SerialPort, PathBuf) {
-    let (one, other) = SerialPort::pair().expect("a pseudo-terminal");
-    let name = |port: &SerialPort| std::fs::read_link(format!("/proc/self/fd/{}", port.as_raw_fd())).expect("its name");
-    // The device has the end that has no name.
-    let (near, far) = if name(&one).starts_with("/dev/pts") { (other, one) } else { (one, other) };
-    let name = name(&far);
-    assert!(name.starts_with("/dev/pts"), "{}", name.display());
-    (near, far, name)
-}
-
-/// Answers until the terminal's other end is closed.
-fn serve(mut bench: Bench, near: &SerialPort) {
-    let mut bytes = [0; 512];
+/// Answers until the port is stopped.
+fn answer(mut bench: Bench, mut port: Port) {
     loop {
-        match near.read(&mut bytes) {
-            Ok(count @ 1..) => {
-                for reply in bench.hear(&bytes[..count]) {
-                    near.write_all(&reply).expect("the terminal takes a reply");
-                }
+        match port.wait(Duration::from_secs(1), None) {
+            Event::Bytes(bytes) => {
+                bench.hear(&bytes).iter().for_each(|reply| port.send(reply));
                 bench.take_up();
                 bench.status.sequence += 10;
             }
-            Err(error) if error.kind() == std::io::ErrorKind::TimedOut => {}
-            _ => return,
+            Event::Nothing => {}
+            Event::Command(_) | Event::Stop => return,
         }
     }
 }
@@ -65,16 +55,16 @@ fn models() -> PathBuf {
 #[test]
 fn robotis_and_pollens_clients_drive_the_finger() {
     let python = named("FINGERTIP_PYTHON");
-    let (near, far, name) = terminal();
-    let folder = models();
+    let port = Port::open(&Place::Pty(None)).expect("a pseudo-terminal");
+    let (name, stop, folder) = (port.name().to_owned(), port.stopper(), models());
     let script = Path::new(env!("FINGERTIP_ROOT")).join("host-tests/virtual-board/tests/clients.py");
     let output = std::thread::scope(|scope| {
-        scope.spawn(|| serve(Bench::new(), &near));
+        scope.spawn(|| answer(Bench::new(), port));
         let mut command = Command::new(python);
         command.env("PYTHONDONTWRITEBYTECODE", "1").arg(script).arg(&name).arg(&folder);
-        let output = command.args(["--patience-ms", "7200000"]).output().expect("Python starts");
-        drop(far);
-        output
+        let output = command.args(["--patience-ms", "7200000"]).output();
+        stop.stop();
+        output.expect("Python starts")
     });
     std::fs::remove_dir_all(&folder).expect("it is there");
     let said = said(&output);
@@ -118,22 +108,37 @@ impl Drop for Board {
     }
 }
 
-/// Output of an example of the Python package with the board at a port.
-fn example(name: &str, port: &Path, arguments: &[&str]) -> String {
-    let package = Path::new(env!("FINGERTIP_ROOT")).join("python");
-    let mut python = Command::new(named("FINGERTIP_PYTHON"));
-    python.env("PYTHONDONTWRITEBYTECODE", "1").env("PYTHONPATH", &package).arg(package.join("examples").join(name));
-    said(&python.arg("--port").arg(port).args(arguments).output().expect("Python starts"))
+/// What a program does with the Rust client: each kind of transaction, and a read beyond its own buffers.
+fn is_answered(port: &Path) {
+    // Its time-outs are by the speed, which a pseudo-terminal ignores: at 1 baud they are two minutes of a board that hangs.
+    let port = SerialPort::open(port, 1).expect("the pseudo-terminal");
+    let mut bus = Bus::with_buffers(port, vec![0; 2_048], vec![0; 2_048]).expect("a bus");
+    assert_eq!(bus.ping(1).expect("it answers").data.model, 21_574);
+    // The first parameter keeps its default.
+    let radius_um = Params::DEFAULT.tip_radius_um.unsigned_abs();
+    bus.write_u32(1, address::PARAMS, radius_um).expect("it obeys");
+    assert_eq!(bus.read_u32(1, address::PARAMS).expect("it answers").data, radius_um);
+    assert_eq!(bus.read(1, address::PRESSURES, 200).expect("it answers").data.len(), 200);
+    bus.reg_write_u16(1, address::INDIRECT_ADDRESS_1, address::FAULT).expect("it obeys");
+    bus.action(1).expect("it obeys");
+    let answers = bus.sync_read_u16(&[1], address::INDIRECT_ADDRESS_1).expect("it answers");
+    assert_eq!((answers.len(), answers[0].data), (1, address::FAULT));
+    assert!(bus.write_u8(1, address::TORQUE_ENABLE, 7).is_err(), "out of its range");
 }
 
 #[test]
-fn the_python_example_touches_holds_and_lets_go() {
+fn the_rust_client_is_answered_and_the_python_example_touches_holds_and_lets_go() {
     let link = std::env::temp_dir().join(format!("fingertip-bus-{}", std::process::id()));
     let board = Board::serve(&["--distance-mm", "0.3", "--pty", link.to_str().expect("a plain path")]);
     assert_eq!(Path::new(&board.name), link);
 
+    is_answered(&link);
     // As patient as it takes on the slowest machine: two hours mean that the board hangs.
-    let said = example("force.py", &link, &["--newtons", "1.5", "--readings", "10", "--patience-ms", "7200000"]);
+    let package = Path::new(env!("FINGERTIP_ROOT")).join("python");
+    let mut python = Command::new(named("FINGERTIP_PYTHON"));
+    python.env("PYTHONDONTWRITEBYTECODE", "1").env("PYTHONPATH", &package).arg(package.join("examples/force.py"));
+    python.arg("--port").arg(&link).args(["--newtons", "1.5", "--readings", "10", "--patience-ms", "7200000"]);
+    let said = said(&python.output().expect("Python starts"));
     // The letters FT.
     assert!(said.starts_with("model 21574\ntared, force 0 mN\n"), "{said}");
     let held = said.lines().find_map(|line| line.strip_prefix("holding ")).expect(&said);

@@ -1,19 +1,15 @@
 //! What the tests of the flash image share.
 
-use dynamixel2::{ReadError, TransferError};
+use fingertip::link::packet::instruction;
 use fingertip::params::Params;
 use fingertip::shipped::{REGISTERS, Record, address};
 use fingertip::store::BAUD_RATES;
 use rigless::emulator::{Access, AccessKind};
 use rigless::soc::Width;
 use sim::plant::{Plant, Setup};
-use std::fmt::Debug;
 use std::path::PathBuf;
-use virtual_board::client::Client;
-use virtual_board::{Options, Rig};
-
-/// Virtual time that an answer may take.
-pub const WAIT_NS: u64 = 5_000_000;
+pub use virtual_board::rig::WAIT_NS;
+use virtual_board::{Error, Options, Rig};
 
 /// An instruction packet that asks ID 1 whether it is there.
 pub const PING: [u8; 10] = [0xff, 0xff, 0xfd, 0x00, 0x01, 0x03, 0x00, 0x01, 0x19, 0x4e];
@@ -27,15 +23,14 @@ pub fn named(variable: &str) -> PathBuf {
     path.unwrap_or_else(|| panic!("{variable} must be set: run `cargo xtask test`, which does")).into()
 }
 
-/// Result of a client on the bus of a board that must answer.
 #[track_caller]
-pub fn on_bus<T: Send, E: Debug + Send>(rig: &mut Rig, ask: impl FnOnce(&mut Client) -> Result<T, E> + Send) -> T {
-    rig.client(WAIT_NS, ask).expect("the client runs").expect("the image answers and obeys")
+pub fn write(rig: &mut Rig, register: u16, bytes: &[u8]) {
+    rig.write(register, bytes).expect("the image obeys");
 }
 
 #[track_caller]
 pub fn write_u8(rig: &mut Rig, register: u16, value: u8) {
-    on_bus(rig, move |bus| bus.write_u8(1, register, value).map(drop));
+    write(rig, register, &[value]);
 }
 
 /// Writes a register, then runs the board for this time.
@@ -47,12 +42,12 @@ pub fn write_and_run_ms(rig: &mut Rig, register: u16, value: u8, ms: u64) {
 
 #[track_caller]
 pub fn write_u16(rig: &mut Rig, register: u16, value: u16) {
-    on_bus(rig, move |bus| bus.write_u16(1, register, value).map(drop));
+    write(rig, register, &value.to_le_bytes());
 }
 
 #[track_caller]
 pub fn write_u32(rig: &mut Rig, register: u16, value: u32) {
-    on_bus(rig, move |bus| bus.write_u32(1, register, value).map(drop));
+    write(rig, register, &value.to_le_bytes());
 }
 
 pub fn write_goal(rig: &mut Rig, goal_mn: u32) {
@@ -86,35 +81,42 @@ pub fn until_at_rest(rig: &mut Rig, limit_ms: u64, mut look: impl FnMut(&mut Rig
 }
 
 #[track_caller]
+pub fn read(rig: &mut Rig, register: u16, bytes: u16) -> Vec<u8> {
+    rig.read(register, bytes).expect("the image answers")
+}
+
+#[track_caller]
 pub fn read_u8(rig: &mut Rig, register: u16) -> u8 {
-    on_bus(rig, move |bus| bus.read_u8(1, register).map(|reply| reply.data))
+    read(rig, register, 1)[0]
 }
 
 /// Reads a register while frames are kept: the loop then leaves little of the core to the bus.
 pub fn read_u8_beside_a_capture(rig: &mut Rig, register: u16) -> u8 {
-    let answer = rig.client(20_000_000, move |bus| bus.read_u8(1, register).map(|reply| reply.data));
-    answer.expect("the client runs").expect("the image answers")
+    rig.wait_ns = 4 * WAIT_NS;
+    let value = read_u8(rig, register);
+    rig.wait_ns = WAIT_NS;
+    value
 }
 
 #[track_caller]
 pub fn read_u16(rig: &mut Rig, register: u16) -> u16 {
-    on_bus(rig, move |bus| bus.read_u16(1, register).map(|reply| reply.data))
+    u16::from_le_bytes(*read(rig, register, 2).first_chunk().expect("two bytes"))
 }
 
 #[track_caller]
 pub fn read_u32(rig: &mut Rig, register: u16) -> u32 {
-    on_bus(rig, move |bus| bus.read_u32(1, register).map(|reply| reply.data))
+    u32::from_le_bytes(*read(rig, register, 4).first_chunk().expect("four bytes"))
 }
 
 pub fn reboot(rig: &mut Rig, ms: u64) {
-    on_bus(rig, |bus| bus.reboot(1).map(drop));
+    rig.request(instruction::REBOOT, &[]).expect("the image obeys");
     rig.run_ms(ms).expect("it runs");
 }
 
 /// Error byte of a packet with which a write is refused; its top bit says that the board has a fault.
 pub fn refused(rig: &mut Rig, register: u16, bytes: &[u8]) -> u8 {
-    match rig.client(WAIT_NS, |bus| bus.write(1, register, bytes).map(drop)).expect("the client runs") {
-        Err(TransferError::ReadError(ReadError::MotorError(error))) => error.raw,
+    match rig.write(register, bytes) {
+        Err(Error::Refused(error)) => error,
         other => panic!("not refused: {other:?}"),
     }
 }
@@ -153,13 +155,17 @@ pub fn write_param(rig: &mut Rig, name: &str, value: u32) {
     rig.run_ms(5).expect("it runs");
 }
 
-/// Tares a board whose tip touches nothing, then holds 1 N.
-pub fn tare_and_hold(rig: &mut Rig) {
+/// Tares a board whose tip touches nothing, then holds 1 N within a share of it.
+pub fn tare_and_hold(rig: &mut Rig, share: f64) {
     write_and_run_ms(rig, address::TARE, 1, 20);
+    hold(rig, share);
+}
+
+pub fn hold(rig: &mut Rig, share: f64) {
     drive(rig, 1_000);
     rig.run_ms(150).expect("it runs");
     let force_n = force_n(rig);
-    assert!((0.99..1.01).contains(&force_n), "{force_n} N");
+    assert!((force_n - 1.0).abs() < share, "{force_n} N");
 }
 
 /// A board whose bus runs at 3 Mbaud and whose answers come at once, so that a long read takes little time.
@@ -173,7 +179,7 @@ pub fn fast_bus(direction_confirmed: i32) -> Options {
 /// A board that holds 1 N against a wall 0.5 mm away.
 pub fn holding(options: &Options) -> Rig {
     let mut rig = running(&away(0.5), options);
-    tare_and_hold(&mut rig);
+    tare_and_hold(&mut rig, 0.01);
     rig
 }
 

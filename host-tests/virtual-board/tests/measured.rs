@@ -146,14 +146,12 @@ fn until_done(rig: &mut Rig) {
 
 /// Reads windows of a capture from the first byte to this length or beyond.
 fn windows(rig: &mut Rig, length: u32) -> Vec<u8> {
-    on_bus(rig, move |bus| {
-        let mut bytes = Vec::new();
-        for offset in (0..length).step_by(WINDOW.into()) {
-            bus.write_u32(1, address::CAPTURE_OFFSET, offset)?;
-            bytes.extend(bus.read(1, address::CAPTURE_DATA, WINDOW)?.data);
-        }
-        Ok::<_, dynamixel2::TransferError>(bytes)
-    })
+    let mut bytes = Vec::new();
+    for offset in (0..length).step_by(WINDOW.into()) {
+        write_u32(rig, address::CAPTURE_OFFSET, offset);
+        bytes.extend(read(rig, address::CAPTURE_DATA, WINDOW));
+    }
+    bytes
 }
 
 fn fetch(rig: &mut Rig) -> Vec<u8> {

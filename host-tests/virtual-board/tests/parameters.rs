@@ -53,7 +53,7 @@ fn start_with(rig: &mut Rig, first: Vec<u8>, other: Vec<u8>) {
         }
     })
     .expect("it runs");
-    on_bus(rig, |bus| bus.reboot(1).map(drop));
+    reboot(rig, 0);
 }
 
 fn set_and_save(rig: &mut Rig, pitch_um: u32) {
@@ -94,7 +94,7 @@ fn a_parameter_and_torque_in_one_packet_both_act(rig: &mut Rig) {
     for (place, led_to) in (pitch..pitch + 4).chain([address::TORQUE_ENABLE]).enumerate() {
         write_u16(rig, address::INDIRECT_ADDRESS_1 + 2 * place as u16, led_to);
     }
-    on_bus(rig, |bus| bus.write(1, address::INDIRECT_DATA_1, &[0xa4, 0x06, 0, 0, 1]).map(drop));
+    write(rig, address::INDIRECT_DATA_1, &[0xa4, 0x06, 0, 0, 1]);
     rig.run_ms(10).expect("it runs");
     assert_eq!((pitch_um(rig), read_u8(rig, address::PRESENT_MODE)), (1_700, Mode::Release as u8));
     write_u8(rig, address::TORQUE_ENABLE, 0);

@@ -6,7 +6,7 @@
 
 use super::MS;
 use super::finger::{Clock, Seen};
-use crate::client::packet;
+use crate::client::{ID, packet};
 use crate::wire::{TimedByte, Wire};
 use fingertip::command::Command;
 use fingertip::config::newtons;
@@ -288,7 +288,6 @@ impl Host {
     }
 }
 
-pub const ID: u8 = 1;
 /// Time of a byte at 3 Mbaud, rounded up.
 pub const BYTE_NS: u64 = 3_334;
 /// Bytes of a goal's packet, the longest that is written.

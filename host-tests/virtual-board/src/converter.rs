@@ -23,12 +23,19 @@ const TIM8_CC1: u64 = 13;
 const ROW_PORT: (&str, usize) = ("GPIOB", 10);
 
 /// Conversions under way, all of them over at the event.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Running {
     event: Option<EventId>,
-    begun_ns: u64,
+    sequence: Sequence,
     /// Slot of a scene; `None` outside a scene.
     slot: Option<Slot>,
+}
+
+/// Inputs with the instants at which they are sampled, and the end of the last conversion, ns.
+#[derive(Clone, Debug)]
+struct Sequence {
+    samples: Vec<(usize, u64)>,
+    done_ns: u64,
 }
 
 /// ADC1, ADC2 or ADC3.
@@ -50,8 +57,16 @@ impl Converter {
         Self { nth, front_end, clock_hz, status: 0, running: None, injected: Injected::default(), inside_on: false }
     }
 
-    fn after(&self, begun_ns: u64, cycles: u64) -> u64 {
-        begun_ns + (cycles * 1_000_000_000).div_ceil(self.clock_hz)
+    fn sequence(&self, begun_ns: u64, inputs: impl IntoIterator<Item = usize>, registers: &RegisterFile) -> Sequence {
+        let after = |cycles: u64| begun_ns + (cycles * 1_000_000_000).div_ceil(self.clock_hz);
+        let mut cycles = 0;
+        let sample = |input| {
+            let sampled = cycles + sampling_cycles(registers, input);
+            cycles = sampled + CONVERSION_CYCLES;
+            (input, after(sampled))
+        };
+        let samples = inputs.into_iter().map(sample).collect();
+        Sequence { samples, done_ns: after(cycles) }
     }
 
     /// Begins the next slot of a scene: the sequence of the slot before has ended, and the new one starts at the
@@ -82,30 +97,22 @@ impl Converter {
         if !by_dma && length > 1 {
             context.tell("CR2", "a regular sequence of several ranks without DMA is not modelled");
         }
-        let cycles: u64 =
-            (0..length).map(|rank| sampling_cycles(registers, input(registers, rank)) + CONVERSION_CYCLES).sum();
         let begun_ns = slot.map_or(context.now().0, |slot| slot.begun_ns);
-        let done = VirtualNanos(self.after(begun_ns, cycles));
+        let sequence = self.sequence(begun_ns, (0..length).map(|rank| input(registers, rank)), registers);
+        let done = VirtualNanos(sequence.done_ns);
         let event = slot.is_none_or(|slot| slot.rows == LAST_ROW).then(|| context.schedule(done));
         self.status = sr::STRT.set(self.status, 1);
-        self.running = Some(Running { event, begun_ns, slot });
+        self.running = Some(Running { event, sequence, slot });
     }
 
     fn finish(&mut self, running: Running, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
-        let (mut cycles, length) = (0, length(registers));
-        let mut samples = [(0, 0); RANKS];
-        for (rank, sample) in samples.iter_mut().enumerate().take(length) {
-            let input = input(registers, rank);
-            cycles += sampling_cycles(registers, input);
-            *sample = (input, self.after(running.begun_ns, cycles));
-            cycles += CONVERSION_CYCLES;
-        }
+        let Sequence { samples, done_ns } = running.sequence;
         let by_dma = cr2::DMA.is_set(registers.get(Register::Cr2));
         let mut front_end = self.front_end.lock();
         if !by_dma {
             front_end.waiting[self.nth].clear();
         }
-        front_end.convert(self.nth, self.inside_on, running.slot, samples.iter().copied().take(length));
+        front_end.convert(self.nth, self.inside_on, running.slot, samples.into_iter());
         if let Some(word) = front_end.waiting[self.nth].front() {
             registers.set(Register::Dr, u64::from(*word));
         }
@@ -114,7 +121,7 @@ impl Converter {
         }
         drop(front_end);
         if cr1::JAUTO.is_set(registers.get(Register::Cr1)) {
-            self.inject(self.after(running.begun_ns, cycles), registers, context);
+            self.inject(done_ns, registers, context);
         }
         self.status = sr::EOC.set(self.status, 1);
         if by_dma {
@@ -126,19 +133,15 @@ impl Converter {
     /// The injected group begins, behind a regular sequence.
     fn inject(&mut self, begun_ns: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         self.status = self.injected.show(context.now().0, self.status, registers);
-        let front_end = self.front_end.lock();
-        let mut cycles = 0;
-        let mut words = Vec::new();
-        for input in injected_inputs(registers) {
-            let sampling = sampling_cycles(registers, input);
-            if input >= REFERENCE_INPUT && sampling * 1_000_000_000 < SAMPLING_NS * self.clock_hz {
-                context.tell("SMPR1", "reference and sensor are sampled for less than 10 us");
-            }
-            cycles += sampling;
-            words.push(front_end.word(self.nth, input, self.inside_on, self.after(begun_ns, cycles)));
-            cycles += CONVERSION_CYCLES;
+        let inputs = injected_inputs(registers);
+        let too_short = |input| sampling_cycles(registers, input) * 1_000_000_000 < SAMPLING_NS * self.clock_hz;
+        if inputs.iter().any(|input| *input >= REFERENCE_INPUT && too_short(*input)) {
+            context.tell("SMPR1", "reference and sensor are sampled for less than 10 us");
         }
-        self.injected = Injected { words, done_ns: self.after(begun_ns, cycles) };
+        let Sequence { samples, done_ns } = self.sequence(begun_ns, inputs, registers);
+        let front_end = self.front_end.lock();
+        let word = |(input, at_ns)| front_end.word(self.nth, input, self.inside_on, at_ns);
+        self.injected = Injected { words: samples.into_iter().map(word).collect(), done_ns };
     }
 
     fn triggered(&mut self, slot: Option<Slot>, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
@@ -260,8 +263,6 @@ impl Device for Converter {
 
 /// Cycles of a 12-bit conversion after sampling, RM0090 13.7.
 pub const CONVERSION_CYCLES: u64 = 12;
-/// The most that a sequence has.
-pub const RANKS: usize = 16;
 
 /// `SMPx`, 13.13.4, in converter cycles.
 const SAMPLING_CYCLES: [u64; 8] = [3, 15, 28, 56, 84, 112, 144, 480];

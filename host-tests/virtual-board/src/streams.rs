@@ -176,35 +176,25 @@ impl Device for Streams {
         if change.level == Level::Low {
             return;
         }
-        let wanted = if change.instance == "TIM8" && change.request == tim::UPDATE_REQUEST {
-            Source::ScanTimer
-        } else if let Some(nth) = CONVERTERS.iter().position(|name| *name == change.instance) {
-            if change.request != adc::DMA_REQUEST {
-                return;
+        let wanted = match (change.instance, change.request) {
+            ("TIM8", tim::UPDATE_REQUEST) => Source::ScanTimer,
+            (name, adc::DMA_REQUEST) if let Some(nth) = CONVERTERS.iter().position(|of| *of == name) => {
+                Source::Converter(nth)
             }
-            Source::Converter(nth)
-        } else {
-            return;
+            _ => return,
         };
-        for (stream, _, _) in REQUESTS.iter().filter(|(_, _, source)| *source == wanted) {
-            if !self.streams[*stream].running || source(registers, *stream) != Some(wanted) {
-                continue;
+        let asked = |stream: &usize| self.streams[*stream].running && source(registers, *stream) == Some(wanted);
+        let Some(stream) = (0..STREAMS).find(asked) else { return };
+        match wanted {
+            Source::Converter(nth) => {
+                self.take_words(stream, nth, registers, context);
+                self.refresh(registers, context);
             }
-            match wanted {
-                Source::Converter(nth) => {
-                    self.take_words(*stream, nth, registers, context);
-                    self.refresh(registers, context);
-                }
-                Source::ScanTimer => {
-                    // In a scene one request covers all updates that passed.
-                    if self.front_end.lock().scan.as_ref().is_some_and(|scan| scan.due_ns.is_empty()) {
-                        return;
-                    }
-                    let at = self.streams[*stream].next_address(4);
-                    context.read_from(at, Width::W32, *stream as u64 | FETCH);
-                }
+            // In a scene one request covers all updates that passed.
+            Source::ScanTimer if self.front_end.lock().scan.as_ref().is_some_and(|scan| scan.due_ns.is_empty()) => {}
+            Source::ScanTimer => {
+                context.read_from(self.streams[stream].next_address(4), Width::W32, stream as u64 | FETCH);
             }
-            return;
         }
     }
 
@@ -285,17 +275,6 @@ enum Source {
     ScanTimer,
 }
 
-/// Stream, channel, who asks there: the rows of RM0390 table 29 that are wired.
-const REQUESTS: [(usize, u64, Source); 7] = [
-    (0, 0, Source::Converter(0)),
-    (4, 0, Source::Converter(0)),
-    (2, 1, Source::Converter(1)),
-    (3, 1, Source::Converter(1)),
-    (0, 2, Source::Converter(2)),
-    (1, 2, Source::Converter(2)),
-    (1, 7, Source::ScanTimer),
-];
-
 /// A stream's registers that matter, by their place among its six.
 #[derive(Clone, Copy)]
 enum Row {
@@ -324,10 +303,14 @@ fn raise(registers: &mut RegisterFile, stream: usize, flags: u64) {
     registers.set(register, registers.get(register) | flags << shift);
 }
 
-/// Who asks on a stream, by its channel.
+/// Who asks on a stream, by its channel: the rows of RM0390 table 29 that the scan uses.
 fn source(registers: &RegisterFile, stream: usize) -> Option<Source> {
-    let channel = s0cr::CHSEL.get(get(registers, stream, Row::Control));
-    REQUESTS.iter().find(|(at, on, _)| *at == stream && *on == channel).map(|(_, _, source)| *source)
+    match (stream, s0cr::CHSEL.get(get(registers, stream, Row::Control))) {
+        (0, 2) => Some(Source::Converter(2)),
+        (2, 1) => Some(Source::Converter(1)),
+        (1, 7) => Some(Source::ScanTimer),
+        _ => None,
+    }
 }
 
 /// Returns true if the setup of a stream is modelled.

@@ -69,10 +69,6 @@ pub fn scene(quick: bool) -> Result<Scene, RunError> {
     Ok(scene)
 }
 
-pub fn what(goal_n: f64) -> String {
-    if goal_n > 0.0 { format!("hold {goal_n} N") } else { "let go".into() }
-}
-
 /// Smallest force of a hold that is drawn. Each force is drawn once.
 const DRAWN_N: f64 = 1.0;
 

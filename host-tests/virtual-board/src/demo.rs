@@ -10,10 +10,10 @@ use crate::{Error, Rig};
 use fingertip::shipped::address;
 use output::say;
 use serde::Serialize;
-use sim::demo::{self, Check, Forces, Run, Trace, what};
-use sim::scene::Scene;
-use sim::watch::{Step, Summary, Watch};
+use sim::demo::{self, Check, Forces, Run, Trace};
+use sim::watch::Summary;
 use std::path::Path;
+use std::thread::JoinHandle;
 use std::time::Instant;
 
 /// Runs the demonstration and takes its figures; a quick one is shorter, and without the second run.
@@ -29,18 +29,16 @@ pub fn run(image: &Path, quick: bool) -> Result<(Figures, Run), Error> {
     let flash = Flashable::of(boards.rigs[0].image())?;
     flash.check_loaded(&mut boards.rigs[0])?;
     let from = Counts::of(&mut boards.rigs[0])?;
-    let mut screen = Screen { trace: Trace::new(&scene), scene: scene.clone(), told: 0 };
-    let summary = boards.run(&scene, &mut screen)?;
+    let mut trace = Trace::new(&scene);
+    let summary = boards.run(&scene, &mut trace)?;
     let rig: &mut Rig = &mut boards.rigs[0];
     let to = Counts::of(rig)?;
-    let repeated = match repeat {
-        Some(repeat) => {
-            say::line("waiting for the same run once more, to compare the traces");
-            Some(repeat.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?)
-        }
-        None => None,
+    let awaited = |repeat: JoinHandle<_>| {
+        say::line("waiting for the same run once more, to compare the traces");
+        repeat.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     };
-    let run = screen.trace.finish()?;
+    let repeated = repeat.map(awaited).transpose()?;
+    let run = trace.finish()?;
     let mut figures = Figures::of(&run, [&from, &to], rig, &flash, summary, repeated)?;
     figures.wall_time_s = begun.elapsed().as_secs_f64();
     Ok((figures, run))
@@ -160,26 +158,5 @@ impl Figures {
             checks.push(Check::new("traces that differ when repeated", differ, "", at_most(0.0)));
         }
         checks
-    }
-}
-
-/// Trace of the run; reports each goal as it is set.
-pub struct Screen {
-    trace: Trace,
-    scene: Scene,
-    told: usize,
-}
-
-impl Watch for Screen {
-    fn wants_every_frame(&self) -> bool {
-        true
-    }
-
-    fn step(&mut self, step: &Step) {
-        self.trace.step(step);
-        while let Some(event) = self.scene.script.get(self.told).filter(|event| event.at_s <= step.time_s) {
-            say::line(format!("{:7.3} s  goal: {}", event.at_s, what(event.goal_n)));
-            self.told += 1;
-        }
     }
 }

@@ -4,7 +4,7 @@ use crate::common::image;
 use sim::cores;
 use sim::demo::{missed, table};
 use sim::scene::{self, Scene, read};
-use sim::watch::{Agreement, BEYOND_MM, BEYOND_N, Controller, Step, Summary, Watch};
+use sim::watch::{Agreement, BEYOND_MM, BEYOND_N, Step, Summary, Watch};
 use virtual_board::demo;
 use virtual_board::scene::simulate;
 
@@ -66,26 +66,14 @@ fn native(of: &Scene) -> Agreement {
     Agreement::new(of, path)
 }
 
-/// Shows each step to several watchers.
-struct All<'a>(Vec<&'a mut dyn Watch>);
-
-impl Watch for All<'_> {
-    fn begin(&mut self, controllers: &[Controller]) {
-        self.0.iter_mut().for_each(|watch| watch.begin(controllers));
-    }
-
-    fn step(&mut self, step: &Step) {
-        self.0.iter_mut().for_each(|watch| watch.step(step));
-    }
-}
-
 #[test]
 fn both_boards_do_the_same_and_one_that_does_otherwise_is_noticed() {
     let of = scene(STEPS);
     let (mut same, mut kept) = (native(&of), Kept::default());
     // A tip that is 5 % stiffer than the image's.
     let mut other = native(&scene(&format!("{STEPS}[tip]\nmodulus_kpa = 262.5\n")));
-    let summary = run(&of, &mut All(vec![&mut same, &mut other, &mut kept]));
+    let watchers: [&mut dyn Watch; 3] = [&mut same, &mut other, &mut kept];
+    let summary = run(&of, &mut Vec::from(watchers));
     println!("{same}\n{:.3} times real time", summary.virtual_s / summary.wall_s);
     assert!(same.held(), "{same}");
     // Two boards that do not differ at all would be one board compared with itself.

@@ -9,7 +9,6 @@
 
 pub mod bench;
 pub mod board;
-#[cfg(feature = "bringup")]
 pub mod bringup;
 pub mod client;
 pub mod converter;

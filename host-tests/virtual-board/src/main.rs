@@ -29,7 +29,6 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Runs the image of `cargo xtask bringup` and judges its report.
-    #[cfg(feature = "bringup")]
     Bringup {
         /// Number of frames for which the rows are read back.
         #[arg(long, default_value_t = 1_000)]
@@ -76,7 +75,6 @@ enum Command {
 fn main() -> ExitCode {
     let Arguments { image, command } = Arguments::parse();
     let result = match command {
-        #[cfg(feature = "bringup")]
         Command::Bringup { frames, estimates, json } => bringup(&image, frames, estimates.as_deref(), json.as_deref()),
         Command::Demo { json, out, quick } => demo(&image, json.as_deref(), &out, quick),
         Command::Serve { pty, tcp, distance_mm } => {
@@ -110,7 +108,6 @@ fn main() -> ExitCode {
 /// Time after which an answer is reported as late: the shortest time-out of the known clients.
 const LATE: Duration = Duration::from_millis(10);
 
-#[cfg(feature = "bringup")]
 fn bringup(image: &Path, frames: u32, estimates: Option<&Path>, json: Option<&Path>) -> Result<(), Error> {
     let estimates = estimates.map(::bringup::judge::estimates).transpose()?.unwrap_or_default();
     let told = &mut |said: &str| say::line(said);

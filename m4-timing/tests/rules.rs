@@ -1,5 +1,5 @@
 //! The timing rules: sequences whose cost the tables of Arm's Technical Reference Manual state, and what the meter
-//! makes of them. These are checks of consistency; `silicon.rs` compares with measurements.
+//! makes of them. These are checks of consistency; `cargo xtask timing --check` compares with measurements.
 
 use Step::{Do, Goto, Touch};
 use m4_timing::core::{Flash, Touched};

@@ -44,7 +44,7 @@ pub fn run(args: &Args) -> Result<()> {
     stages.stage("panic-free proof", image::prove_panic_free);
     stages.stage("emulated Cortex-M4F against this machine", cores::test_m4);
     stages.stage("example for another board", cores::example);
-    stages.stage("timing model against published measurements", timing::check);
+    stages.stage("timing model against published measurements", |console| timing::check(console).map(drop));
     stages.stage("virtual board", |console| {
         let python = install::bus_python(console)?;
         let mut command = host::tests(&["--test", "board"]);

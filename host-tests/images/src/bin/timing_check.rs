@@ -1,7 +1,7 @@
 //! Published kernels for the timing model's check: code in assembly, so the compiler has no part in the figures.
 //!
 //! Not for a board. Each kernel is a region, numbered by its place in [`KERNELS`] from 1 on;
-//! `m4-timing/tests/silicon.rs` has the cycles that their authors measured, in the same order. With the command line
+//! `xtask/src/timing.rs` has the cycles that their authors measured, in the same order. With the command line
 //! `unknown`, a region holds an instruction that the core does not have.
 #![no_std]
 #![no_main]

@@ -8,6 +8,7 @@ use crate::{docs, install};
 use anyhow::{Context, Result, ensure};
 use std::fs;
 use std::path::PathBuf;
+use std::process::Command;
 
 /// The page with the table of cores, and the example that runs the images and prints it.
 pub const PAGE: (&str, &str) = ("docs/porting.md", "porting-page");
@@ -103,7 +104,9 @@ fn table(page: &str) -> String {
 
 // The core on an emulated Cortex-M4F.
 
-const M4_EMULATOR: &str = "qemu-system-arm";
+pub const M4_EMULATOR: &str = "qemu-system-arm";
+/// The first version with the plugin interface of `m4-timing`.
+const VERSION_MIN: u32 = 9;
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  cargo xtask qemu\n  cargo xtask qemu --inject hang    (fails, as it must)")]
@@ -125,12 +128,23 @@ pub fn test_m4(console: &mut Console) -> Result<()> {
     host::test(host::tests(&["--test", "qemu", "--", "--ignored"]).env("FINGERTIP_QEMU_IMAGE", image), console)
 }
 
+/// Makes sure of an emulator that also takes the plugin of the estimated cycles.
 pub fn ensure_m4(console: &mut Console) -> Result<()> {
-    match host::find_program(M4_EMULATOR) {
-        Some(_) => Ok(()),
-        // At once the version that the estimates of cycles need: none is installed to be replaced.
-        None => install::newest(&[M4_EMULATOR], "running the core on an emulated Cortex-M4F", console),
+    if version() >= Some(VERSION_MIN) {
+        return Ok(());
     }
+    let why = "running code on an emulated Cortex-M4F";
+    install::newest(&[M4_EMULATOR], why, console)?;
+    let found = version().map_or("none".into(), |version| version.to_string());
+    let new = version() >= Some(VERSION_MIN);
+    ensure!(new, "{why} needs {M4_EMULATOR} {VERSION_MIN} or newer; found {found} in PATH: install one by hand");
+    Ok(())
+}
+
+fn version() -> Option<u32> {
+    let output = Command::new(M4_EMULATOR).arg("--version").output().ok()?;
+    let text = String::from_utf8(output.stdout).ok()?;
+    text.strip_prefix("QEMU emulator version ")?.split('.').next()?.parse().ok()
 }
 
 fn prepare(console: &mut Console) -> Result<PathBuf> {

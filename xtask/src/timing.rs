@@ -1,20 +1,16 @@
 //! Estimated cycles on a Cortex-M4F, by QEMU with the timing plugin. Their worth: `docs/timing.md`.
 
 use crate::console::{self, Console};
+use crate::cores::M4_EMULATOR;
 use crate::host::{self, Program};
 use crate::toolchain;
-use crate::{image, install};
+use crate::{cores, image};
 use anyhow::{Context, Result, bail, ensure};
 use m4_timing::meter::{Measured, json_lines, parse};
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-
-const PROGRAM: &str = "qemu-system-arm";
-/// The first version with the plugin interface that the plugin speaks.
-const VERSION_MIN: u32 = 9;
-const WHY: &str = "estimating cycles on an emulated Cortex-M4F";
 
 #[derive(clap::Args)]
 #[command(
@@ -127,17 +123,17 @@ pub fn check(console: &mut Console) -> Result<String> {
 /// Runs an image to its end under the plugin; `argument` is its command line. Returns its standard output, and the regions in
 /// order of their numbers, with the names of the output's lines `region NUMBER NAME`.
 pub fn measure(image: &Path, argument: Option<&Path>, console: &mut Console) -> Result<(String, Vec<Measured>)> {
-    ensure(console)?;
+    cores::ensure_m4(console)?;
     let plugin = plugin(console)?;
     let name = image.file_stem().unwrap_or_default().display();
     let file = host::made("timing")?.join(format!("{name}.{}.json", std::process::id()));
     let argument = argument.map_or_else(String::new, |argument| format!(",arg={}", argument.display()));
-    let mut command = Command::new(PROGRAM);
+    let mut command = Command::new(M4_EMULATOR);
     command.args(["-M", "netduinoplus2", "-display", "none", "-monitor", "none", "-serial", "none"]);
     command.arg("-semihosting-config").arg(format!("enable=on,target=native{argument}"));
     command.arg("-plugin").arg(format!("{},out={}", plugin.display(), file.display()));
     command.arg("-kernel").arg(image).stdin(Stdio::null());
-    let ended = command.output().with_context(|| format!("cannot start {PROGRAM}"))?;
+    let ended = command.output().with_context(|| format!("cannot start {M4_EMULATOR}"))?;
     let output = String::from_utf8_lossy(&ended.stdout).into_owned();
     if !ended.status.success() {
         let errors = String::from_utf8_lossy(&ended.stderr);
@@ -153,27 +149,6 @@ pub fn measure(image: &Path, argument: Option<&Path>, console: &mut Console) -> 
         measured.name = name.map_or(format!("region {}", measured.region), Into::into);
     }
     Ok((output, regions))
-}
-
-/// Makes sure of an emulator with the plugin interface.
-fn ensure(console: &mut Console) -> Result<()> {
-    if version().is_some_and(|version| version >= VERSION_MIN) {
-        return Ok(());
-    }
-    install::newest(&[PROGRAM], WHY, console)?;
-    match version() {
-        Some(version) if version >= VERSION_MIN => Ok(()),
-        found => {
-            let found = found.map_or("none".into(), |version| version.to_string());
-            bail!("{WHY} needs {PROGRAM} {VERSION_MIN} or newer; found {found} in PATH: install one by hand")
-        }
-    }
-}
-
-fn version() -> Option<u32> {
-    let output = Command::new(PROGRAM).arg("--version").output().ok()?;
-    let text = String::from_utf8(output.stdout).ok()?;
-    text.strip_prefix("QEMU emulator version ")?.split('.').next()?.parse().ok()
 }
 
 fn plugin(console: &mut Console) -> Result<PathBuf> {

@@ -1,7 +1,7 @@
 //! Runs the examples for clusters on this machine, without a cluster: each task of Slurm and each pod of Kubernetes runs
 //! with the environment variables that it would get there.
 
-use crate::console::{self, Console};
+use crate::console;
 use crate::host::{self, Program};
 use crate::install::{self, Environment};
 use anyhow::{Context, Result};
@@ -22,10 +22,10 @@ const CLIENTS: Environment = Environment {
 };
 
 /// Runs a sweep whole and by each example, and compares what they make byte by byte.
-pub fn run(console: &mut Console) -> Result<()> {
-    install::packages(&["parallel"], "the test of the examples for clusters", console)?;
-    let python = install::environment(&CLIENTS, console)?;
-    Program::sim("sweep").build(console)?;
+pub fn run() -> Result<()> {
+    install::packages(&["parallel"], "the test of the examples for clusters")?;
+    let python = install::environment(&CLIENTS)?;
+    Program::sim("sweep").build()?;
     let sweep = host::target().join(host::PROGRAMS).join("sweep");
     let folder = host::target().join("cluster");
     host::emptied(&folder)?;
@@ -38,20 +38,20 @@ pub fn run(console: &mut Console) -> Result<()> {
     let whole = folder.join("whole");
     let mut command = Command::new(&sweep);
     given(&mut command, &whole);
-    tried("one sweep", &mut command, console)?;
+    tried("one sweep", &mut command)?;
 
     let shared = folder.join("slurm");
     for task in 1..=SHARES {
         let mut command = slurm_task([task, 1, SHARES, SHARES]);
         given(&mut command, &shared);
-        tried("a task of a Slurm array", &mut command, console)?;
+        tried("a task of a Slurm array", &mut command)?;
     }
     same(&sweep, &whole, &shared)?;
 
     let parallel = folder.join("parallel");
     let mut command = Command::new(examples.join("parallel.sh"));
     given(command.arg(SHARES.to_string()), &parallel);
-    tried("GNU parallel", &mut command, console)?;
+    tried("GNU parallel", &mut command)?;
     same(&sweep, &whole, &parallel)?;
 
     // The job's folder has the program and the scene in it.
@@ -65,19 +65,19 @@ pub fn run(console: &mut Console) -> Result<()> {
     let mut command = Command::new(&python);
     command.arg(&check).arg("kubernetes").arg(examples.join("kubernetes.yaml")).arg(&kubernetes);
     command.args([SEEDS, &SHARES.to_string()]);
-    tried("the shell of the Kubernetes job", &mut command, console)?;
+    tried("the shell of the Kubernetes job", &mut command)?;
     same(&sweep, &whole, &kubernetes)?;
 
     let mut command = Command::new(&python);
     command.arg(&check).arg("summary").arg(examples.join("summary.sql")).arg(&whole);
-    tried("the summary by DuckDB", &mut command, console)?;
-    console.say("All of them make the same bytes as one sweep.");
+    tried("the summary by DuckDB", &mut command)?;
+    console::say("All of them make the same bytes as one sweep.");
     Ok(())
 }
 
-fn tried(what: &str, command: &mut Command, console: &Console) -> Result<()> {
+fn tried(what: &str, command: &mut Command) -> Result<()> {
     console::output(command)?;
-    console.say(&format!("done     {what}"));
+    console::say(&format!("done     {what}"));
     Ok(())
 }
 

@@ -1,6 +1,6 @@
 //! The closed loop of the crate's example on every core that QEMU emulates: each gives the same bits as this machine.
 
-use crate::console::{self, Console};
+use crate::console;
 use crate::host::{self, Program};
 use crate::image::{self, Image};
 use crate::toolchain::{self, TARGET};
@@ -46,26 +46,26 @@ fn emulator(target: &str, board: &str) -> String {
 }
 
 /// Runs the loop on every core and writes the table.
-pub fn run_all(console: &mut Console) -> Result<()> {
-    let page = page(console)?;
-    console.print(&table(&page));
-    docs::renew(PAGE.0, &page, false, &mut Vec::new(), console)
+pub fn run_all() -> Result<()> {
+    let page = page()?;
+    console::print(&table(&page));
+    docs::renew(PAGE.0, &page, false, &mut Vec::new())
 }
 
 /// Runs the image of every core and compares its digest with this machine's. Returns the page with the table.
-pub fn page(console: &mut Console) -> Result<String> {
-    ensure_m4(console)?;
+pub fn page() -> Result<String> {
+    ensure_m4()?;
     if host::find_program(RISCV_PROGRAM).is_none() {
         // Of the same version as the emulator for Arm: both share files.
-        install::newest(&["qemu-system-riscv"], "running the loop on emulated cores", console)?;
+        install::newest(&["qemu-system-riscv"], "running the loop on emulated cores")?;
     }
     let targets = CORES.map(|(_, _, target, ..)| target);
-    toolchain::ensure_for(&targets, "the loop is built for other cores than the board's", console)?;
+    toolchain::ensure_for(&targets, "the loop is built for other cores than the board's")?;
     let folder = host::made("cores")?;
     let mut list = String::new();
     for (number, (name, array, target, flags, board)) in CORES.iter().enumerate() {
         let mut command = image::apart("build", LOOP, target, flags);
-        console.build(command.arg("--release"), &format!("the loop for {target}"))?;
+        console::prepare(command.arg("--release"))?;
         // Two boards have the same target and name.
         let elf = folder.join(format!("{number}.elf"));
         fs::copy(toolchain::images_for(target, flags).join("cores"), &elf).with_context(|| host::shown(&elf))?;
@@ -75,16 +75,16 @@ pub fn page(console: &mut Console) -> Result<String> {
     }
     let file = folder.join("list.tsv");
     host::write(&file, list)?;
-    console::output(host::example(PAGE.1, console)?.arg(&file))
+    console::output(host::example(PAGE.1)?.arg(&file))
 }
 
 /// Builds the example for another board, which links for its chip.
-pub fn example(console: &mut Console) -> Result<()> {
+pub fn example() -> Result<()> {
     let target = TARGET_OF_EXAMPLE;
-    toolchain::ensure_for(&[target], "the example for another board is built for it", console)?;
-    let mut size = |features: &[&str]| {
+    toolchain::ensure_for(&[target], "the example for another board is built for it")?;
+    let size = |features: &[&str]| {
         let mut command = image::apart("build", EXAMPLE, target, &[]);
-        console.build(command.arg("--release").args(features), EXAMPLE)?;
+        console::prepare(command.arg("--release").args(features))?;
         Ok::<_, anyhow::Error>(Image::read(&toolchain::images_for(target, &[]).join("rp2040"))?.bytes.len())
     };
     let measures = size(&["--features", "fingertip/measure"])?;
@@ -93,7 +93,7 @@ pub fn example(console: &mut Console) -> Result<()> {
     ensure!(bytes > 40_000, "{EXAMPLE} has {bytes} bytes: the loop is not in it");
     // Without the feature the code of the motions must not be in the image.
     ensure!(measures > bytes + 7_000, "{EXAMPLE} has {bytes} bytes, and {measures} with the feature `measure`");
-    console.print(&format!("{EXAMPLE}: {bytes} bytes of flash, {measures} with the motions that measure"));
+    console::print(&format!("{EXAMPLE}: {bytes} bytes of flash, {measures} with the motions that measure"));
     Ok(())
 }
 
@@ -117,24 +117,24 @@ pub struct QemuArgs {
 }
 
 /// Runs recorded stimulus, and random inputs of functions with own instructions, there and here, and compares.
-pub fn run_m4(args: &QemuArgs, console: &mut Console) -> Result<()> {
-    let image = prepare(console)?;
-    let mut replay = Program::tool("qemu-host").build(console)?;
-    console.run(replay.arg(&image).arg(host::target().join("stimulus")).args(&args.inject))
+pub fn run_m4(args: &QemuArgs) -> Result<()> {
+    let image = prepare()?;
+    let mut replay = Program::tool("qemu-host").build()?;
+    console::run(replay.arg(&image).arg(host::target().join("stimulus")).args(&args.inject))
 }
 
-pub fn test_m4(console: &mut Console) -> Result<()> {
-    let image = prepare(console)?;
-    host::test(host::tests(&["--test", "qemu", "--", "--ignored"]).env("FINGERTIP_QEMU_IMAGE", image), console)
+pub fn test_m4() -> Result<()> {
+    let image = prepare()?;
+    host::test(host::tests(&["--test", "qemu", "--", "--ignored"]).env("FINGERTIP_QEMU_IMAGE", image))
 }
 
 /// Makes sure of an emulator that also takes the plugin of the estimated cycles.
-pub fn ensure_m4(console: &mut Console) -> Result<()> {
+pub fn ensure_m4() -> Result<()> {
     if version() >= Some(VERSION_MIN) {
         return Ok(());
     }
     let why = "running code on an emulated Cortex-M4F";
-    install::newest(&[M4_EMULATOR], why, console)?;
+    install::newest(&[M4_EMULATOR], why)?;
     let found = version().map_or("none".into(), |version| version.to_string());
     let new = version() >= Some(VERSION_MIN);
     ensure!(new, "{why} needs {M4_EMULATOR} {VERSION_MIN} or newer; found {found} in PATH: install one by hand");
@@ -147,7 +147,7 @@ fn version() -> Option<u32> {
     text.strip_prefix("QEMU emulator version ")?.split('.').next()?.parse().ok()
 }
 
-fn prepare(console: &mut Console) -> Result<PathBuf> {
-    ensure_m4(console)?;
-    image::build("qemu", "qemu", console)
+fn prepare() -> Result<PathBuf> {
+    ensure_m4()?;
+    image::build("qemu", "qemu")
 }

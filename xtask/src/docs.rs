@@ -1,6 +1,6 @@
 //! Generated files: renewed, or checked for being fresh.
 
-use crate::console::{self, Console};
+use crate::console;
 use crate::host::{self, Program};
 use crate::install::{self, Environment};
 use crate::{cores, image};
@@ -30,14 +30,14 @@ pub struct Args {
 }
 
 /// Writes or checks the generated files; the figures come from a run of the demonstration.
-pub fn run(args: &Args, console: &mut Console) -> Result<()> {
+pub fn run(args: &Args) -> Result<()> {
     let mut stale = Vec::new();
     for (path, example) in GENERATED.split(' ').map(|path| (path, "generated")).chain([SCENES]) {
-        renew(path, &print(example, Some(Path::new(path)), console)?, args.check, &mut stale, console)?;
+        renew(path, &print(example, Some(Path::new(path)))?, args.check, &mut stale)?;
     }
-    let mut budget = Program::sim("budget").build(console)?;
-    renew(BUDGET.0, &console::output(budget.args(["--fingers", BUDGET.1]))?, args.check, &mut stale, console)?;
-    renew(cores::PAGE.0, &cores::page(console)?, args.check, &mut stale, console)?;
+    let mut budget = Program::sim("budget").build()?;
+    renew(BUDGET.0, &console::output(budget.args(["--fingers", BUDGET.1]))?, args.check, &mut stale)?;
+    renew(cores::PAGE.0, &cores::page()?, args.check, &mut stale)?;
 
     let root = host::root();
     let (json, pictures) = if args.check {
@@ -46,12 +46,12 @@ pub fn run(args: &Args, console: &mut Console) -> Result<()> {
         (root.join(FIGURES), root.join(PICTURES))
     };
     fs::create_dir_all(&pictures).with_context(|| format!("cannot make {}", host::shown(&pictures)))?;
-    let image = image::firmware(console)?;
+    let image = image::firmware()?;
     // Like the programs before it: the one of `cargo xtask demo` would compile the emulator again, with fewer features.
-    let mut command = host::SCENE_BOARD.build(console)?;
+    let mut command = host::SCENE_BOARD.build()?;
     command.args(["demo", "--image"]).arg(&image.elf).arg("--json").arg(&json).arg("--out").arg(&pictures);
-    console.run(&mut command)?;
-    renew(README.0, &print(README.1, Some(&json), console)?, args.check, &mut stale, console)?;
+    console::run(&mut command)?;
+    renew(README.0, &print(README.1, Some(&json))?, args.check, &mut stale)?;
 
     if !stale.is_empty() {
         bail!("stale: {}; renew them with `cargo xtask docs`", stale.join(", "));
@@ -59,21 +59,21 @@ pub fn run(args: &Args, console: &mut Console) -> Result<()> {
     Ok(())
 }
 
-fn print(example: &str, argument: Option<&Path>, console: &mut Console) -> Result<String> {
-    console::output(host::example(example, console)?.args(argument))
+fn print(example: &str, argument: Option<&Path>) -> Result<String> {
+    console::output(host::example(example)?.args(argument))
 }
 
 /// Writes a file that is not fresh, or adds it to the stale ones.
-pub fn renew(path: &str, text: &str, check: bool, stale: &mut Vec<String>, console: &Console) -> Result<()> {
+pub fn renew(path: &str, text: &str, check: bool, stale: &mut Vec<String>) -> Result<()> {
     let file = host::root().join(path);
     if fs::read_to_string(&file).is_ok_and(|present| present == text) {
-        console.print(&format!("fresh    {path}"));
+        console::print(&format!("fresh    {path}"));
     } else if check {
-        console.print(&format!("stale    {path}"));
+        console::print(&format!("stale    {path}"));
         stale.push(path.into());
     } else {
         host::write(&file, text)?;
-        console.print(&format!("written  {path}"));
+        console::print(&format!("written  {path}"));
     }
     Ok(())
 }
@@ -86,11 +86,11 @@ pub const PACKAGES: [&str; 2] = ["fingertip-lanes", "fingertip"];
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// Tests the packages from `host-tests/outside`; checks the Python package's types and wheel.
-pub fn package(console: &mut Console) -> Result<()> {
+pub fn package() -> Result<()> {
     let mut package = console::cargo("package");
     // The project outside compiles them.
     package.args(["--allow-dirty", "--no-verify"]).args(PACKAGES.iter().flat_map(|name| ["--package", name]));
-    console.run(&mut package)?;
+    console::run(&mut package)?;
     let made = host::target().join("package");
     let unpacked = host::target().join("outside").join("packages");
     host::emptied(&unpacked)?;
@@ -100,7 +100,7 @@ pub fn package(console: &mut Console) -> Result<()> {
         let mut unpack = std::process::Command::new("tar");
         // `-m` gives the files the present time, by which cargo decides what to rebuild.
         unpack.args(["-x", "-z", "-m", "-f"]).arg(made.join(format!("{folder}.crate"))).arg("-C").arg(&unpacked);
-        console.run(&mut unpack)?;
+        console::run(&mut unpack)?;
         test.arg("--config").arg(format!("patch.crates-io.{name}.path={:?}", unpacked.join(folder)));
     }
     let outside = host::root().join("host-tests").join("outside");
@@ -108,16 +108,16 @@ pub fn package(console: &mut Console) -> Result<()> {
     let lock = outside.join("Cargo.lock");
     fs::copy(host::root().join("Cargo.lock"), &lock).with_context(|| format!("cannot write {}", host::shown(&lock)))?;
     test.arg("--manifest-path").arg(outside.join("Cargo.toml")).arg("--target-dir").arg(host::target().join("outside"));
-    console.run(&mut test)?;
+    console::run(&mut test)?;
 
-    let python = install::bus_python(console)?;
+    let python = install::bus_python()?;
     // The wheel's builder reads the sources of every platform, also those that no build here needs.
-    console.prepare(console::cargo("fetch").args(["--locked", "--quiet"]))?;
-    let serve = host::SERVE.build(console)?;
+    console::prepare(console::cargo("fetch").args(["--locked", "--quiet"]))?;
+    let serve = host::SERVE.build()?;
     let mut test = std::process::Command::new(python);
     test.args(["-B", "-m", "unittest", "discover", "--pattern", "test_package.py"]);
     test.arg(host::root().join("python").join("tests")).env("PYTHONPATH", host::root().join("python"));
-    console.run(test.env("FINGERTIP_SERVE", host::root().join(serve.get_program())))
+    console::run(test.env("FINGERTIP_SERVE", host::root().join(serve.get_program())))
 }
 
 // The checker of licences and sources, installed in the build folder.
@@ -132,24 +132,24 @@ const DENY_PACKAGE: Environment = Environment {
     does: "checks the licences",
 };
 
-pub fn deny(console: &mut Console) -> Result<PathBuf> {
+pub fn deny() -> Result<PathBuf> {
     let (name, version) = DENY;
     let folder = host::target().join("tools");
     let compiled = folder.join("bin").join(name);
     if compiled.is_file() {
         return Ok(compiled);
     }
-    let packed = install::environment(&DENY_PACKAGE, console).map(|python| python.with_file_name(name));
+    let packed = install::environment(&DENY_PACKAGE).map(|python| python.with_file_name(name));
     if let Ok(program) = packed
         && program.is_file()
     {
         return Ok(program);
     }
-    console.say(&format!("Installing {name} {version} to {}: it checks the licences.", host::shown(&folder)));
+    console::say(&format!("Installing {name} {version} to {}: it checks the licences.", host::shown(&folder)));
     // Unoptimised: it compiles in a third of the time, and runs for seconds.
     let mut install = console::cargo("install");
     install.arg(format!("{name}@{version}")).args(["--locked", "--debug", "--no-default-features", "--root"]);
-    let installed = console.prepare(install.arg(&folder));
+    let installed = console::prepare(install.arg(&folder));
     installed.with_context(|| format!("cannot install {name}: is crates.io in reach?"))?;
     Ok(compiled)
 }

@@ -1,7 +1,7 @@
 //! Writing an image to a board: the firmware, and for the first hour with a board the image that checks a bare
 //! NUCLEO-F446RE, or the emulated one, and its judge.
 
-use crate::console::{self, Console};
+use crate::console;
 use crate::host::{self, Program};
 use crate::image::{self, Image};
 use crate::{sim, timing};
@@ -22,12 +22,12 @@ pub struct Args {
 }
 
 /// Builds the flash image, prints its SHA-256, sees to the option bytes, writes and verifies it, and starts it.
-pub fn run(args: &Args, console: &mut Console) -> Result<()> {
+pub fn run(args: &Args) -> Result<()> {
     need_probe_rs()?;
-    let image = image::firmware(console)?;
-    console.print(&image.summary());
-    put(&image, args.probe.as_deref(), console)?;
-    console.say("The board runs the image.");
+    let image = image::firmware()?;
+    console::print(&image.summary());
+    put(&image, args.probe.as_deref())?;
+    console::say("The board runs the image.");
     Ok(())
 }
 
@@ -44,7 +44,7 @@ pub fn need_probe_rs() -> Result<()> {
 }
 
 /// Sees to the option bytes, writes and verifies an image, and starts it.
-pub fn put(image: &Image, probe: Option<&str>, console: &mut Console) -> Result<()> {
+pub fn put(image: &Image, probe: Option<&str>) -> Result<()> {
     let command = |subcommand| {
         let mut command = Command::new("probe-rs");
         command.args([subcommand, "--chip", CHIP]).args(probe.iter().flat_map(|probe| ["--probe", probe]));
@@ -56,12 +56,12 @@ pub fn put(image: &Image, probe: Option<&str>, console: &mut Console) -> Result<
     };
     // First, because this refuses another device.
     if set_brown_out_level(read, |options| write_options(options, probe))? {
-        console.say("Programmed brown-out level 3 into the option bytes.");
+        console::say("Programmed brown-out level 3 into the option bytes.");
     }
     let mut download = command("download");
     download.args(["--verify", "--binary-format", "bin", "--base-address"]);
-    console.run(download.arg(format!("{:#x}", image.base)).arg(&image.bin))?;
-    console.run(&mut command("reset"))
+    console::run(download.arg(format!("{:#x}", image.base)).arg(&image.bin))?;
+    console::run(&mut command("reset"))
 }
 
 // The option bytes (RM0390 3.6, 3.8). A write that a reset or a power loss cuts short can leave the device at read protection
@@ -195,25 +195,25 @@ enum Board {
 }
 
 /// Builds the image, runs it and judges what it reports. This process ends as the judge does.
-pub fn bringup(args: &BringupArgs, console: &mut Console) -> Result<()> {
+pub fn bringup(args: &BringupArgs) -> Result<()> {
     // First, as it takes no time: without a board there is no wait for a build.
     let port = (args.board == Board::Nucleo).then(|| args.port.clone().map_or_else(find_port, Ok)).transpose()?;
     if port.is_some() && !args.flashed {
         need_probe_rs()?;
     }
-    let image = image::checking(BRINGUP, console)?;
-    console.say(&image.summary());
-    let estimates = if args.without_estimates { None } else { Some(estimates(console)?) };
+    let image = image::checking(BRINGUP)?;
+    console::say(&image.summary());
+    let estimates = if args.without_estimates { None } else { Some(estimates()?) };
     let mut command = match port {
         None => {
-            let mut command = host::SCENE_BOARD.build(console)?;
+            let mut command = host::SCENE_BOARD.build()?;
             command.arg(BRINGUP).arg("--image").arg(std::path::absolute(&image.elf)?);
             command
         }
         Some(port) => {
-            let mut command = Program { package: BRINGUP, name: "bringup-host", with: host::SHARED }.build(console)?;
+            let mut command = Program { package: BRINGUP, name: "bringup-host", with: host::SHARED }.build()?;
             if !args.flashed {
-                put(&image, args.probe.as_deref(), console)?;
+                put(&image, args.probe.as_deref())?;
             }
             command.arg("--port").arg(port).arg("--sha256").arg(image.sha256());
             command
@@ -227,13 +227,13 @@ pub fn bringup(args: &BringupArgs, console: &mut Console) -> Result<()> {
 }
 
 /// The kernels' estimated cycles, with the flash's wait states, for the image's inputs: a file with a line each.
-fn estimates(console: &mut Console) -> Result<PathBuf> {
+fn estimates() -> Result<PathBuf> {
     let folder = host::made("study")?;
     let [kept, full, file] = ["kept.bin", "few.bin", "few.txt"].map(|name| folder.join(name));
-    let mut inputs = Program::tool("study").build(console)?;
-    console.run(inputs.arg("few").arg(&kept).arg(&full))?;
-    let study = image::build("study", "study", console)?;
-    let (_, regions) = timing::measure(&study, Some(&full), console)?;
+    let mut inputs = Program::tool("study").build()?;
+    console::run(inputs.arg("few").arg(&kept).arg(&full))?;
+    let study = image::build("study", "study")?;
+    let (_, regions) = timing::measure(&study, Some(&full))?;
     let call = regions.first().map_or(0, |region| region.flash.median);
     let mut text = String::new();
     for region in &regions {

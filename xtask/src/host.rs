@@ -1,6 +1,6 @@
 //! This machine: its paths, and programs of the workspace that run here, built with a line of progress, then started.
 
-use crate::console::{self, Console};
+use crate::console;
 use anyhow::{Context, Result};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -13,6 +13,8 @@ pub const PROGRAMS: &str = "debug";
 
 /// Selects all tests, with the features that [`SHARED`] gives to programs: crates that both use are compiled once.
 pub const TESTS: &str = "--workspace --features=fingertip-cli/foxglove --ignore-rust-version";
+/// Shows a dot for each test that passes.
+const QUIET: &str = "--quiet";
 /// Selects the packages that bring most dependencies, next to a program's own: cargo unifies their features.
 pub const SHARED: &str = "--package=virtual-board --package=serve --package=fingertip-cli \
                           --features=fingertip-cli/foxglove";
@@ -45,18 +47,18 @@ impl Program {
     }
 
     /// Builds it, and returns the command that starts it.
-    pub fn build(&self, console: &mut Console) -> Result<Command> {
+    pub fn build(&self) -> Result<Command> {
         let mut command = cargo("build", self.package);
         command.args(["--bin", self.name]).args(self.with.split(' '));
-        console.build(&mut command, self.name)?;
+        console::prepare(&mut command)?;
         Ok(Command::new(target().join(PROGRAMS).join(self.name)))
     }
 }
 
 /// Builds one of the tools of `host-tests` and runs it.
-pub fn run_tool(name: &'static str, words: &[impl AsRef<OsStr>], console: &mut Console) -> Result<()> {
-    let mut command = Program::tool(name).build(console)?;
-    console.run(command.args(words))
+pub fn run_tool(name: &'static str, words: &[impl AsRef<OsStr>]) -> Result<()> {
+    let mut command = Program::tool(name).build()?;
+    console::run(command.args(words))
 }
 
 /// `cargo <subcommand>` for a package of this machine. The emulator's crate asks for a newer compiler than it needs.
@@ -67,9 +69,9 @@ pub fn cargo(subcommand: &str, package: &str) -> Command {
 }
 
 /// Builds one of the examples, and returns the command that starts it.
-pub fn example(name: &str, console: &mut Console) -> Result<Command> {
+pub fn example(name: &str) -> Result<Command> {
     let mut build = cargo("build", "host-tests");
-    console.build(build.arg("--package=sim").args(SHARED.split(' ')).args(["--example", name]), name)?;
+    console::prepare(build.arg("--package=sim").args(SHARED.split(' ')).args(["--example", name]))?;
     Ok(Command::new(target().join(PROGRAMS).join("examples").join(name)))
 }
 
@@ -77,18 +79,19 @@ pub fn example(name: &str, console: &mut Console) -> Result<Command> {
 pub fn tests(words: &[&str]) -> Command {
     let mut command = console::cargo("test");
     // For a test that asks all programs for their help: built in another way, they would be compiled again.
-    command.args(TESTS.split(' ')).args(words).env("FINGERTIP_TESTS", TESTS);
+    command.arg(QUIET).args(TESTS.split(' ')).args(words).env("FINGERTIP_TESTS", TESTS);
     command
 }
 
-/// Builds the tests of a command `cargo test ...`, then runs them.
-pub fn test(command: &mut Command, console: &mut Console) -> Result<()> {
+/// Builds the tests of a command of [`tests`], then runs them.
+pub fn test(command: &mut Command) -> Result<()> {
     let mut build = Command::new(command.get_program());
     // What follows `--` is for the tests.
-    build.args(command.get_args().take_while(|word| *word != "--").filter(|word| *word != "--no-fail-fast"));
+    let words = command.get_args().take_while(|word| *word != "--");
+    build.args(words.filter(|word| *word != "--no-fail-fast" && *word != QUIET));
     build.arg("--no-run");
-    console.build(&mut build, "the tests")?;
-    console.run(command)
+    console::prepare(&mut build)?;
+    console::run(command)
 }
 
 /// The repository's root, wherever it lies now: as cargo says, or else around the folder that the user is in.

@@ -3,7 +3,7 @@
 //! Apt's package lists and downloads are kept in the build folder, so its own lists, caches and sources stay as they are. The
 //! environments have clients of the bus, the driver of a browser, and the fit of a real sensor.
 
-use crate::console::Console;
+use crate::console;
 use crate::{host, sim};
 use anyhow::{Context, Result, bail, ensure};
 use std::fs::{self, File};
@@ -22,12 +22,12 @@ pub fn alone() -> Result<File> {
 }
 
 /// Makes sure of Debian packages.
-pub fn packages(names: &[&str], why: &str, console: &mut Console) -> Result<()> {
+pub fn packages(names: &[&str], why: &str) -> Result<()> {
     let _alone = alone()?;
-    add(names, why, console)
+    add(names, why)
 }
 
-fn add(names: &[&str], why: &str, console: &mut Console) -> Result<()> {
+fn add(names: &[&str], why: &str) -> Result<()> {
     let missing: Vec<&str> = names.iter().copied().filter(|name| !installed(name)).collect();
     if missing.is_empty() {
         return Ok(());
@@ -39,13 +39,13 @@ fn add(names: &[&str], why: &str, console: &mut Console) -> Result<()> {
     if !is_root() {
         bail!("{why} needs the Debian packages `{list}`: run `sudo apt-get install {list}` and try again");
     }
-    console.say(&format!("Installing the Debian packages `{list}`: {why} needs them."));
-    Apt::new(None)?.install(&missing, why, console)
+    console::say(&format!("Installing the Debian packages `{list}`: {why} needs them."));
+    Apt::new(None)?.install(&missing, why)
 }
 
 /// Installs the newest version of packages that Debian has for this release, its backports included. Backports are a
 /// source of this call alone: apt does not know of them afterwards.
-pub fn newest(packages: &[&str], why: &str, console: &mut Console) -> Result<()> {
+pub fn newest(packages: &[&str], why: &str) -> Result<()> {
     let list = packages.join(" ");
     let release = fs::read_to_string("/etc/os-release").unwrap_or_default();
     let field = |name| release.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix('='));
@@ -58,11 +58,11 @@ pub fn newest(packages: &[&str], why: &str, console: &mut Console) -> Result<()>
         bail!("{why} needs a recent `{list}`: run `sudo apt-get install -t {suite} {list}` and try again");
     }
     let _alone = alone()?;
-    console.say(&format!(
+    console::say(&format!(
         "Installing the newest `{list}`, from {suite} where {codename} has an older one: {why} needs it. \
          Apt's sources stay as they are."
     ));
-    Apt::new(Some(&suite))?.install(&[&["-t", &suite], packages].concat(), why, console)
+    Apt::new(Some(&suite))?.install(&[&["-t", &suite], packages].concat(), why)
 }
 
 /// apt-get with lists, downloads and, where a suite is added, sources of its own.
@@ -86,9 +86,9 @@ impl Apt {
         Ok(Self { folder, sources: sources.transpose()? })
     }
 
-    fn install(&self, words: &[&str], why: &str, console: &mut Console) -> Result<()> {
-        console.prepare(&mut self.command("update"))?;
-        let installed = console.prepare(self.command("install").args(words));
+    fn install(&self, words: &[&str], why: &str) -> Result<()> {
+        console::prepare(&mut self.command("update"))?;
+        let installed = console::prepare(self.command("install").args(words));
         let list = words.join(" ");
         installed.with_context(|| format!("apt-get cannot install `{list}`, which {why} needs: is a mirror in reach?"))
     }
@@ -152,13 +152,13 @@ const PLAYWRIGHT: Environment = Environment {
 
 /// Finds or installs a browser, with fonts, without which a page has no letters. Returns the command that opens reports in
 /// it.
-pub fn browser_test(console: &mut Console) -> Result<Command> {
+pub fn browser_test() -> Result<Command> {
     let find = || BROWSERS.into_iter().find_map(host::find_program);
     if find().is_none() {
-        packages(&["chromium", "fonts-dejavu-core"], "the test that opens reports in a browser", console)?;
+        packages(&["chromium", "fonts-dejavu-core"], "the test that opens reports in a browser")?;
     }
     let program = find().context("Debian's package `chromium` is installed, but no `chromium` is in PATH")?;
-    let mut command = script(&PLAYWRIGHT, "browser/test_report.py", console)?;
+    let mut command = script(&PLAYWRIGHT, "browser/test_report.py")?;
     command.env("FINGERTIP_CHROMIUM", program);
     Ok(command)
 }
@@ -180,12 +180,12 @@ const BUS: Environment = Environment {
 };
 
 /// Finds or makes the environment with the bus client, and returns its interpreter.
-pub fn bus_python(console: &mut Console) -> Result<PathBuf> {
-    environment(&BUS, console)
+pub fn bus_python() -> Result<PathBuf> {
+    environment(&BUS)
 }
 
 /// Finds or makes a virtual environment, and returns its interpreter.
-pub fn environment(environment: &Environment, console: &mut Console) -> Result<PathBuf> {
+pub fn environment(environment: &Environment) -> Result<PathBuf> {
     let Environment { folder, packages, imports, does } = environment;
     let folder = host::target().join(folder);
     let python = folder.join("bin").join("python");
@@ -194,17 +194,17 @@ pub fn environment(environment: &Environment, console: &mut Console) -> Result<P
         return Ok(python);
     }
     let list = packages.join(" ");
-    console.say(&format!("Making a Python environment with `{list}`: {does}."));
+    console::say(&format!("Making a Python environment with `{list}`: {does}."));
     let make = || Command::new("python3").args(["-m", "venv", "--clear"]).arg(&folder).output();
     // Debian splits `venv` off Python, and may lack Python altogether.
     if !make().is_ok_and(|output| output.status.success()) {
-        add(&["python3", "python3-venv"], "a Python environment", console)?;
+        add(&["python3", "python3-venv"], "a Python environment")?;
         let output = make().context("cannot start python3")?;
         ensure!(output.status.success(), "python3 -m venv: {}", String::from_utf8_lossy(&output.stderr));
     }
     let mut install = Command::new(&python);
     install.args(["-m", "pip", "install", "--quiet", "--no-cache-dir", "--disable-pip-version-check"]).args(*packages);
-    let installed = console.prepare(&mut install);
+    let installed = console::prepare(&mut install);
     installed.with_context(|| format!("pip cannot install {list}: is a package index in reach?"))?;
     ensure!(has(&python, imports), "{list} is installed in {}, but does not import", host::shown(&folder));
     Ok(python)
@@ -224,20 +224,20 @@ const LEAST_SQUARES: Environment = Environment {
 };
 
 /// Returns the command that starts a script of the folder `host-tests`, in an environment with what it imports.
-fn script(needs: &Environment, path: &str, console: &mut Console) -> Result<Command> {
-    let mut command = Command::new(environment(needs, console)?);
+fn script(needs: &Environment, path: &str) -> Result<Command> {
+    let mut command = Command::new(environment(needs)?);
     // With -B Python writes no compiled files beside the sources.
     command.arg("-B").arg(host::root().join("host-tests").join(path));
     Ok(command)
 }
 
 /// Returns the command that tests the fit of a sensor.
-pub fn sensor_test(console: &mut Console) -> Result<Command> {
-    script(&LEAST_SQUARES, "sensor/test_fit.py", console)
+pub fn sensor_test() -> Result<Command> {
+    script(&LEAST_SQUARES, "sensor/test_fit.py")
 }
 
-pub fn sensor(args: &sim::Args, console: &mut Console) -> Result<()> {
-    sim::start(script(&LEAST_SQUARES, "sensor/fit.py", console)?.args(&args.arguments))
+pub fn sensor(args: &sim::Args) -> Result<()> {
+    sim::start(script(&LEAST_SQUARES, "sensor/fit.py")?.args(&args.arguments))
 }
 
 #[cfg(test)]

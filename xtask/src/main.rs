@@ -14,7 +14,6 @@ mod timing;
 mod toolchain;
 
 use clap::{Parser, Subcommand};
-use console::Console;
 use std::io::Write as _;
 use std::process::ExitCode;
 
@@ -50,10 +49,8 @@ enum Command {
     )]
     Sensor(sim::Args),
     /// Serve a simulated finger in real time for any DYNAMIXEL client, behind a pseudo-terminal or a TCP port
-    #[command(
-        disable_help_flag = true,
-        after_help = "Examples:\n  cargo xtask serve --pty /tmp/finger\n  cargo xtask serve raspberry --tcp 7000\n  cargo xtask serve --board virtual --pty /tmp/finger    (the flash image on the emulated board)\n  cargo xtask serve --help    (all that it takes)"
-    )]
+    #[command(disable_help_flag = true, after_help = examples("serve --pty /tmp/finger|serve raspberry --tcp 7000|\
+        serve --board virtual --pty /tmp/finger    (the flash image on the emulated board)"))]
     Serve(sim::Args),
     /// Run every test: core, host, panic-free proof, QEMU, virtual board, reports in a browser
     Test(test::Args),
@@ -112,29 +109,28 @@ fn main() -> ExitCode {
 }
 
 fn run(cli: &Cli) -> anyhow::Result<()> {
-    let console = &mut Console::default();
     match &cli.command {
-        Command::Demo(args) => sim::demo(args, console),
-        Command::Sim(args) => sim::on_board("sim", args, console),
-        Command::Sweep(args) => sim::native("sweep", args, console),
-        Command::Population(args) => sim::on_board("population", args, console),
-        Command::Budget(args) => sim::native("budget", args, console),
-        Command::Sensor(args) => install::sensor(args, console),
-        Command::Serve(args) => sim::serve(args, console),
+        Command::Demo(args) => sim::demo(args),
+        Command::Sim(args) => sim::on_board("sim", args),
+        Command::Sweep(args) => sim::native("sweep", args),
+        Command::Population(args) => sim::on_board("population", args),
+        Command::Budget(args) => sim::native("budget", args),
+        Command::Sensor(args) => install::sensor(args),
+        Command::Serve(args) => sim::serve(args),
         Command::Test(args) => test::run(args),
-        Command::Build => image::firmware(console).map(|image| console.print(&image.summary())),
-        Command::Flash(args) => flash::run(args, console),
-        Command::Bringup(args) => flash::bringup(args, console),
-        Command::Qemu(args) => cores::run_m4(args, console),
-        Command::Cores => cores::run_all(console),
-        Command::Timing(args) => timing::run(args, console),
-        Command::Study(args) => timing::study(args, console),
-        Command::Prove(args) => host::run_tool("prove", &args.arguments, console),
-        Command::Fit(args) => host::run_tool("fit", &args.arguments, console),
-        Command::PanicFree => image::prove_panic_free(console),
+        Command::Build => image::firmware().map(|image| console::print(&image.summary())),
+        Command::Flash(args) => flash::run(args),
+        Command::Bringup(args) => flash::bringup(args),
+        Command::Qemu(args) => cores::run_m4(args),
+        Command::Cores => cores::run_all(),
+        Command::Timing(args) => timing::run(args),
+        Command::Study(args) => timing::study(args),
+        Command::Prove(args) => host::run_tool("prove", &args.arguments),
+        Command::Fit(args) => host::run_tool("fit", &args.arguments),
+        Command::PanicFree => image::prove_panic_free(),
         Command::Lint => test::lint(),
-        Command::Docs(args) => docs::run(args, console),
-        Command::Package => docs::package(console),
-        Command::Cluster => cluster::run(console),
+        Command::Docs(args) => docs::run(args),
+        Command::Package => docs::package(),
+        Command::Cluster => cluster::run(),
     }
 }

@@ -1,6 +1,6 @@
 //! Simulated fingers: scenes, the demonstration and the bus server.
 
-use crate::console::{self, Console};
+use crate::console;
 use crate::{host, image};
 use anyhow::{Context, Result};
 use std::path::PathBuf;
@@ -15,17 +15,17 @@ pub struct Args {
 }
 
 /// Runs a program on the native board.
-pub fn native(program: &'static str, args: &Args, console: &mut Console) -> Result<()> {
-    start(host::Program::sim(program).build(console)?.args(&args.arguments))
+pub fn native(program: &'static str, args: &Args) -> Result<()> {
+    start(host::Program::sim(program).build()?.args(&args.arguments))
 }
 
 /// Runs a program on this machine, or the same command of the board that runs the flash image.
-pub fn on_board(program: &'static str, args: &Args, console: &mut Console) -> Result<()> {
+pub fn on_board(program: &'static str, args: &Args) -> Result<()> {
     if !wants_image(&args.arguments) {
-        return native(program, args, console);
+        return native(program, args);
     }
-    let image = image::firmware(console)?;
-    let mut command = host::SCENE_BOARD.build(console)?;
+    let image = image::firmware()?;
+    let mut command = host::SCENE_BOARD.build()?;
     start(command.arg(program).arg("--image").arg(std::path::absolute(&image.elf)?).args(&args.arguments))
 }
 
@@ -63,33 +63,33 @@ pub struct DemoArgs {
 }
 
 /// Shows the demonstration on the native core, which is built soon, then on the flash image.
-pub fn demo(args: &DemoArgs, console: &mut Console) -> Result<()> {
-    let mut command = host::NATIVE_DEMO.build(console)?;
-    console.say("First on the native core: the same script and plant, no microcontroller in between.");
+pub fn demo(args: &DemoArgs) -> Result<()> {
+    let mut command = host::NATIVE_DEMO.build()?;
+    console::say("First on the native core: the same script and plant, no microcontroller in between.");
     // As it is to be read: programs are started in the root.
     let out = host::shown(&host::target().join("demo").join("native"));
-    console.run(command.arg("--out").arg(out).args(args.quick.then_some("--quick")))?;
-    console.say("Now on the flash image: the emulator is compiled for some minutes, the first time.");
-    let image = image::firmware(console)?;
-    console.say(&image.summary());
-    let mut command = host::BOARD.build(console)?;
+    console::run(command.arg("--out").arg(out).args(args.quick.then_some("--quick")))?;
+    console::say("Now on the flash image: the emulator is compiled for some minutes, the first time.");
+    let image = image::firmware()?;
+    console::say(&image.summary());
+    let mut command = host::BOARD.build()?;
     command.args(["demo", "--image"]).arg(&image.elf);
     host::give_files(&mut command, [("--json", &args.json), ("--out", &args.out)])?;
     command.args(args.quick.then_some("--quick"));
-    console.run(&mut command)
+    console::run(&mut command)
 }
 
 /// Serves a scene's finger on the native core, or the flash image on the emulated board.
-pub fn serve(args: &Args, console: &mut Console) -> Result<()> {
+pub fn serve(args: &Args) -> Result<()> {
     // Neither program takes the flag that selects it.
     let board = ["--board", "native", "virtual", "--board=native", "--board=virtual"];
     let words = args.arguments.iter().filter(|word| !board.contains(&word.as_str()));
     if !wants_image(&args.arguments) {
-        return start(host::SERVE.build(console)?.args(words));
+        return start(host::SERVE.build()?.args(words));
     }
-    let image = image::firmware(console)?;
-    console.say(&image.summary());
-    let mut command = host::BOARD.build(console)?;
+    let image = image::firmware()?;
+    console::say(&image.summary());
+    let mut command = host::BOARD.build()?;
     command.args(["serve", "--image"]).arg(std::path::absolute(&image.elf)?);
     start(command.args(words))
 }

@@ -1,6 +1,6 @@
 //! Estimated cycles on a Cortex-M4F, by QEMU with the timing plugin. Their worth: `docs/timing.md`.
 
-use crate::console::{self, Console};
+use crate::console;
 use crate::cores::M4_EMULATOR;
 use crate::host::{self, Program};
 use crate::toolchain;
@@ -30,14 +30,14 @@ pub struct Args {
 }
 
 /// Measures an image, or checks the model.
-pub fn run(args: &Args, console: &mut Console) -> Result<()> {
+pub fn run(args: &Args) -> Result<()> {
     let Some(image) = &args.image else {
-        console.print(&check(console)?);
+        console::print(&check()?);
         return Ok(());
     };
     let image = fs::canonicalize(image).with_context(|| host::shown(image))?;
-    let (_, regions) = measure(&image, None, console)?;
-    console.print(&table(&regions));
+    let (_, regions) = measure(&image, None)?;
+    console::print(&table(&regions));
     args.json.iter().try_for_each(|path| host::write(path, json_lines(&regions)))
 }
 
@@ -79,9 +79,9 @@ const MEAN_MAX: f64 = 0.02;
 const WORST_MAX: f64 = 0.10;
 
 /// Compares the model with published measurements; returns each figure beside the published one, as text.
-pub fn check(console: &mut Console) -> Result<String> {
-    let image = image::build("timing-check", "timing", console)?;
-    let mut measured = |word: &str| measure(&image, Some(Path::new(word)), console);
+pub fn check() -> Result<String> {
+    let image = image::build("timing-check", "timing")?;
+    let measured = |word: &str| measure(&image, Some(Path::new(word)));
     let [(_, regions), second, third] = [measured("measure")?, measured("measure")?, measured("measure")?];
     ensure!(regions == second.1 && regions == third.1, "three runs give other figures");
     ensure!(regions.len() == PUBLISHED.len(), "{} regions of {} were measured", regions.len(), PUBLISHED.len());
@@ -122,9 +122,9 @@ pub fn check(console: &mut Console) -> Result<String> {
 
 /// Runs an image to its end under the plugin; `argument` is its command line. Returns its standard output, and the regions in
 /// order of their numbers, with the names of the output's lines `region NUMBER NAME`.
-pub fn measure(image: &Path, argument: Option<&Path>, console: &mut Console) -> Result<(String, Vec<Measured>)> {
-    cores::ensure_m4(console)?;
-    let plugin = plugin(console)?;
+pub fn measure(image: &Path, argument: Option<&Path>) -> Result<(String, Vec<Measured>)> {
+    cores::ensure_m4()?;
+    let plugin = plugin()?;
     let name = image.file_stem().unwrap_or_default().display();
     let file = host::made("timing")?.join(format!("{name}.{}.json", std::process::id()));
     let argument = argument.map_or_else(String::new, |argument| format!(",arg={}", argument.display()));
@@ -151,9 +151,9 @@ pub fn measure(image: &Path, argument: Option<&Path>, console: &mut Console) -> 
     Ok((output, regions))
 }
 
-fn plugin(console: &mut Console) -> Result<PathBuf> {
+fn plugin() -> Result<PathBuf> {
     let mut command = host::cargo("build", "m4-timing");
-    console.build(command.args(["--features", "plugin"]), "the timing plugin")?;
+    console::prepare(command.args(["--features", "plugin"]))?;
     let file = host::target().join(host::PROGRAMS).join(format!("{DLL_PREFIX}m4_timing{DLL_SUFFIX}"));
     fs::canonicalize(&file).with_context(|| host::shown(&file))
 }
@@ -194,40 +194,40 @@ pub struct StudyArgs {
 }
 
 /// Runs the study and renews or checks its page, its table in the README and its pictures.
-pub fn study(args: &StudyArgs, console: &mut Console) -> Result<()> {
+pub fn study(args: &StudyArgs) -> Result<()> {
     let folder = host::made("study")?;
     let inputs = folder.join("inputs.bin");
     let judge = Program::tool("study");
-    let mut command = judge.build(console)?;
-    console.run(command.arg("inputs").arg(&inputs))?;
-    let shipped = image::build(STUDY, STUDY, console)?;
-    let shipped = measured(&shipped, &inputs, &folder.join("shipped.txt"), console)?;
-    let quick = measured(&build_quick(console)?, &inputs, &folder.join("quick.txt"), console)?;
-    let mut fingers = Program::sim("budget").build(console)?;
+    let mut command = judge.build()?;
+    console::run(command.arg("inputs").arg(&inputs))?;
+    let shipped = image::build(STUDY, STUDY)?;
+    let shipped = measured(&shipped, &inputs, &folder.join("shipped.txt"))?;
+    let quick = measured(&build_quick()?, &inputs, &folder.join("quick.txt"))?;
+    let mut fingers = Program::sim("budget").build()?;
     let held = console::output(fingers.args(["--whole-loop", "--fingers", FINGERS]))?;
     let whole_loop = folder.join("whole-loop.txt");
     host::write(&whole_loop, held)?;
-    let mut command = judge.build(console)?;
+    let mut command = judge.build()?;
     command.arg("report").arg(&shipped).arg(&quick).arg(&whole_loop).args(args.check.then_some("--check"));
     host::give_files(&mut command, [("--json", &args.json)])?;
-    console.run(&mut command)
+    console::run(&mut command)
 }
 
 /// The image as quick as the compiler makes it, without what keeps the firmware's small.
-fn build_quick(console: &mut Console) -> Result<PathBuf> {
+fn build_quick() -> Result<PathBuf> {
     let mut command = image::emulated(STUDY, STUDY);
     command.args(["--profile", STUDY_PROFILE]);
     // Instead of the flags that `.cargo/config.toml` has for the target.
     let flags = ["-C", "opt-level=3"].map(String::from).into_iter().chain(toolchain::short_paths());
     // Flags may hold blanks: a separator that no path has.
     command.env("CARGO_ENCODED_RUSTFLAGS", flags.collect::<Vec<_>>().join("\u{1f}"));
-    console.build(&mut command, "the study, as quick as can be")?;
+    console::prepare(&mut command)?;
     Ok(toolchain::images().with_file_name(STUDY_PROFILE).join(STUDY))
 }
 
 /// Runs an image; what it said and what it cost, in a file.
-fn measured(image: &Path, inputs: &Path, file: &Path, console: &mut Console) -> Result<PathBuf> {
-    let (mut text, regions) = measure(image, Some(inputs), console)?;
+fn measured(image: &Path, inputs: &Path, file: &Path) -> Result<PathBuf> {
+    let (mut text, regions) = measure(image, Some(inputs))?;
     for measured in &regions {
         text += &format!("cost {}", measured.region);
         for figure in [&measured.instructions, &measured.low, &measured.estimate, &measured.high, &measured.flash] {

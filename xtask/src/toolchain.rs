@@ -1,6 +1,6 @@
 //! The compiler for the firmware: that of this command, with rustup's bare-metal targets.
 
-use crate::console::{self, Console};
+use crate::console;
 use crate::{host, install};
 use anyhow::{Context, Result, bail};
 use std::path::PathBuf;
@@ -55,12 +55,12 @@ pub fn sources() -> Option<PathBuf> {
 }
 
 /// Installs the firmware's target where it is missing.
-pub fn ensure(console: &mut Console) -> Result<()> {
-    ensure_for(&[TARGET], "the firmware is compiled for it", console)
+pub fn ensure() -> Result<()> {
+    ensure_for(&[TARGET], "the firmware is compiled for it")
 }
 
 /// Installs the targets that are missing.
-pub fn ensure_for(targets: &[&str], why: &str, console: &mut Console) -> Result<()> {
+pub fn ensure_for(targets: &[&str], why: &str) -> Result<()> {
     if targets.iter().all(|target| has_target(target)) {
         return Ok(());
     }
@@ -74,8 +74,8 @@ pub fn ensure_for(targets: &[&str], why: &str, console: &mut Console) -> Result<
         return Ok(());
     }
     let list = targets.join(", ");
-    console.say(&format!("Adding rustup's target {list}: {why}."));
-    let added = console.prepare(Command::new("rustup").args(["target", "add"]).args(&targets));
+    console::say(&format!("Adding rustup's target {list}: {why}."));
+    let added = console::prepare(Command::new("rustup").args(["target", "add"]).args(&targets));
     added.context("the Rust distribution server (static.rust-lang.org) gave no target")?;
     if !targets.iter().all(|target| has_target(target)) {
         bail!("rustup added {list} to another toolchain than the one that cargo takes");

@@ -5,14 +5,12 @@ use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
-/// A folder of this test with a script that reports a build of one crate, and leaves a note that it ran.
+/// A folder of this test with a script that reports a build, and leaves a note that it ran.
 fn folder(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     let _ = fs::remove_dir_all(&folder);
     fs::create_dir_all(folder.join("debug")).expect("a folder");
-    let bar = "    Building [=====>  ] 1/2: fit(bin)";
-    let artifact = r#"{"package_id":"path+file:///host-tests#0.1.0","fresh":false}"#;
-    script(&folder.join("cargo"), &format!("touch {}/built; echo '{bar}' >&2; echo '{artifact}'", folder.display()));
+    script(&folder.join("cargo"), &format!("touch {}/built; echo Building >&2; echo also built", folder.display()));
     folder
 }
 
@@ -33,7 +31,7 @@ fn progress_stays_out_of_the_results() {
     script(&folder.join("debug/fit"), "echo force_n; echo 1.5");
     let output = xtask(&folder, &["fit"]);
     let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success() && said.contains("built    fit: 2 crates"), "{said}");
+    assert!(output.status.success() && said.contains("Building\nalso built"), "{said}");
     assert_eq!(String::from_utf8_lossy(&output.stdout), "force_n\n1.5\n");
 }
 

@@ -144,7 +144,7 @@ impl Core {
         let went_on = next.address == executed.address.wrapping_add(executed.instruction.size());
         let words = |count: u8| 1 + u64::from(count);
         match executed.instruction.kind {
-            Kind::Alu | Kind::Multiply | Kind::Float => Cycles::sure(1),
+            Kind::Alu => Cycles::sure(1),
             Kind::Divide { .. } => {
                 let steps = u64::from((10 * executed.quotient_bits).div_ceil(32));
                 Cycles::new(2, 2 + steps, 12)
@@ -162,7 +162,7 @@ impl Core {
                 Cycles::new(1, if self.pipelines(&executed.instruction) { 1 } else { 2 }, 2) + split(executed)
             }
             Kind::LoadPc => Cycles::new(1, 2, 2) + refill(REFILL_MEMORY, next),
-            Kind::LoadMany(count) => {
+            Kind::Many(count) => {
                 let jumps = executed.instruction.writes & bit(PC) != 0;
                 let refill = if jumps { refill(REFILL_MEMORY, next) } else { Cycles::default() };
                 Cycles::sure(words(count)) + refill
@@ -172,11 +172,8 @@ impl Core {
             Kind::FloatAccumulate => Cycles::sure(3),
             // The result takes longer: see `float_wait`.
             Kind::FloatDivide => Cycles::new(1, 1, FLOAT_DIVIDE),
-            Kind::FloatMove(count) => Cycles::new(count.into(), 1 + u64::from(count.min(1)), words(count)),
-            Kind::StoreMany(count) | Kind::FloatLoadMany(count) | Kind::FloatStoreMany(count) => {
-                Cycles::sure(words(count))
-            }
-            Kind::FloatLoad | Kind::FloatStore | Kind::Special => Cycles::new(1, 2, 2),
+            Kind::Move(count) => Cycles::new(count.into(), 1 + u64::from(count.min(1)), words(count)),
+            Kind::FloatWord => Cycles::new(1, 2, 2),
             Kind::Barrier => Cycles::new(1, 4, 7),
             Kind::Begin | Kind::End | Kind::Untimed => Cycles::default(),
         }

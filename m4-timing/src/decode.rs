@@ -44,9 +44,9 @@ pub fn decode(bytes: &[u8]) -> Result<Instruction, Unknown> {
 /// `0` and `1` are themselves and `x` is any bit. Core registers: `d` is written and not the program counter, `e` and `g`
 /// are written, `r` is not the program counter; `a` is the base of an address (the program counter makes none), written
 /// back if `w` is set, `A` one that is always written back, `B` and `C` are the same but not the program counter, `b` is an
-/// index; `l` is a list; `n` over `m` is a division. `z` is a size and not 3. FPU registers, four bits and a bit in small letters:
-/// `S` is written, `T` and `U` are read, `V` is both, of singles; `P` is written and `Q` is read, of doubles, or their half
-/// `h`; `c` is a number of words.
+/// index; `l` is a list, `L` one that is written; `n` over `m` is a division. `z` is a size and not 3. FPU registers, four
+/// bits and a bit in small letters: `S` is written, `T` and `U` are read, `V` is both, of singles; `P` is written and `Q` is
+/// read, of doubles, or their half `h`; `c` is a number of words.
 type Row = (&'static str, Instruction);
 
 /// An instruction that touches no register.
@@ -62,8 +62,6 @@ const BRANCH_IF: Instruction = of(Kind::Branch { conditional: true }).writing(bi
 const JUMP: Instruction = of(Kind::Jump).writing(bit(PC));
 const IF_THEN: Instruction = of(Kind::IfThen { state: 0 });
 const UNTIMED: Instruction = of(Kind::Untimed);
-const MULTIPLY: Instruction = of(Kind::Multiply);
-const FLOAT: Instruction = of(Kind::Float);
 
 const NARROW: &[Row] = &[
     // Shift, add, subtract, move; compare writes nothing.
@@ -72,7 +70,6 @@ const NARROW: &[Row] = &[
     ("001x xddd xxxx xxxx", ALU),
     ("0100 0010 00xx xxxx", ALU),
     ("0100 0010 1xxx xxxx", ALU),
-    ("0100 0011 01xx xddd", MULTIPLY),
     ("0100 00xx xxxx xddd", ALU),
     // High registers, and branches to registers.
     ("0100 0101 xxxx xxxx", ALU),
@@ -95,12 +92,12 @@ const NARROW: &[Row] = &[
     ("1011 0000 xxxx xxxx", ALU.writing(bit(SP))),
     ("1011 x0x1 xxxx xxxx", BRANCH_IF),
     ("1011 0010 xxxx xddd", ALU),
-    ("1011 010l llll llll", of(Kind::StoreMany(0)).writing(bit(SP)).at(bit(SP))),
-    ("1011 0110 011x xxxx", of(Kind::Special)),
+    ("1011 010l llll llll", of(Kind::Many(0)).writing(bit(SP)).at(bit(SP))),
+    ("1011 0110 011x xxxx", of(Kind::Move(1))),
     ("1011 1010 0xxx xddd", ALU),
     ("1011 1010 11xx xddd", ALU),
-    ("1011 1100 llll llll", of(Kind::LoadMany(0)).writing(bit(SP)).at(bit(SP))),
-    ("1011 1101 llll llll", of(Kind::LoadMany(0)).writing(bit(SP) | bit(PC)).at(bit(SP))),
+    ("1011 1100 LLLL LLLL", of(Kind::Many(0)).writing(bit(SP)).at(bit(SP))),
+    ("1011 1101 LLLL LLLL", of(Kind::Many(0)).writing(bit(SP) | bit(PC)).at(bit(SP))),
     ("1011 1110 xxxx xxxx", UNTIMED),
     // If-then, and hints: NOP and YIELD do nothing on this core; WFE, WFI and SEV have no time of their own.
     ("1011 1111 xxxx xxx1", IF_THEN),
@@ -110,8 +107,8 @@ const NARROW: &[Row] = &[
     ("1011 1111 000x 0000", ALU),
     ("1011 1111 001x 0000", UNTIMED),
     ("1011 1111 0100 0000", UNTIMED),
-    ("1100 0AAA llll llll", of(Kind::StoreMany(0))),
-    ("1100 1AAA llll llll", of(Kind::LoadMany(0))),
+    ("1100 0AAA llll llll", of(Kind::Many(0))),
+    ("1100 1AAA LLLL LLLL", of(Kind::Many(0))),
     ("1101 111x xxxx xxxx", UNTIMED),
     ("1101 xxxx xxxx xxxx", BRANCH_IF),
     ("1110 0xxx xxxx xxxx", BRANCH),
@@ -119,15 +116,15 @@ const NARROW: &[Row] = &[
 
 const WIDE: &[Row] = &[
     // LDM and STM: increment after or decrement before; the others are for other profiles.
-    ("1110 1000 10w0 aaaa llll llll llll llll", of(Kind::StoreMany(0))),
-    ("1110 1000 10w1 aaaa llll llll llll llll", of(Kind::LoadMany(0))),
-    ("1110 1001 00w0 aaaa llll llll llll llll", of(Kind::StoreMany(0))),
-    ("1110 1001 00w1 aaaa llll llll llll llll", of(Kind::LoadMany(0))),
+    ("1110 1000 10w0 aaaa llll llll llll llll", of(Kind::Many(0))),
+    ("1110 1000 10w1 aaaa LLLL LLLL LLLL LLLL", of(Kind::Many(0))),
+    ("1110 1001 00w0 aaaa llll llll llll llll", of(Kind::Many(0))),
+    ("1110 1001 00w1 aaaa LLLL LLLL LLLL LLLL", of(Kind::Many(0))),
     // Two words, exclusives, and branches by a table.
-    ("1110 1001 x1w1 aaaa eeee gggg xxxx xxxx", of(Kind::LoadMany(2))),
-    ("1110 1001 x1w0 aaaa xxxx xxxx xxxx xxxx", of(Kind::StoreMany(2))),
-    ("1110 1000 x111 AAAA eeee gggg xxxx xxxx", of(Kind::LoadMany(2))),
-    ("1110 1000 x110 AAAA xxxx xxxx xxxx xxxx", of(Kind::StoreMany(2))),
+    ("1110 1001 x1w1 aaaa eeee gggg xxxx xxxx", of(Kind::Many(2))),
+    ("1110 1001 x1w0 aaaa xxxx xxxx xxxx xxxx", of(Kind::Many(2))),
+    ("1110 1000 x111 AAAA eeee gggg xxxx xxxx", of(Kind::Many(2))),
+    ("1110 1000 x110 AAAA xxxx xxxx xxxx xxxx", of(Kind::Many(2))),
     ("1110 1000 0100 aaaa xxxx eeee xxxx xxxx", of(Kind::StoreIndexed)),
     ("1110 1000 1100 aaaa xxxx xxxx 010x eeee", of(Kind::StoreIndexed)),
     ("1110 1000 0101 aaaa eeee xxxx xxxx xxxx", LOAD),
@@ -168,8 +165,8 @@ const WIDE: &[Row] = &[
     ("1111 0x10 xxxx xxxx 10x0 xxxx xxxx xxxx", BRANCH_IF),
     ("1111 0x11 0xxx xxxx 10x0 xxxx xxxx xxxx", BRANCH_IF),
     ("1111 0111 1111 xxxx 1x10 xxxx xxxx xxxx", UNTIMED),
-    ("1111 0011 1000 xxxx 10x0 xxxx xxxx xxxx", of(Kind::Special)),
-    ("1111 0011 1110 xxxx 10x0 dddd xxxx xxxx", of(Kind::Special)),
+    ("1111 0011 1000 xxxx 10x0 xxxx xxxx xxxx", of(Kind::Move(1))),
+    ("1111 0011 1110 xxxx 10x0 dddd xxxx xxxx", of(Kind::Move(1))),
     ("1111 0011 1010 xxxx 10x0 x000 0100 0000", of(Kind::Begin)),
     ("1111 0011 1010 xxxx 10x0 x000 0100 0001", of(Kind::End)),
     ("1111 0011 1010 xxxx 10x0 x000 0000 000x", ALU),
@@ -208,75 +205,67 @@ const WIDE: &[Row] = &[
     ("1111 1010 0xxx xxxx 1111 dddd 0000 xxxx", ALU),
     ("1111 1010 00xx xxxx 1111 dddd 10xx xxxx", ALU),
     ("1111 1010 010x xxxx 1111 dddd 10xx xxxx", ALU),
-    ("1111 1010 100x xxxx 1111 dddd 0x0x xxxx", ALU),
-    ("1111 1010 100x xxxx 1111 dddd 0x10 xxxx", ALU),
-    ("1111 1010 1010 xxxx 1111 dddd 0x0x xxxx", ALU),
-    ("1111 1010 1010 xxxx 1111 dddd 0x10 xxxx", ALU),
-    ("1111 1010 11x0 xxxx 1111 dddd 0x0x xxxx", ALU),
-    ("1111 1010 11x0 xxxx 1111 dddd 0x10 xxxx", ALU),
-    ("1111 1010 1101 xxxx 1111 dddd 0x0x xxxx", ALU),
-    ("1111 1010 1101 xxxx 1111 dddd 0x10 xxxx", ALU),
+    ("1111 1010 1x0x xxxx 1111 dddd 0x0x xxxx", ALU),
+    ("1111 1010 1x0x xxxx 1111 dddd 0x10 xxxx", ALU),
+    ("1111 1010 1x10 xxxx 1111 dddd 0x0x xxxx", ALU),
+    ("1111 1010 1x10 xxxx 1111 dddd 0x10 xxxx", ALU),
     ("1111 1010 100x xxxx 1111 dddd 10xx xxxx", ALU),
     ("1111 1010 101x xxxx 1111 dddd 1000 xxxx", ALU),
     // Products of 32 bits, of 64 bits, and divisions.
-    ("1111 1011 0000 xxxx xxxx dddd 000x xxxx", MULTIPLY),
-    ("1111 1011 0001 xxxx xxxx dddd 00xx xxxx", MULTIPLY),
-    ("1111 1011 001x xxxx xxxx dddd 000x xxxx", MULTIPLY),
-    ("1111 1011 010x xxxx xxxx dddd 000x xxxx", MULTIPLY),
-    ("1111 1011 0110 xxxx xxxx dddd 000x xxxx", MULTIPLY),
-    ("1111 1011 0111 xxxx xxxx dddd 0000 xxxx", MULTIPLY),
+    ("1111 1011 0001 xxxx xxxx dddd 00xx xxxx", ALU),
+    ("1111 1011 00xx xxxx xxxx dddd 000x xxxx", ALU),
+    ("1111 1011 010x xxxx xxxx dddd 000x xxxx", ALU),
+    ("1111 1011 0110 xxxx xxxx dddd 000x xxxx", ALU),
+    ("1111 1011 0111 xxxx xxxx dddd 0000 xxxx", ALU),
     ("1111 1011 1001 nnnn 1111 dddd 1111 mmmm", of(Kind::Divide { signed: true, numerator: 0, denominator: 0 })),
     ("1111 1011 1011 nnnn 1111 dddd 1111 mmmm", of(Kind::Divide { signed: false, numerator: 0, denominator: 0 })),
-    ("1111 1011 10x0 xxxx eeee gggg 0000 xxxx", MULTIPLY),
-    ("1111 1011 1100 xxxx eeee gggg 0000 xxxx", MULTIPLY),
-    ("1111 1011 1100 xxxx eeee gggg 10xx xxxx", MULTIPLY),
-    ("1111 1011 110x xxxx eeee gggg 110x xxxx", MULTIPLY),
-    ("1111 1011 1110 xxxx eeee gggg 0000 xxxx", MULTIPLY),
-    ("1111 1011 1110 xxxx eeee gggg 0110 xxxx", MULTIPLY),
+    ("1111 1011 1xx0 xxxx eeee gggg 0000 xxxx", ALU),
+    ("1111 1011 1100 xxxx eeee gggg 10xx xxxx", ALU),
+    ("1111 1011 110x xxxx eeee gggg 110x xxxx", ALU),
+    ("1111 1011 1110 xxxx eeee gggg 0110 xxxx", ALU),
     // The FPU: VMOV between two core registers and two singles or a double.
-    ("1110 1100 0101 eeee gggg 1010 00t1 TTTT", of(Kind::FloatMove(2))),
-    ("1110 1100 0100 xxxx xxxx 1010 00s1 SSSS", of(Kind::FloatMove(2))),
-    ("1110 1100 0101 eeee gggg 1011 00q1 QQQQ", of(Kind::FloatMove(2))),
-    ("1110 1100 0100 xxxx xxxx 1011 00p1 PPPP", of(Kind::FloatMove(2))),
+    ("1110 1100 0101 eeee gggg 1010 00t1 TTTT", of(Kind::Move(2))),
+    ("1110 1100 0100 xxxx xxxx 1010 00s1 SSSS", of(Kind::Move(2))),
+    ("1110 1100 0101 eeee gggg 1011 00q1 QQQQ", of(Kind::Move(2))),
+    ("1110 1100 0100 xxxx xxxx 1011 00p1 PPPP", of(Kind::Move(2))),
     // VLDR, VSTR; VLDM, VSTM, VPUSH, VPOP.
-    ("1110 1101 xs01 aaaa SSSS 1010 xxxx xxxx", of(Kind::FloatLoad)),
-    ("1110 1101 xp01 aaaa PPPP 1011 xxxx xxxx", of(Kind::FloatLoadMany(2))),
-    ("1110 1101 xt00 aaaa TTTT 1010 xxxx xxxx", of(Kind::FloatStore)),
-    ("1110 1101 xq00 aaaa QQQQ 1011 xxxx xxxx", of(Kind::FloatStoreMany(2))),
-    ("1110 1100 1sw1 aaaa SSSS 1010 cccc cccc", of(Kind::FloatLoadMany(0))),
-    ("1110 1100 1pw1 aaaa PPPP 1011 cccc cccc", of(Kind::FloatLoadMany(0))),
-    ("1110 1100 1tw0 aaaa TTTT 1010 cccc cccc", of(Kind::FloatStoreMany(0))),
-    ("1110 1100 1qw0 aaaa QQQQ 1011 cccc cccc", of(Kind::FloatStoreMany(0))),
-    ("1110 1101 0s11 AAAA SSSS 1010 cccc cccc", of(Kind::FloatLoadMany(0))),
-    ("1110 1101 0p11 AAAA PPPP 1011 cccc cccc", of(Kind::FloatLoadMany(0))),
-    ("1110 1101 0t10 AAAA TTTT 1010 cccc cccc", of(Kind::FloatStoreMany(0))),
-    ("1110 1101 0q10 AAAA QQQQ 1011 cccc cccc", of(Kind::FloatStoreMany(0))),
+    ("1110 1101 xs01 aaaa SSSS 1010 xxxx xxxx", of(Kind::FloatWord)),
+    ("1110 1101 xp01 aaaa PPPP 1011 xxxx xxxx", of(Kind::Many(2))),
+    ("1110 1101 xt00 aaaa TTTT 1010 xxxx xxxx", of(Kind::FloatWord)),
+    ("1110 1101 xq00 aaaa QQQQ 1011 xxxx xxxx", of(Kind::Many(2))),
+    ("1110 1100 1sw1 aaaa SSSS 1010 cccc cccc", of(Kind::Many(0))),
+    ("1110 1100 1pw1 aaaa PPPP 1011 cccc cccc", of(Kind::Many(0))),
+    ("1110 1100 1tw0 aaaa TTTT 1010 cccc cccc", of(Kind::Many(0))),
+    ("1110 1100 1qw0 aaaa QQQQ 1011 cccc cccc", of(Kind::Many(0))),
+    ("1110 1101 0s11 AAAA SSSS 1010 cccc cccc", of(Kind::Many(0))),
+    ("1110 1101 0p11 AAAA PPPP 1011 cccc cccc", of(Kind::Many(0))),
+    ("1110 1101 0t10 AAAA TTTT 1010 cccc cccc", of(Kind::Many(0))),
+    ("1110 1101 0q10 AAAA QQQQ 1011 cccc cccc", of(Kind::Many(0))),
     // VMOV of one word, VMRS, VMSR.
-    ("1110 1110 0001 TTTT eeee 1010 txx1 xxxx", of(Kind::FloatMove(1))),
-    ("1110 1110 0000 SSSS xxxx 1010 sxx1 xxxx", of(Kind::FloatMove(1))),
-    ("1110 1110 00h1 QQQQ eeee 1011 q001 xxxx", of(Kind::FloatMove(1))),
-    ("1110 1110 00h0 PPPP xxxx 1011 p001 xxxx", of(Kind::FloatMove(1))),
-    ("1110 1110 1111 xxxx dddd 1010 xxx1 xxxx", FLOAT.float(FPSCR, 0)),
-    ("1110 1110 1111 xxxx 1111 1010 xxx1 xxxx", FLOAT.float(FPSCR, 0)),
-    ("1110 1110 1110 xxxx xxxx 1010 xxx1 xxxx", FLOAT.float(0, FPSCR)),
+    ("1110 1110 0001 TTTT eeee 1010 txx1 xxxx", of(Kind::Move(1))),
+    ("1110 1110 0000 SSSS xxxx 1010 sxx1 xxxx", of(Kind::Move(1))),
+    ("1110 1110 00h1 QQQQ eeee 1011 q001 xxxx", of(Kind::Move(1))),
+    ("1110 1110 00h0 PPPP xxxx 1011 p001 xxxx", of(Kind::Move(1))),
+    ("1110 1110 1111 xxxx dddd 1010 xxx1 xxxx", ALU.float(FPSCR, 0)),
+    ("1110 1110 1111 xxxx 1111 1010 xxx1 xxxx", ALU.float(FPSCR, 0)),
+    ("1110 1110 1110 xxxx xxxx 1010 xxx1 xxxx", ALU.float(0, FPSCR)),
     // Data processing. With an accumulator, without one, division.
     ("1110 1110 0v0x TTTT VVVV 1010 txu0 UUUU", of(Kind::FloatAccumulate)),
     ("1110 1110 1v01 TTTT VVVV 1010 txu0 UUUU", of(Kind::FloatAccumulate)),
     ("1110 1110 1v10 TTTT VVVV 1010 txu0 UUUU", of(Kind::FloatAccumulate)),
-    ("1110 1110 0s1x TTTT SSSS 1010 txu0 UUUU", FLOAT),
+    ("1110 1110 0s1x TTTT SSSS 1010 txu0 UUUU", ALU),
     ("1110 1110 1s00 TTTT SSSS 1010 t0u0 UUUU", of(Kind::FloatDivide)),
-    // An immediate; move and absolute value, negation; square root; half precision.
-    ("1110 1110 1s11 xxxx SSSS 1010 0000 xxxx", FLOAT),
-    ("1110 1110 1s11 0000 SSSS 1010 x1u0 UUUU", FLOAT),
-    ("1110 1110 1s11 0001 SSSS 1010 01u0 UUUU", FLOAT),
+    // An immediate; move, absolute value and conversion from an integer; negation; square root; half precision.
+    ("1110 1110 1s11 xxxx SSSS 1010 0000 xxxx", ALU),
+    ("1110 1110 1s11 x000 SSSS 1010 x1u0 UUUU", ALU),
+    ("1110 1110 1s11 0001 SSSS 1010 01u0 UUUU", ALU),
     ("1110 1110 1s11 0001 SSSS 1010 11u0 UUUU", of(Kind::FloatDivide)),
-    ("1110 1110 1v11 001x VVVV 1010 x1u0 UUUU", FLOAT),
-    // Comparison with a register and with zero; conversions from and to integers, and fixed point in place.
-    ("1110 1110 1t11 0100 TTTT 1010 x1u0 UUUU", FLOAT.float(0, FPSCR)),
-    ("1110 1110 1t11 0101 TTTT 1010 x1x0 xxxx", FLOAT.float(0, FPSCR)),
-    ("1110 1110 1s11 1000 SSSS 1010 x1u0 UUUU", FLOAT),
-    ("1110 1110 1s11 110x SSSS 1010 x1u0 UUUU", FLOAT),
-    ("1110 1110 1v11 1x1x VVVV 1010 x1x0 xxxx", FLOAT),
+    ("1110 1110 1v11 001x VVVV 1010 x1u0 UUUU", ALU),
+    // Comparison with a register and with zero; conversions to integers, and fixed point in place.
+    ("1110 1110 1t11 0100 TTTT 1010 x1u0 UUUU", ALU.float(0, FPSCR)),
+    ("1110 1110 1t11 0101 TTTT 1010 x1x0 xxxx", ALU.float(0, FPSCR)),
+    ("1110 1110 1s11 110x SSSS 1010 x1u0 UUUU", ALU),
+    ("1110 1110 1v11 1x1x VVVV 1010 x1x0 xxxx", ALU),
 ];
 
 /// The instruction of a row with the letters' values; `None` if the word does not fit.
@@ -297,25 +286,19 @@ fn filled((pattern, row): &Row, word: u32) -> Option<Instruction> {
     }
     let base = (core(b'a') | core(b'A') | core(b'B') | core(b'C')) & !bit(PC);
     let back = if value(b'A').or(value(b'C')).is_some() || value(b'w') == Some(1) { base } else { 0 };
-    let list = value(b'l').unwrap_or(0);
-    let count = (list.count_ones() + u32::from(row.writes & bit(PC) != 0)) as u8;
-    let words = value(b'c').unwrap_or(0);
-    let (kind, loaded) = match row.kind {
-        Kind::LoadMany(0) if count > 0 => (Kind::LoadMany(count), list as CoreSet),
-        Kind::StoreMany(0) if count > 0 => (Kind::StoreMany(count), 0),
-        Kind::LoadMany(0) | Kind::StoreMany(0) => return None,
-        Kind::FloatLoadMany(0) if (1..=32).contains(&words) => (Kind::FloatLoadMany(words as u8), 0),
-        Kind::FloatStoreMany(0) if (1..=32).contains(&words) => (Kind::FloatStoreMany(words as u8), 0),
-        Kind::FloatLoadMany(0) | Kind::FloatStoreMany(0) => return None,
-        Kind::IfThen { .. } => (Kind::IfThen { state: word as u8 }, 0),
+    let loaded = value(b'L').unwrap_or(0);
+    let listed = (value(b'l').unwrap_or(0) | loaded).count_ones() + u32::from(row.writes & bit(PC) != 0);
+    let kind = match row.kind {
+        Kind::Many(0) => Kind::Many(value(b'c').or(Some(listed)).filter(|words| (1..=32).contains(words))? as u8),
+        Kind::IfThen { .. } => Kind::IfThen { state: word as u8 },
         Kind::Divide { signed, .. } => {
             let register = |letter| value(letter).unwrap_or(0) as u8;
-            (Kind::Divide { signed, numerator: register(b'n'), denominator: register(b'm') }, 0)
+            Kind::Divide { signed, numerator: register(b'n'), denominator: register(b'm') }
         }
-        kind => (kind, 0),
+        kind => kind,
     };
     let words = match kind {
-        Kind::FloatLoadMany(words) | Kind::FloatStoreMany(words) | Kind::FloatMove(words) => words.into(),
+        Kind::Many(words) | Kind::Move(words) => words.into(),
         _ => 1,
     };
     // The registers of the file from one on; `None` beyond its end.
@@ -332,7 +315,7 @@ fn filled((pattern, row): &Row, word: u32) -> Option<Instruction> {
     Some(Instruction {
         kind,
         wide: width == 32,
-        writes: row.writes | core(b'd') | core(b'e') | core(b'g') | loaded | back,
+        writes: row.writes | core(b'd') | core(b'e') | core(b'g') | loaded as CoreSet | back,
         address: row.address | base | core(b'b'),
         float_reads: row.float_reads | singles(b'T')? | singles(b'U')? | doubles(b'Q')? | both,
         float_writes: row.float_writes | singles(b'S')? | doubles(b'P')? | both,

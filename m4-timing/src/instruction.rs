@@ -30,10 +30,8 @@ pub struct Instruction {
 /// The classes of instructions that take different times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Data processing, shifts, extensions, saturation, packed arithmetic, hints that do nothing.
+    /// One cycle: data processing, multiplication, most FPU operations, hints that do nothing.
     Alu,
-    /// Any multiplication, with or without accumulation.
-    Multiply,
     /// Division; the registers hold the operands.
     Divide {
         /// Two's complement.
@@ -61,32 +59,20 @@ pub enum Kind {
     Load,
     /// One load into the program counter.
     LoadPc,
-    /// A load of that many words; into the program counter too where it is written.
-    LoadMany(u8),
+    /// Loads or stores of that many words; into the program counter too where it is written.
+    Many(u8),
     /// One store at a register and an offset in the instruction.
     Store,
     /// One store at the sum of two registers.
     StoreIndexed,
-    /// A store of that many words.
-    StoreMany(u8),
-    /// An FPU operation of one cycle.
-    Float,
     /// An FPU multiplication with accumulation.
     FloatAccumulate,
     /// An FPU division or square root.
     FloatDivide,
-    /// Between core and FPU registers, that many words.
-    FloatMove(u8),
-    /// One FPU load of a single.
-    FloatLoad,
-    /// One FPU store of a single.
-    FloatStore,
-    /// FPU loads of that many words.
-    FloatLoadMany(u8),
-    /// FPU stores of that many words.
-    FloatStoreMany(u8),
-    /// Access to a special register, or a change of the interrupt mask.
-    Special,
+    /// That many words between core and FPU registers; one from or to a special register.
+    Move(u8),
+    /// One FPU load or store of a single.
+    FloatWord,
     /// A memory or instruction barrier.
     Barrier,
     /// Begin of a region.
@@ -126,15 +112,11 @@ impl Instruction {
             self.kind,
             Kind::Load
                 | Kind::LoadPc
-                | Kind::LoadMany(_)
+                | Kind::Many(_)
                 | Kind::Store
                 | Kind::StoreIndexed
-                | Kind::StoreMany(_)
                 | Kind::Table
-                | Kind::FloatLoad
-                | Kind::FloatStore
-                | Kind::FloatLoadMany(_)
-                | Kind::FloatStoreMany(_)
+                | Kind::FloatWord
         )
     }
 

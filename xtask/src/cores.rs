@@ -108,19 +108,11 @@ pub const M4_EMULATOR: &str = "qemu-system-arm";
 /// The first version with the plugin interface of `m4-timing`.
 const VERSION_MIN: u32 = 9;
 
-#[derive(clap::Args)]
-#[command(after_help = "Examples:\n  cargo xtask qemu\n  cargo xtask qemu --inject hang    (fails, as it must)")]
-pub struct QemuArgs {
-    /// Make the image fail, to see it reported
-    #[arg(long, value_name = "FAILURE", value_parser = ["panic", "hardfault", "hang"])]
-    inject: Option<String>,
-}
-
 /// Runs recorded stimulus, and random inputs of functions with own instructions, there and here, and compares.
-pub fn run_m4(args: &QemuArgs) -> Result<()> {
+pub fn run_m4() -> Result<()> {
     let image = prepare()?;
     let mut replay = Program::tool("qemu-host").build()?;
-    console::run(replay.arg(&image).arg(host::target().join("stimulus")).args(&args.inject))
+    console::run(replay.arg(&image).arg(host::target().join("stimulus")))
 }
 
 pub fn test_m4() -> Result<()> {

@@ -62,7 +62,8 @@ enum Command {
     /// Check a bare NUCLEO-F446RE, or the emulated board: clocks, watchdogs, flash, converters, scan, the loop, cycles
     Bringup(flash::BringupArgs),
     /// Run the core on an emulated Cortex-M4F and compare it bit for bit with the host
-    Qemu(cores::QemuArgs),
+    #[command(after_help = "Examples:\n  cargo xtask qemu")]
+    Qemu,
     /// Run the loop on every core that QEMU emulates, compare with the host, and renew the table of docs/porting.md
     #[command(after_help = "Examples:\n  cargo xtask cores")]
     Cores,
@@ -121,7 +122,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Build => image::firmware().map(|image| console::print(&image.summary())),
         Command::Flash(args) => flash::run(args),
         Command::Bringup(args) => flash::bringup(args),
-        Command::Qemu(args) => cores::run_m4(args),
+        Command::Qemu => cores::run_m4(),
         Command::Cores => cores::run_all(),
         Command::Timing(args) => timing::run(args),
         Command::Study(args) => timing::study(args),

@@ -1,6 +1,4 @@
-//! Contact of tip and object.
-//!
-//! Objects that can move, one finger and two.
+//! Contact of tip and object, also of objects that can move.
 
 use crate::*;
 use sim::effects::contact::Named;
@@ -211,37 +209,4 @@ fn without_fingers_it_falls_once_the_floor_is_gone() {
         world.advance(f64::from(step) * 1e-4, 1e-4, &[Bridge::Coast]);
     }
     close(world.body.speed_mm_per_s[1], -9806.65 * (0.2 + 2.0 * 0.05), 1e-9);
-}
-
-/// A grasp by two fingers.
-const GRASP: &str = "[hand]\nfingers = 2\nlift_mm = 20.0\nlift_at_s = 0.6\nlift_s = 0.4\n[object]\ndistance_mm = 3.0\nshake_g = 2.0\n\
-    shake_at_s = 1.2\nshake_ms = 20.0\n[[script]]\nat_s = 0.0\ngoal_n = 2.0\n[effects.object_mass]\nmass_g = 50.0\n\
-    [effects.tangential]\n[effects.relaxation]\n[effects.dry_friction]\n[effects.gear_efficiency]\n";
-
-#[derive(Default)]
-struct Grasp {
-    last: [Last; 2],
-    steps: Vec<usize>,
-}
-
-impl Watch for Grasp {
-    fn step(&mut self, step: &Step) {
-        self.steps.push(step.finger);
-        self.last[step.finger].step(step);
-    }
-}
-
-#[test]
-fn two_fingers_lift_an_object_and_hold_it_when_it_is_shaken() {
-    let mut grasp = Grasp::default();
-    sim::simulate(&scene(&format!("duration_s = 1.5\n{GRASP}")), &mut grasp).unwrap();
-    for last in &grasp.last {
-        assert_eq!(last.mode, Some(Mode::Force), "{:?}", last.truth);
-        close(last.truth.force_n, 2.0, 0.05);
-        // Each carries half of the weight.
-        close(last.truth.tangential_n, 0.5 * 0.05 * 9.80665, 0.05);
-        assert!(last.truth.slip_mm < 0.01, "{} mm", last.truth.slip_mm);
-        close(last.truth.object_mm[1], 20.0 - 0.5 * 0.05 * 9.80665, 0.01);
-    }
-    assert!(grasp.steps.chunks(2).all(|pair| pair == [0, 1]));
 }

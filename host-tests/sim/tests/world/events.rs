@@ -4,7 +4,7 @@ use crate::*;
 use fingertip::command::Command;
 use fingertip::frame::Sense;
 use fingertip::pipeline::Status;
-use fingertip::state::Fault;
+use fingertip::state::{Fault, Mode};
 use sim::metrics::Measured;
 use sim::run::{Outcome, run};
 use sim::watch::{Agreement, Path};

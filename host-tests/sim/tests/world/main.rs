@@ -11,7 +11,6 @@ mod plant;
 mod sensor;
 
 use fingertip::shipped::{COLUMNS, ROWS, SLOTS};
-use fingertip::state::Mode;
 use sim::cores;
 use sim::effects::{self, Parts};
 use sim::mechanics::Bridge;
@@ -178,13 +177,11 @@ fn parts(tables: &str, seed: u64) -> Parts {
 struct Last {
     steps: u64,
     truth: Truth,
-    mode: Option<Mode>,
 }
 
 impl Watch for Last {
     fn step(&mut self, step: &Step) {
         self.steps += 1;
         self.truth = *step.truth;
-        self.mode = Some(step.status.mode);
     }
 }

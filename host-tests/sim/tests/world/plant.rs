@@ -3,6 +3,7 @@
 use crate::*;
 use fingertip::config::newtons;
 use fingertip::shipped::{self, Frame};
+use fingertip::state::Mode;
 use sim::mechanics::decay;
 use sim::mechanics::pressures::Cell;
 use sim::mechanics::rotor::{Unreachable, profile};

@@ -101,6 +101,7 @@ mod tests {
         for (name, unit) in [
             ("torque_constant_unm_per_a", "uN m/A"),
             ("curvature_per_mm", "1/mm"),
+            ("speed_rad_per_s", "rad/s"),
             ("voltage_slew_mv_per_ms", "mV/ms"),
             ("modulus_pa", "Pa"),
             ("damping_n_s_per_mm", "N s/mm"),

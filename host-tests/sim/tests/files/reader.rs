@@ -117,27 +117,6 @@ fn every_quantity_ends_with_its_unit() {
     assert!(without.is_empty(), "these have no unit: {without:?}");
 }
 
-/// The unit that is shown is the whole one: the word in front of it is no unit that is not known.
-#[test]
-fn no_unit_is_cut_short() {
-    const SHORT: [&str; 36] = [
-        "at", "axis", "by", "dead", "drop", "fast", "for", "from", "gain", "gear", "goal", "grip", "hold", "inl",
-        "lift", "lost", "mass", "max", "min", "most", "off", "on", "play", "rate", "read", "rms", "rows", "sag",
-        "slew", "step", "tau", "time", "to", "x", "y", "zero",
-    ];
-    const RATES: [&str; 4] = ["curvature", "magnet", "max", "rate"];
-    for (table, key) in described() {
-        let (unit, label) = (output::units::of(key.name), output::units::label(key.name));
-        let word = label.split(',').next().and_then(|words| words.rsplit(' ').next()).unwrap_or_default();
-        let known = match &unit {
-            None => !key.name.contains("_per_"),
-            Some(unit) if unit.starts_with("1/") => RATES.contains(&word),
-            Some(_) => word.is_empty() || word.len() > 4 || SHORT.contains(&word),
-        };
-        assert!(known, "{table}: {} in {unit:?}", key.name);
-    }
-}
-
 #[test]
 fn every_default_lies_within_its_range_and_every_key_says_what_it_is() {
     for (table, key) in described() {

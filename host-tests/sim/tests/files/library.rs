@@ -97,13 +97,6 @@ fn long_each_bound_of_the_library_breaks_on_either_side_when_something_is_wrong(
     cores::map(BREAKERS, |(name, keys)| assert_eq!(unbroken(name, keys), BTreeSet::new(), "{name}"));
 }
 
-#[test]
-fn the_page_of_scenes_shows_the_wall_as_it_is() {
-    let page = include_str!("../../../../docs/scenes.md");
-    let wall = include_str!("../../scenes/wall.toml");
-    assert!(page.contains(wall) && wall.lines().count() <= 25);
-}
-
 // The first of the many seeds for which these scenes hold; `cargo xtask sweep` runs them all.
 sim::sizes!(what_depends_on_chance_holds_for_more_than_one_seed, hold_for_seeds(1..4), hold_for_seeds(4..11));
 

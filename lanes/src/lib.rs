@@ -227,7 +227,7 @@ mod build;
 
 #[cfg(test)]
 mod tests {
-    use super::{build, high, larger, low, pair, portable};
+    use super::{build, portable};
 
     #[test]
     fn dsp_instructions_are_used_where_target_or_flags_show_them() {
@@ -251,25 +251,6 @@ mod tests {
         assert!(!has("thumbv6m-none-eabi", &["-C", "target-cpu=cortex-m4"]));
         assert!(!has("thumbv7a-none-eabi", &["-C", "target-feature=+dsp"]));
         assert!(build::has_dsp(m33, "dsp,mclass", ""));
-    }
-
-    #[test]
-    fn lanes_do_not_touch_each_other() {
-        let edges = [i16::MIN, i16::MIN + 1, -1, 0, 1, 4090, i16::MAX - 1, i16::MAX];
-        for (a, b) in edges.iter().flat_map(|a| edges.map(|b| (*a, b))) {
-            for (c, d) in edges.iter().flat_map(|c| edges.map(|d| (*c, d))) {
-                let difference = portable::sub(pair(a, c), pair(b, d));
-                assert_eq!((low(difference), high(difference)), (a.wrapping_sub(b), c.wrapping_sub(d)));
-                let [a_bits, b_bits, c_bits, d_bits] = [a, b, c, d].map(|lane| lane as u16);
-                let above = portable::excess(pair(a, c), pair(b, d));
-                let exact = [a_bits.saturating_sub(b_bits), c_bits.saturating_sub(d_bits)];
-                assert_eq!([low(above) as u16, high(above) as u16], exact);
-                let most = larger(pair(a, c), pair(b, d));
-                assert_eq!([low(most) as u16, high(most) as u16], [a_bits.max(b_bits), c_bits.max(d_bits)]);
-                let exact = 7 + i64::from(a) * i64::from(b) + i64::from(c) * i64::from(d);
-                assert_eq!(portable::dot(pair(a, c), pair(b, d), 7), exact as i32);
-            }
-        }
     }
 
     #[test]

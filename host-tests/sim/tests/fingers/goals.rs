@@ -92,11 +92,7 @@ fn goal_zero_releases_a_soft_object_after_a_press_that_measures() {
 
 #[test]
 fn goal_zero_releases_an_object_that_moved_while_it_was_held() {
-    let mut tasks = Vec::new();
-    for yield_mm_per_n in [0.0, 0.3, 0.7, 1.0, 2.0] {
-        tasks.extend([-2.0, -1.0, 1.0, 2.0].map(|by_mm| (yield_mm_per_n, by_mm)));
-    }
-    let cases = cores::map(tasks, |(yield_mm_per_n, by_mm)| {
+    let cases = each(&[0.0, 0.3, 0.7, 1.0, 2.0], &[-2.0, -1.0, 1.0, 2.0], |yield_mm_per_n, by_mm| {
         let mut finger = finger(&(object(5.0, yield_mm_per_n) + LOSSES));
         press(&mut finger, 3.0, 1.0);
         finger.carry_object(5.0, 5.0 + by_mm, 40.0, |_| {});
@@ -109,13 +105,8 @@ fn goal_zero_releases_an_object_that_moved_while_it_was_held() {
 
 #[test]
 fn torque_off_just_after_the_touch_does_not_let_the_tip_run_into_the_object() {
-    let mut tasks = Vec::new();
-    for losses in ["", LOSSES] {
-        for goal_n in [0.5, 1.0, 3.0, 7.0] {
-            tasks.extend([1, 2, 4, 6, 8, 10, 12, 14, 17, 20].map(|after_ms| (losses, goal_n, after_ms)));
-        }
-    }
-    let cases = cores::map(tasks, |(losses, goal_n, after_ms)| {
+    let goals = ["", LOSSES].map(|losses| [0.5, 1.0, 3.0, 7.0].map(|goal_n| (losses, goal_n)));
+    let cases = each(goals.as_flattened(), &[1, 2, 4, 6, 8, 10, 12, 14, 17, 20], |(losses, goal_n), after_ms| {
         let mut finger = finger(&(object(2.0, 0.0) + losses));
         set_goal(&mut finger, goal_n);
         touch(&mut finger);
@@ -130,19 +121,16 @@ fn torque_off_just_after_the_touch_does_not_let_the_tip_run_into_the_object() {
 #[test]
 fn torque_off_during_a_release_does_not_let_the_tip_fly_back() {
     let clearance_mm = f64::from(Params::DEFAULT.clearance_um) * 1e-3;
-    let mut cases = Vec::new();
-    for goal_n in [1.0, 3.0, 7.0] {
-        for after_s in [0.004, 0.012, 0.03, 0.1] {
-            let mut finger = finger(&(object(5.0, 0.0) + LOSSES));
-            press(&mut finger, goal_n, 1.0);
-            let indentation_mm = finger.truth().indentation_mm;
-            press(&mut finger, 0.0, after_s);
-            interrupt_torque(&mut finger, 3.0);
-            let behind_mm = 5.0 - finger.truth().travel_mm;
-            let what = format!("goal {goal_n} N, off {after_s} s after the release began");
-            cases.push(Case::new(what, behind_mm, clearance_mm + indentation_mm + 3.0));
-        }
-    }
+    let cases = each(&[1.0, 3.0, 7.0], &[0.004, 0.012, 0.03, 0.1], |goal_n, after_s| {
+        let mut finger = finger(&(object(5.0, 0.0) + LOSSES));
+        press(&mut finger, goal_n, 1.0);
+        let indentation_mm = finger.truth().indentation_mm;
+        press(&mut finger, 0.0, after_s);
+        interrupt_torque(&mut finger, 3.0);
+        let behind_mm = 5.0 - finger.truth().travel_mm;
+        let what = format!("goal {goal_n} N, off {after_s} s after the release began");
+        Case::new(what, behind_mm, clearance_mm + indentation_mm + 3.0)
+    });
     judge("torque off during a release, behind the surface", "mm", &cases);
 }
 
@@ -193,24 +181,21 @@ fn torque_on_while_the_motor_coasts_is_no_fault() {
 /// An object that is pushed into a released tip and taken away leaves the next goal as it is.
 #[test]
 fn a_push_against_a_released_tip_does_not_change_the_next_goal() {
-    let mut cases = Vec::new();
-    for wait_s in [0.02, 0.04, 0.06, 0.1, 0.16, 0.2, 0.3] {
-        for depth_mm in [1.0, 1.45] {
-            let mut finger = finger(&(object(5.0, 0.0) + LOSSES));
-            press(&mut finger, 7.0, 1.0);
-            press(&mut finger, 0.0, wait_s);
-            let travel_mm = finger.truth().travel_mm;
-            finger.carry_object(5.0, (travel_mm - depth_mm).min(5.0), 100.0, |_| {});
-            finger.run(1.0);
-            let pushed_n = finger.truth().force_n;
-            finger.place_object(8.0);
-            finger.run(0.05);
-            press(&mut finger, 1.0, 1.5);
-            let off_n = (finger.truth().force_n - 1.0).abs();
-            let what = format!("{depth_mm} mm, {wait_s} s after the release began ({pushed_n:.2} N at last)");
-            cases.push(Case::new(what, off_n, 0.15));
-        }
-    }
+    let cases = each(&[0.02, 0.04, 0.06, 0.1, 0.16, 0.2, 0.3], &[1.0, 1.45], |wait_s, depth_mm| {
+        let mut finger = finger(&(object(5.0, 0.0) + LOSSES));
+        press(&mut finger, 7.0, 1.0);
+        press(&mut finger, 0.0, wait_s);
+        let travel_mm = finger.truth().travel_mm;
+        finger.carry_object(5.0, (travel_mm - depth_mm).min(5.0), 100.0, |_| {});
+        finger.run(1.0);
+        let pushed_n = finger.truth().force_n;
+        finger.place_object(8.0);
+        finger.run(0.05);
+        press(&mut finger, 1.0, 1.5);
+        let off_n = (finger.truth().force_n - 1.0).abs();
+        let what = format!("{depth_mm} mm, {wait_s} s after the release began ({pushed_n:.2} N at last)");
+        Case::new(what, off_n, 0.15)
+    });
     judge("a push against a released tip, then 1 N: off by", "N", &cases);
 }
 
@@ -219,18 +204,15 @@ sim::sizes!(a_residual_reading_does_not_drive_the_tip_through_the_air, residual_
 
 fn residual_after(hold_s: f64) {
     let remembering = "[effects.hysteresis]\nwidth_percent = 2\n[effects.creep]\nrate_percent_per_decade = 2\n";
-    let mut cases = Vec::new();
-    for away_s in [0.0, 0.001, 0.003, 0.01, 0.03, 0.1] {
-        for goal_n in [1.0, 3.0] {
-            let mut finger = finger(&(object(5.0, 0.0) + LOSSES + remembering));
-            press(&mut finger, goal_n, hold_s);
-            finger.place_object(8.0);
-            let fastest = fastest_in_the_air(&mut finger, (away_s, 0.0), 2.0);
-            let fault = finger.status().fault;
-            let what = format!("{goal_n} N for {hold_s} s, goal 0 {away_s} s after the object is away, {fault:?}");
-            cases.push(Case::new(what, fastest, 1.5 * APPROACH_MM_PER_S));
-        }
-    }
+    let cases = each(&[0.0, 0.001, 0.003, 0.01, 0.03, 0.1], &[1.0, 3.0], |away_s, goal_n| {
+        let mut finger = finger(&(object(5.0, 0.0) + LOSSES + remembering));
+        press(&mut finger, goal_n, hold_s);
+        finger.place_object(8.0);
+        let fastest = fastest_in_the_air(&mut finger, (away_s, 0.0), 2.0);
+        let fault = finger.status().fault;
+        let what = format!("{goal_n} N for {hold_s} s, goal 0 {away_s} s after the object is away, {fault:?}");
+        Case::new(what, fastest, 1.5 * APPROACH_MM_PER_S)
+    });
     judge("speed without contact", "mm/s", &cases);
 }
 
@@ -238,13 +220,9 @@ fn residual_after(hold_s: f64) {
 #[test]
 fn a_goal_amid_a_release_does_not_drive_the_tip_through_the_air() {
     let remembering = "[effects.dry_friction]\n[effects.creep]\nrate_percent_per_decade = 2\n";
-    let mut tasks = Vec::new();
-    for yield_mm_per_n in [0.0, 0.2] {
-        for (first_n, second_n) in [(2.0, 3.0), (1.6, 4.0), (1.0, 0.4)] {
-            tasks.extend((10..22).map(|step| (yield_mm_per_n, first_n, second_n, 0.0025 * f64::from(step))));
-        }
-    }
-    let cases = cores::map(tasks, |(yield_mm_per_n, first_n, second_n, after_s)| {
+    let goals = [0.0, 0.2].map(|mm_per_n| [(2.0, 3.0), (1.6, 4.0), (1.0, 0.4)].map(|goals| (mm_per_n, goals)));
+    let times_s: Vec<_> = (10..22).map(|step| 0.0025 * f64::from(step)).collect();
+    let cases = each(goals.as_flattened(), &times_s, |(yield_mm_per_n, (first_n, second_n)), after_s| {
         let mut finger = finger(&(object(3.0, yield_mm_per_n) + remembering));
         press(&mut finger, first_n, 0.7);
         set_goal(&mut finger, 0.0);
@@ -260,14 +238,13 @@ fn a_goal_amid_a_release_does_not_drive_the_tip_through_the_air() {
 /// A release is quick enough for its promise however slow an approach is.
 #[test]
 fn goal_zero_releases_at_the_slowest_approach() {
-    let mut cases = Vec::new();
-    for (yield_mm_per_n, goal_n) in [(0.0, 5.0), (0.0, 1.0), (1.0, 1.0)] {
+    let cases = cores::map([(0.0, 5.0), (0.0, 1.0), (1.0, 1.0)], |(yield_mm_per_n, goal_n)| {
         let controller = "[controller]\napproach_um_per_s = 500\n";
         let mut finger = finger(&(object(0.2, yield_mm_per_n) + LOSSES + controller));
         press(&mut finger, goal_n, 8.0);
         let held_n = finger.truth().force_n;
-        cases.push(case(&mut finger, yield_mm_per_n, format!("{yield_mm_per_n} mm/N, {held_n:.3} of {goal_n} N")));
-    }
+        case(&mut finger, yield_mm_per_n, format!("{yield_mm_per_n} mm/N, {held_n:.3} of {goal_n} N"))
+    });
     judge("released at the slowest approach", "N", &cases);
 }
 

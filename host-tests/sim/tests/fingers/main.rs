@@ -144,6 +144,16 @@ impl Case {
     }
 }
 
+/// Does the work for each pair, on all cores.
+fn each<A: Copy + Sync, B: Copy + Sync, R: Send>(
+    firsts: &[A],
+    seconds: &[B],
+    work: impl Fn(A, B) -> R + Sync,
+) -> Vec<R> {
+    let pairs = firsts.iter().flat_map(|first| seconds.iter().map(move |second| (first, second)));
+    cores::map(pairs, |(first, second)| work(*first, *second))
+}
+
 /// Prints the case nearest to its bound or farthest beyond it, and fails if any case is beyond its bound.
 fn judge(name: &str, unit: &str, cases: &[Case]) {
     let worst = cases.iter().max_by(|a, b| (a.is - a.most).total_cmp(&(b.is - b.most))).expect("there are cases");

@@ -108,26 +108,23 @@ fn noise(rms_codes: f64, friction_mnm: f64) -> String {
 
 #[test]
 fn noise_does_not_walk_a_released_tip_back() {
-    for rms_codes in [1.5, 3.0, 4.0, 6.0] {
-        for (goal_n, friction_mnm) in [(1.0, 0.12), (1.0, 0.0), (5.0, 0.12), (0.2, 0.12)] {
-            let ran = lets_go(goal_n, &noise(rms_codes, friction_mnm)).keeps_all().stands_clear();
-            // The noise is there: a sum of 100 taxels and 10 levels.
-            ran.has("force_error_rms_mn", 1.5 * rms_codes..5.0 * rms_codes);
-        }
-    }
+    let held = [(1.0, 0.12), (1.0, 0.0), (5.0, 0.12), (0.2, 0.12)];
+    each(&[1.5, 3.0, 4.0, 6.0], &held, |rms_codes, (goal_n, friction_mnm)| {
+        let ran = lets_go(goal_n, &noise(rms_codes, friction_mnm)).keeps_all().stands_clear();
+        // The noise is there: a sum of 100 taxels and 10 levels.
+        ran.has("force_error_rms_mn", 1.5 * rms_codes..5.0 * rms_codes);
+    });
 }
 
 sim::sizes!(heat_does_not_drive_a_released_tip_away, warm(&[20.0]), warm(&[600.0, 1.0]));
 
 fn warm(time_constants_s: &[f64]) {
-    for warming_k in [20.0, 40.0, -20.0, -40.0] {
-        for time_constant_s in time_constants_s {
-            for friction_mnm in [0.12, 0.0] {
-                let warming = format!("warming_k = {warming_k:?}\ntime_constant_s = {time_constant_s:?}");
-                let noise = noise(0.0, friction_mnm);
-                lets_go(1.0, &format!("[effects.temperature_drift]\n{warming}\n{noise}")).keeps_all().stands_clear();
-            }
-        }
+    for time_constant_s in time_constants_s {
+        each(&[20.0, 40.0, -20.0, -40.0], &[0.12, 0.0], |warming_k, friction_mnm| {
+            let warming = format!("warming_k = {warming_k:?}\ntime_constant_s = {time_constant_s:?}");
+            let noise = noise(0.0, friction_mnm);
+            lets_go(1.0, &format!("[effects.temperature_drift]\n{warming}\n{noise}")).keeps_all().stands_clear();
+        });
     }
 }
 
@@ -163,30 +160,27 @@ fn every_touch_is_found_again() {
 
 #[test]
 fn what_an_array_remembers_is_learnt_again_after_each_touch() {
-    for rms_codes in [0.0, 2.0, 4.0] {
-        for warming_k in [20.0, -20.0] {
-            let ran = asks(&AGAIN, 4.0, &(remembering(warming_k) + &noise(rms_codes, 0.12)));
-            assert_eq!(ran.outcome.holds.len(), 3);
-            // What such an array reads of 2 N is off by more than the envelope.
-            let ran = ran.keeps_all_but(&["hold_error_mn"]).has("hold_error_mn", 0.0..450.0);
-            ran.has("force_error_rms_mn", 5.0..f64::INFINITY);
-        }
-    }
+    each(&[0.0, 2.0, 4.0], &[20.0, -20.0], |rms_codes, warming_k| {
+        let ran = asks(&AGAIN, 4.0, &(remembering(warming_k) + &noise(rms_codes, 0.12)));
+        assert_eq!(ran.outcome.holds.len(), 3);
+        // What such an array reads of 2 N is off by more than the envelope.
+        let ran = ran.keeps_all_but(&["hold_error_mn"]).has("hold_error_mn", 0.0..450.0);
+        ran.has("force_error_rms_mn", 5.0..f64::INFINITY);
+    });
 }
 
 /// The array reads more than a contact in the air, with the same codes at every travel, but it is not frozen. An offset
 /// above `contact_off_mn` once ended in fault 4 or 1.
 #[test]
 fn an_offset_in_the_air_is_no_fault() {
-    for (zero_kpa_per_k, time_constant_s) in [(0.01, 1.0), (0.01, 0.5), (0.02, 1.0), (0.04, 2.0), (-0.02, 1.0)] {
-        for goal_n in [0.5, 1.0, 4.0] {
-            let zero = format!("zero_kpa_per_k = {zero_kpa_per_k:?}\ngain_percent_per_k = 0");
-            let warming = format!("[effects.temperature_drift]\n{zero}\ntime_constant_s = {time_constant_s:?}\n");
-            // At a force a hundred times as large, the offset is indistinguishable.
-            let ran = asks(&[(0.0, goal_n), (0.4, 0.0), (1.2, goal_n), (1.7, 0.0)], 2.4, &warming);
-            ran.keeps_all_but(&["hold_error_mn"]).stands_clear();
-        }
-    }
+    let drifts = [(0.01, 1.0), (0.01, 0.5), (0.02, 1.0), (0.04, 2.0), (-0.02, 1.0)];
+    each(&drifts, &[0.5, 1.0, 4.0], |(zero_kpa_per_k, time_constant_s), goal_n| {
+        let zero = format!("zero_kpa_per_k = {zero_kpa_per_k:?}\ngain_percent_per_k = 0");
+        let warming = format!("[effects.temperature_drift]\n{zero}\ntime_constant_s = {time_constant_s:?}\n");
+        // At a force a hundred times as large, the offset is indistinguishable.
+        let ran = asks(&[(0.0, goal_n), (0.4, 0.0), (1.2, goal_n), (1.7, 0.0)], 2.4, &warming);
+        ran.keeps_all_but(&["hold_error_mn"]).stands_clear();
+    });
 }
 
 // 99 of 100 hunted with 30 to 50 % of the duty.
@@ -214,21 +208,19 @@ fn duty_rests(numbers: Range<usize>) {
 sim::sizes!(coarse_encoders_do_not_swing, do_not_swing(&[1.0]), do_not_swing(&[0.3, 3.0]));
 
 fn do_not_swing(goals_n: &[f64]) {
-    for counts in [256, 128, 64, 48, 24, 16] {
-        for &goal_n in goals_n {
-            for friction_mnm in [0.12, 0.0] {
-                let tables = format!(
-                    "[motor]\nencoder_counts_per_turn = {counts}\n[effects.noise]\nrms_codes = 1\n\
-                    [effects.dry_friction]\ntorque_mnm = {friction_mnm:?}\n"
-                );
-                // A drift within a count is invisible: the bound is a count if that is more than the envelope's 50 um.
-                let count_mm = 2.0 * core::f64::consts::PI / (f64::from(counts) * 43.0 / 12.0);
-                let unseen: &[&str] = if count_mm > 0.05 { &["rest_travel_um"] } else { &[] };
-                // The coarsest encoders take half a second to settle.
-                let ran = asks(&[(0.0, goal_n), (1.2, 0.0)], 2.4, &tables).keeps_all_but(unseen).stands_clear();
-                ran.has("rest_travel_um", 0.0..1e3 * count_mm);
-            }
-        }
+    for &goal_n in goals_n {
+        each(&[256, 128, 64, 48, 24, 16], &[0.12, 0.0], |counts, friction_mnm| {
+            let tables = format!(
+                "[motor]\nencoder_counts_per_turn = {counts}\n[effects.noise]\nrms_codes = 1\n\
+                [effects.dry_friction]\ntorque_mnm = {friction_mnm:?}\n"
+            );
+            // A drift within a count is invisible: the bound is a count if that is more than the envelope's 50 um.
+            let count_mm = 2.0 * core::f64::consts::PI / (f64::from(counts) * 43.0 / 12.0);
+            let unseen: &[&str] = if count_mm > 0.05 { &["rest_travel_um"] } else { &[] };
+            // The coarsest encoders take half a second to settle.
+            let ran = asks(&[(0.0, goal_n), (1.2, 0.0)], 2.4, &tables).keeps_all_but(unseen).stands_clear();
+            ran.has("rest_travel_um", 0.0..1e3 * count_mm);
+        });
     }
 }
 
@@ -238,24 +230,20 @@ fn noise_and_bursts_are_no_fault() {
         let ran = holds(goal_n, &format!("[effects.noise]\nrms_codes = {rms_codes:?}\n")).keeps_all().stands_clear();
         ran.has("force_error_rms_mn", 5.0..f64::INFINITY);
     }
-    for (amplitude_codes, rate_per_s) in [(20, 10), (20, 100), (10, 1_000)] {
-        for goal_n in [0.5, 1.0, 3.0] {
-            let bursts = format!("amplitude_codes = {amplitude_codes}\nrate_per_s = {rate_per_s}");
-            holds(goal_n, &format!("[effects.burst]\n{bursts}\n")).keeps_all().stands_clear();
-        }
-    }
+    each(&[(20, 10), (20, 100), (10, 1_000)], &[0.5, 1.0, 3.0], |(amplitude_codes, rate_per_s), goal_n| {
+        let bursts = format!("amplitude_codes = {amplitude_codes}\nrate_per_s = {rate_per_s}");
+        holds(goal_n, &format!("[effects.burst]\n{bursts}\n")).keeps_all().stands_clear();
+    });
 }
 
 /// The current is limited before the supply goes under, so it was no fault 9.
 #[test]
 fn a_weak_source_is_spared() {
-    for source_ohm in [0.5, 1.0, 2.0] {
-        for goal_n in [1.0, 5.0, 7.0] {
-            let script = [(0.0, goal_n), (0.6, 0.3), (1.1, goal_n), (1.7, 0.0)];
-            let ran = asks(&script, 2.3, &format!("[effects.supply_sag]\nsource_ohm = {source_ohm:?}\n"));
-            ran.keeps_all().stands_clear();
-        }
-    }
+    each(&[0.5, 1.0, 2.0], &[1.0, 5.0, 7.0], |source_ohm, goal_n| {
+        let script = [(0.0, goal_n), (0.6, 0.3), (1.1, goal_n), (1.7, 0.0)];
+        let ran = asks(&script, 2.3, &format!("[effects.supply_sag]\nsource_ohm = {source_ohm:?}\n"));
+        ran.keeps_all().stands_clear();
+    });
 }
 
 /// A tip that the motor drives almost directly goes far for each count, and friction counts for much: that was fault 5,
@@ -290,17 +278,15 @@ fn off(centre_mm: [f64; 2], spread_percent: f64, more: &str) -> String {
 /// long frames of a slow scan the force once reached its goal before the fit began.
 #[test]
 fn the_fit_begins_on_every_contact_off_the_middle_also_with_a_slow_scan() {
-    for centre_mm in [[5.0, 0.0], [6.0, 0.0], [-6.0, 0.0], [0.0, 6.0], [0.0, -7.0], [4.0, -4.0]] {
-        for goal_n in [0.5, 1.0, 1.7, 3.0] {
-            holds(goal_n, &off(centre_mm, 0.0, "")).keeps_all().holds_share(0.97..1.03);
-        }
-    }
-    for settle_ns in [40_000, 100_000] {
-        for (centre_mm, goal_n) in [([6.0, 0.0], 2.0), ([-6.0, 0.0], 2.0), ([0.0, 6.0], 1.0), ([0.0, 6.0], 4.0)] {
-            let slow = format!("[controller]\nsettle_ns = {settle_ns}\n");
-            holds(goal_n, &off(centre_mm, 0.0, &slow)).keeps_all().holds_share(0.97..1.03);
-        }
-    }
+    let places_mm = [[5.0, 0.0], [6.0, 0.0], [-6.0, 0.0], [0.0, 6.0], [0.0, -7.0], [4.0, -4.0]];
+    each(&places_mm, &[0.5, 1.0, 1.7, 3.0], |centre_mm, goal_n| {
+        holds(goal_n, &off(centre_mm, 0.0, "")).keeps_all().holds_share(0.97..1.03);
+    });
+    let held = [([6.0, 0.0], 2.0), ([-6.0, 0.0], 2.0), ([0.0, 6.0], 1.0), ([0.0, 6.0], 4.0)];
+    each(&[40_000, 100_000], &held, |settle_ns, (centre_mm, goal_n)| {
+        let slow = format!("[controller]\nsettle_ns = {settle_ns}\n");
+        holds(goal_n, &off(centre_mm, 0.0, &slow)).keeps_all().holds_share(0.97..1.03);
+    });
 }
 
 /// Requests more than the converter can measure: the force is limited and reported, so that no taxel saturates.
@@ -332,27 +318,23 @@ fn a_stiff_or_small_tip_presses_no_more_than_its_taxels_show() {
 /// 4.73 N at 2 N.
 #[test]
 fn a_doubtful_fit_does_not_press_harder() {
-    for spread_percent in [0.0, 4.0, 5.0, 6.0, 12.0] {
-        for (centre_mm, goal_n) in
-            [([8.0, 0.0], 1.0), ([8.0, 0.0], 2.0), ([0.0, -8.0], 1.0), ([0.0, -8.0], 4.0), ([-6.0, 6.0], 1.0)]
-        {
-            // With taxels that differ by 15 % the share of the force off the array is uncertain by as much.
-            let spared: &[_] = if spread_percent > 6.0 { &["hold_error_mn"] } else { &[] };
-            holds(goal_n, &off(centre_mm, spread_percent, "")).keeps_all_but(spared).holds_share(0.7..1.3);
-        }
-    }
+    let held = [([8.0, 0.0], 1.0), ([8.0, 0.0], 2.0), ([0.0, -8.0], 1.0), ([0.0, -8.0], 4.0), ([-6.0, 6.0], 1.0)];
+    each(&[0.0, 4.0, 5.0, 6.0, 12.0], &held, |spread_percent, (centre_mm, goal_n)| {
+        // With taxels that differ by 15 % the share of the force off the array is uncertain by as much.
+        let spared: &[_] = if spread_percent > 6.0 { &["hold_error_mn"] } else { &[] };
+        holds(goal_n, &off(centre_mm, spread_percent, "")).keeps_all_but(spared).holds_share(0.7..1.3);
+    });
 }
 
 /// The contact's middle is 1.5 to 2.5 mm off the array, which shows no contact until it is wide: the tip once touched
 /// at full speed.
 #[test]
 fn a_touch_far_beside_the_array_is_slow_until_it_is_known() {
-    for spread_percent in [0.0, 6.0] {
-        for (centre_mm, goal_n) in [([9.0, 0.0], 1.0), ([0.0, -9.0], 1.0), ([9.0, 0.0], 4.0), ([10.0, 0.0], 2.0)] {
-            let ran = holds(goal_n, &off(centre_mm, spread_percent, ""));
-            ran.keeps_all_but(&["hold_error_mn"]).holds_share(0.7..1.3);
-        }
-    }
+    let held = [([9.0, 0.0], 1.0), ([0.0, -9.0], 1.0), ([9.0, 0.0], 4.0), ([10.0, 0.0], 2.0)];
+    each(&[0.0, 6.0], &held, |spread_percent, (centre_mm, goal_n)| {
+        let ran = holds(goal_n, &off(centre_mm, spread_percent, ""));
+        ran.keeps_all_but(&["hold_error_mn"]).holds_share(0.7..1.3);
+    });
 }
 
 fn friction(torque_mnm: f64) -> String {
@@ -375,31 +357,27 @@ fn the_motor_feels_a_touch_that_the_array_sees_late() {
 /// Farther out the array does not measure the first newton: once 4.8 N were pressed at goal 0.5 N, and 2.4 N at 1 N.
 #[test]
 fn a_touch_that_the_array_hardly_sees_is_pressed_no_harder() {
-    for (goal_n, spread_percent) in [(0.5, 0.0), (0.5, 6.0), (1.0, 0.0), (1.0, 6.0)] {
+    each(&[0.5, 1.0], &[0.0, 6.0], |goal_n, spread_percent| {
         holds(goal_n, &off([11.5, 0.0], spread_percent, &friction(0.12))).has("peak_force_n", 1.0..2.1);
-    }
+    });
 }
 
 /// A thing that does not touch the array at all was pressed with 8.8 N, until the motor stood.
 #[test]
 fn a_touch_that_the_array_does_not_see_ends_by_what_the_motor_feels() {
-    for (centre_mm, friction_mnm) in [(14.0, 0.12), (20.0, 0.12), (20.0, 0.0)] {
-        for goal_n in [0.5, 2.0, 7.0] {
-            let ran = holds(goal_n, &off([centre_mm, 0.0], 0.0, &friction(friction_mnm)));
-            ran.has("fault_number", 16.0..16.5).has("peak_force_n", 0.7..3.2);
-        }
-    }
+    each(&[(14.0, 0.12), (20.0, 0.12), (20.0, 0.0)], &[0.5, 2.0, 7.0], |(centre_mm, friction_mnm), goal_n| {
+        let ran = holds(goal_n, &off([centre_mm, 0.0], 0.0, &friction(friction_mnm)));
+        ran.has("fault_number", 16.0..16.5).has("peak_force_n", 0.7..3.2);
+    });
 }
 
 /// It pressed 1.4 N too much on a ball of 20 mm.
 #[test]
 fn a_ball_beside_the_middle_is_not_pressed_harder() {
     let ball = "[effects.sphere]\ncurvature_per_mm = 0.05\n";
-    for centre_mm in [[8.0, 0.0], [-8.0, 0.0], [0.0, 6.0], [4.0, 0.0]] {
-        for goal_n in [0.5, 1.0, 2.0] {
-            holds(goal_n, &off(centre_mm, 6.0, ball)).keeps_all().holds_share(0.75..f64::INFINITY);
-        }
-    }
+    each(&[[8.0, 0.0], [-8.0, 0.0], [0.0, 6.0], [4.0, 0.0]], &[0.5, 1.0, 2.0], |centre_mm, goal_n| {
+        holds(goal_n, &off(centre_mm, 6.0, ball)).keeps_all().holds_share(0.75..f64::INFINITY);
+    });
 }
 
 /// A first touch almost completely off the array, and then another goal.
@@ -427,18 +405,16 @@ fn a_doubtful_fit_never_says_less_than_the_taxels() {
 /// need more than that. A clipped taxel counts as saturated, so the clipped force is no reason to press harder.
 #[test]
 fn a_clipped_amplifier_gives_no_over_force() {
-    for headroom_mv in [50, 120, 197] {
-        for curvature_per_mm in [0.0, 0.066, 0.16, 0.29] {
-            for goal_n in [5.0, 7.0] {
-                let tables = format!(
-                    "[tip]\nradius_mm = 10\nmodulus_kpa = 800\n[controller]\nmodulus_pa = 800000\n\
-                    [object]\ndistance_mm = 2\n[effects.sphere]\ncurvature_per_mm = {curvature_per_mm:?}\n\
-                    [effects.saturation]\nheadroom_mv = {headroom_mv}\n[effects.noise]\nrms_codes = 2"
-                );
-                asks(&[(0.0, goal_n)], 0.7, &tables).has("over_force_mn", f64::NEG_INFINITY..150.0 + 300.0 * goal_n);
-            }
+    each(&[50, 120, 197], &[0.0, 0.066, 0.16, 0.29], |headroom_mv, curvature_per_mm| {
+        for goal_n in [5.0, 7.0] {
+            let tables = format!(
+                "[tip]\nradius_mm = 10\nmodulus_kpa = 800\n[controller]\nmodulus_pa = 800000\n\
+                [object]\ndistance_mm = 2\n[effects.sphere]\ncurvature_per_mm = {curvature_per_mm:?}\n\
+                [effects.saturation]\nheadroom_mv = {headroom_mv}\n[effects.noise]\nrms_codes = 2"
+            );
+            asks(&[(0.0, goal_n)], 0.7, &tables).has("over_force_mn", f64::NEG_INFINITY..150.0 + 300.0 * goal_n);
         }
-    }
+    });
 }
 
 /// With a slow scan the distance determines the time of the touch within a frame; stiff tips touch abruptly.

@@ -27,15 +27,12 @@ sim::sizes!(a_signal_that_is_lost_stops_the_motor_in_time, stops_in_time(&[250.0
 
 fn stops_in_time(moduli_kpa: &[f64]) {
     let ways = [(false, None), (false, Some(0.002)), (false, Some(0.03)), (true, Some(0.002)), (true, Some(0.03))];
-    let mut tasks = Vec::new();
     for &modulus_kpa in moduli_kpa {
-        for goal_n in [0.5, 1.0, 3.0, 7.0] {
-            tasks.extend(ways.map(|(freezes, before_touch_s)| (modulus_kpa, goal_n, freezes, before_touch_s)));
-        }
+        let cases = each(&[0.5, 1.0, 3.0, 7.0], &ways, |goal_n, (freezes, before_touch_s)| {
+            lost(modulus_kpa, goal_n, freezes, before_touch_s)
+        });
+        judge("signal lost", "N", &cases);
     }
-    let cases =
-        cores::map(tasks, |(modulus_kpa, goal_n, freezes, before_s)| lost(modulus_kpa, goal_n, freezes, before_s));
-    judge("signal lost", "N", &cases);
 }
 
 /// Halves all codes relative to the level of an undriven column.
@@ -51,23 +48,20 @@ fn halve(record: &mut Record) {
 
 #[test]
 fn gains_that_halve_during_a_press_do_not_double_the_force() {
-    let mut cases = Vec::new();
-    for goal_n in [0.5, 1.0, 2.2, 5.0] {
-        for after_s in [-0.03, 0.003, 0.01, 0.03, 0.5] {
-            let mut finger = finger(&(object(3.0, 0.0) + LOSSES));
-            set_goal(&mut finger, goal_n);
-            if after_s < 0.0 {
-                finger.run(0.03);
-            } else {
-                touch(&mut finger);
-                finger.run(after_s);
-            }
-            let peak_n = finger.run_with(1.5, halve);
-            let (force_n, fault) = (finger.truth().force_n, finger.status().fault);
-            let what = format!("goal {goal_n} N, {after_s} s after the touch, {force_n:.2} N at last: {fault:?}");
-            cases.push(Case::new(what, peak_n, most_n(goal_n)));
+    let cases = each(&[0.5, 1.0, 2.2, 5.0], &[-0.03, 0.003, 0.01, 0.03, 0.5], |goal_n, after_s| {
+        let mut finger = finger(&(object(3.0, 0.0) + LOSSES));
+        set_goal(&mut finger, goal_n);
+        if after_s < 0.0 {
+            finger.run(0.03);
+        } else {
+            touch(&mut finger);
+            finger.run(after_s);
         }
-    }
+        let peak_n = finger.run_with(1.5, halve);
+        let (force_n, fault) = (finger.truth().force_n, finger.status().fault);
+        let what = format!("goal {goal_n} N, {after_s} s after the touch, {force_n:.2} N at last: {fault:?}");
+        Case::new(what, peak_n, most_n(goal_n))
+    });
     judge("gains halved", "N", &cases);
 }
 
@@ -120,20 +114,18 @@ fn at_rest(scene: &Scene, what: &str) -> [Case; 2] {
 fn a_flickering_taxel_does_not_shake_the_motor() {
     let (path, text) = scene::library_text("raspberry").unwrap_or_else(|error| panic!("{error}"));
     let raspberry = read(&path.to_string_lossy(), &text).unwrap_or_else(|errors| panic!("{errors}"));
-    let mut cases = Vec::new();
-    for seed in [1, 33, 72] {
+    let cases = cores::map([1, 33, 72], |seed| {
         let scene = Scene { seed, duration_s: 3.0, bounds: Vec::new(), ..raspberry.clone() };
-        cases.extend(at_rest(&scene, &format!("raspberry, seed {seed}")));
-    }
-    judge("a flickering taxel", "% or mN", &cases);
+        at_rest(&scene, &format!("raspberry, seed {seed}"))
+    });
+    judge("a flickering taxel", "% or mN", cases.as_flattened());
 }
 
 /// No noise: the highest taxel is at the edge of saturation while the goal is held.
 #[test]
 fn a_taxel_at_the_edge_of_saturation_does_not_shake_the_motor() {
     let gains = [36.0, 40.0, 44.0, 48.0, 49.0, 49.5, 50.0, 50.5, 51.0, 52.0];
-    let tasks: Vec<_> = gains.into_iter().flat_map(|gain| [0, 50].map(|headroom_mv| (gain, headroom_mv))).collect();
-    let cases = cores::map(tasks, |(gain, headroom_mv)| {
+    let cases = each(&gains, &[0, 50], |gain, headroom_mv| {
         let tables = format!(
             "[array]\ngain_codes_per_kpa = {gain:?}\n[tip]\nmodulus_kpa = 370\n[object]\ncentre_x_mm = -1.9\n\
             [effects.object_stiffness]\nyield_mm_per_n = 0.44\n[effects.sphere]\ncurvature_per_mm = 0.046\n\
@@ -143,7 +135,7 @@ fn a_taxel_at_the_edge_of_saturation_does_not_shake_the_motor() {
         let scene = Scene { duration_s: 3.0, script, ..scene(&tables) };
         at_rest(&scene, &format!("{gain} codes/kPa, headroom of {headroom_mv} mV"))
     });
-    judge("a taxel at the edge of saturation", "% or mN", &cases.into_iter().flatten().collect::<Vec<_>>());
+    judge("a taxel at the edge of saturation", "% or mN", cases.as_flattened());
 }
 
 sim::sizes!(a_tilted_contact_near_the_edge_is_not_pressed_too_hard, tilted_contacts(0..12), tilted_contacts(12..100));

@@ -13,23 +13,18 @@ const MM_PER_N: f64 = 0.5;
 /// Times, s, and goals, N: three forces, a release, and a second touch and release.
 const SCRIPT: [(f64, f64); 6] = [(0.0, 1.0), (0.9, 4.0), (1.5, 2.0), (2.1, 0.0), (3.1, 1.0), (3.8, 0.0)];
 
-/// State of the world at a time.
-#[derive(Clone, Copy, Debug, Default)]
+/// State of the world and of the finger at a time.
+#[derive(Default)]
 struct Made {
     time_s: f64,
     /// Time since the goal changed, s, and number of steps since the start.
     since_s: f64,
     steps: usize,
     goal_n: f64,
-    force_n: f64,
-    travel_mm: f64,
-    speed_mm_per_s: f64,
     duty: f64,
+    truth: Truth,
+    command: Command,
     fault: Option<Fault>,
-    torque_off: bool,
-    friction_n: f64,
-    object_mm: f64,
-    disturbed: bool,
 }
 
 /// Returns the promises that a perfect finger breaks after a change of its states.
@@ -40,24 +35,19 @@ fn broken(change: impl Fn(&mut Made)) -> BTreeSet<String> {
         let time_s = f64::from(steps) * 1e-4;
         let (at_s, goal_n) = SCRIPT.into_iter().rfind(|(at_s, _)| *at_s <= time_s).unwrap();
         let touches = time_s > 0.2 && goal_n > 0.0;
-        let mut made = Made { time_s, since_s: time_s - at_s, steps: steps as usize, goal_n, ..Made::default() };
-        made.force_n = if touches { goal_n } else { 0.0 };
-        made.travel_mm = if touches { TOUCH_MM + MM_PER_N * goal_n } else { TOUCH_MM - 1.0 };
-        change(&mut made);
+        let command = Command { goal: newtons((goal_n * 1e3) as i32), torque: true, ..Command::default() };
         let truth = Truth {
-            force_n: made.force_n,
-            indentation_mm: MM_PER_N * made.force_n.min(made.goal_n),
-            travel_mm: made.travel_mm,
-            speed_mm_per_s: made.speed_mm_per_s,
-            friction_n: made.friction_n,
-            object_mm: [made.object_mm, 0.0],
-            disturbed: made.disturbed,
+            force_n: if touches { goal_n } else { 0.0 },
+            travel_mm: if touches { TOUCH_MM + MM_PER_N * goal_n } else { TOUCH_MM - 1.0 },
             ..Truth::default()
         };
-        let command = Command { goal: newtons((goal_n * 1e3) as i32), torque: !made.torque_off, ..Command::default() };
+        let (since_s, steps) = (time_s - at_s, steps as usize);
+        let mut made = Made { time_s, since_s, steps, goal_n, truth, command, ..Made::default() };
+        change(&mut made);
+        made.truth.indentation_mm = MM_PER_N * made.truth.force_n.min(goal_n);
         let duty = Duty((made.duty * f64::from(Duty::FULL)).round() as _);
         let status = Status { duty, fault: made.fault, ..Status::default() };
-        observe(&mut meter, 0, time_s, &command, &status, &truth);
+        observe(&mut meter, 0, time_s, &made.command, &status, &made.truth);
     }
     let verdicts = meter.verdicts(&meter.measured(), &bounds).into_iter();
     verdicts.filter(|verdict| !verdict.held).map(|verdict| verdict.metric).collect()
@@ -87,7 +77,7 @@ fn while_held(goal_n: f64, since_s: impl RangeBounds<f64>, change: impl Fn(&mut 
 
 #[test]
 fn over_force() {
-    let at = |goal_n, since_s: Range<f64>| while_held(goal_n, since_s, |made, force_n| made.force_n = force_n);
+    let at = |goal_n, since_s: Range<f64>| while_held(goal_n, since_s, |made, force_n| made.truth.force_n = force_n);
     two_sided(at(4.0, 0.0..0.00005), 1.3 * 4.0 + 0.149, 1.3 * 4.0 + 0.151, &["over_force_mn"]);
     // At the least goal, and with none.
     two_sided(at(1.0, 0.45..0.4501), 1.449, 1.451, &["over_force_mn"]);
@@ -103,14 +93,14 @@ fn running_away() {
     let rear_mm = TOUCH_MM + MM_PER_N - MM_PER_N * 4.0 - clearance_mm;
     let back = |made: &mut Made, behind_mm: f64| {
         if made.time_s > 2.1 && made.goal_n == 0.0 {
-            made.travel_mm = rear_mm - behind_mm;
+            made.truth.travel_mm = rear_mm - behind_mm;
         }
     };
     two_sided(back, 0.999, 1.001, &["runaway_mm"]);
     for (limit_mm, way) in [(-clearance_mm, -1.0), (f64::from(Params::DEFAULT.travel_max_um) * 1e-3, 1.0)] {
         let before = |made: &mut Made, beyond_mm: f64| {
             if made.time_s < 0.1 {
-                made.travel_mm = limit_mm + way * beyond_mm;
+                made.truth.travel_mm = limit_mm + way * beyond_mm;
             }
         };
         two_sided(before, 0.999, 1.001, &["runaway_mm"]);
@@ -121,12 +111,12 @@ fn running_away() {
 fn fast_in_the_air() {
     let approach_mm_per_s = f64::from(Params::DEFAULT.approach_um_per_s) * 1e-3;
     for way in [approach_mm_per_s, -approach_mm_per_s] {
-        let flies = while_held(0.0, 0.03..0.031, |made, share| made.speed_mm_per_s = way * share);
+        let flies = while_held(0.0, 0.03..0.031, |made, share| made.truth.speed_mm_per_s = way * share);
         two_sided(flies, 1.499, 1.501, &["air_speed_percent"]);
     }
     // What a contact throws back has 20 ms.
     let thrown = |made: &mut Made, until_s: f64| {
-        while_held(0.0, ..until_s, |made, mm_per_s| made.speed_mm_per_s = mm_per_s)(made, -200.0);
+        while_held(0.0, ..until_s, |made, mm_per_s| made.truth.speed_mm_per_s = mm_per_s)(made, -200.0);
     };
     two_sided(thrown, 0.0195, 0.0205, &["air_speed_percent"]);
 }
@@ -134,38 +124,40 @@ fn fast_in_the_air() {
 #[test]
 fn no_rest_after_letting_go() {
     let wanders = while_held(0.0, .., |made, width_mm| {
-        made.travel_mm += 0.5 * width_mm * sign(made) * if made.since_s < 0.9 { -1.0 } else { 1.0 };
+        made.truth.travel_mm += 0.5 * width_mm * sign(made) * if made.since_s < 0.9 { -1.0 } else { 1.0 };
     });
     two_sided(wanders, 0.0499, 0.0501, &["rest_travel_um"]);
 }
 
 #[test]
 fn a_stop_that_leaves_a_force() {
-    let remains = while_held(0.0, .., |made, force_n| made.force_n = force_n);
+    let remains = while_held(0.0, .., |made, force_n| made.truth.force_n = force_n);
     let stays = |made: &mut Made, until_s: f64| while_held(0.0, ..until_s, &remains)(made, 0.041);
     two_sided(stays, 0.499, 0.501, &["stop_force_mn"]);
     two_sided(&remains, 0.0399, 0.0401, &["stop_force_mn"]);
     // A force that friction holds while torque is off does not count against the controller.
     let held = |made: &mut Made, friction_n: f64| {
-        made.torque_off = made.time_s > 0.3;
-        (made.disturbed, made.friction_n, made.force_n) = (true, friction_n, made.force_n.min(1.0));
+        made.command.torque = made.time_s <= 0.3;
+        let truth = &mut made.truth;
+        (truth.disturbed, truth.friction_n, truth.force_n) = (true, friction_n, truth.force_n.min(1.0));
     };
     two_sided(held, 0.961, 0.959, &["stop_force_mn"]);
     // An object that moves nearer ends the stop; a fault is a reason.
     let pushed = |made: &mut Made, by_mm: f64| {
-        (made.disturbed, made.object_mm) = (made.time_s > 2.2, if made.time_s > 2.4 { by_mm } else { 0.0 });
+        made.truth.disturbed = made.time_s > 2.2;
+        made.truth.object_mm[0] = if made.time_s > 2.4 { by_mm } else { 0.0 };
         remains(made, if (2.5..3.0).contains(&made.time_s) { 0.1 } else { 0.0 });
     };
     two_sided(pushed, -0.1, 0.1, &["stop_force_mn"]);
-    assert!(!broken(|made| (made.fault, made.force_n) = (Some(Fault::RowStuck), 1.0)).contains("stop_force_mn"));
+    assert!(!broken(|made| (made.fault, made.truth.force_n) = (Some(Fault::RowStuck), 1.0)).contains("stop_force_mn"));
 }
 
 #[test]
 fn a_force_that_swings_or_is_not_held() {
-    let swings = while_held(2.0, 0.45.., |made, width_n| made.force_n += 0.5 * width_n * sign(made));
+    let swings = while_held(2.0, 0.45.., |made, width_n| made.truth.force_n += 0.5 * width_n * sign(made));
     two_sided(swings, 0.249, 0.251, &["hold_swing_mn"]);
     for way in [1.0, -1.0] {
-        let off = while_held(2.0, 0.3.., |made, off_n| made.force_n += way * off_n);
+        let off = while_held(2.0, 0.3.., |made, off_n| made.truth.force_n += way * off_n);
         two_sided(off, 0.399, 0.401, &["hold_error_mn"]);
     }
 }
@@ -190,7 +182,7 @@ fn any_fault() {
     let lets_go = |made: &mut Made, at_s: f64| {
         faults(made, at_s);
         if made.fault.is_some() {
-            made.force_n = 0.0;
+            made.truth.force_n = 0.0;
         }
     };
     two_sided(lets_go, 5.0, 1.0, &["faults_count"]);
@@ -200,7 +192,7 @@ fn any_fault() {
 fn a_touch_that_is_missed() {
     let misses = |made: &mut Made, until_s: f64| {
         if made.time_s > 3.0 && made.time_s < until_s && made.goal_n > 0.0 {
-            (made.force_n, made.travel_mm) = (0.0, TOUCH_MM);
+            (made.truth.force_n, made.truth.travel_mm) = (0.0, TOUCH_MM);
         }
     };
     two_sided(misses, 3.5, 3.9, &["hold_error_mn", "touches_missed_count"]);

@@ -32,25 +32,12 @@ pub struct Instruction {
 pub enum Kind {
     /// One cycle: data processing, multiplication, most FPU operations, hints that do nothing.
     Alu,
-    /// Division; the registers hold the operands.
-    Divide {
-        /// Two's complement.
-        signed: bool,
-        /// The dividend's register.
-        numerator: u8,
-        /// The divisor's register.
-        denominator: u8,
-    },
-    /// If-then: the condition of the first instruction, and the mask of the others.
-    IfThen {
-        /// Condition and mask as the core keeps them in ITSTATE.
-        state: u8,
-    },
-    /// A branch to a place in the instruction.
-    Branch {
-        /// Taken or not by the flags or by a register.
-        conditional: bool,
-    },
+    /// Division of the numbers in two registers.
+    Divide { signed: bool, numerator: u8, denominator: u8 },
+    /// If-then: condition and mask as the core keeps them in ITSTATE.
+    IfThen { state: u8 },
+    /// A branch to a place in the instruction; a conditional one by the flags or by a register.
+    Branch { conditional: bool },
     /// A branch to where a register says.
     Jump,
     /// A branch by a table of bytes or halfwords.
@@ -75,9 +62,9 @@ pub enum Kind {
     FloatWord,
     /// A memory or instruction barrier.
     Barrier,
-    /// Begin of a region.
+    /// A region begins.
     Begin,
-    /// End of a region.
+    /// A region ends.
     End,
     /// Known, but no time can be given: it waits, traps or calls the debugger.
     Untimed,

@@ -110,7 +110,7 @@ pub fn package() -> Result<()> {
     test.arg("--manifest-path").arg(outside.join("Cargo.toml")).arg("--target-dir").arg(host::target().join("outside"));
     console::run(&mut test)?;
 
-    let python = install::bus_python()?;
+    let python = install::environment(&install::BUS)?;
     // The wheel's builder reads the sources of every platform, also those that no build here needs.
     console::prepare(console::cargo("fetch").args(["--locked", "--quiet"]))?;
     let serve = host::SERVE.build()?;

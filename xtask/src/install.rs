@@ -172,17 +172,13 @@ pub struct Environment {
     pub does: &'static str,
 }
 
-const BUS: Environment = Environment {
+/// Clients of the bus, and what the Python package is checked and built with.
+pub const BUS: Environment = Environment {
     folder: "venv",
     packages: &["dynamixel-sdk==4.1.0", "rustypot==1.13.1", "mypy==2.4.1", "maturin==1.9.4"],
     imports: "dynamixel_sdk, rustypot, mypy, maturin",
     does: "tests talk to the board by the first two, and check and build the Python package by the others",
 };
-
-/// Finds or makes the environment with the bus client, and returns its interpreter.
-pub fn bus_python() -> Result<PathBuf> {
-    environment(&BUS)
-}
 
 /// Finds or makes a virtual environment, and returns its interpreter.
 pub fn environment(environment: &Environment) -> Result<PathBuf> {

@@ -46,13 +46,13 @@ pub fn run(args: &Args) -> Result<()> {
     stages.stage("example for another board", cores::example);
     stages.stage("timing model against published measurements", || timing::check().map(drop));
     stages.stage("virtual board", || {
-        let python = install::bus_python()?;
+        let python = install::environment(&install::BUS)?;
         let mut command = host::tests(&["--test", "board"]);
         command.env("FINGERTIP_IMAGE", &image()?.elf).env("FINGERTIP_PYTHON", &python);
         host::test(&mut command)
     });
     stages.stage("Python package on a served finger", || {
-        let python = install::bus_python()?;
+        let python = install::environment(&install::BUS)?;
         let mut command = host::tests(&["--test", "served", "--", "--ignored", "--skip", "long_"]);
         host::test(command.env("FINGERTIP_PYTHON", &python))
     });
@@ -68,7 +68,7 @@ pub fn run(args: &Args) -> Result<()> {
 /// Runs the larger sizes (tests whose names begin with `long_`), and checks the tables of proofs and fits.
 fn long(mut stages: Stages) -> Result<()> {
     stages.stage("long core and host tests", || {
-        let python = install::bus_python()?;
+        let python = install::environment(&install::BUS)?;
         let mut command = host::tests(&["--no-fail-fast", "--", "--ignored", "long_"]);
         host::test(command.env("FINGERTIP_PYTHON", &python))
     });

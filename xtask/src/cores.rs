@@ -45,11 +45,9 @@ fn emulator(target: &str, board: &str) -> String {
     }
 }
 
-/// Runs the loop on every core and writes the table.
+/// Runs the loop on every core and renews the page with the table.
 pub fn run_all() -> Result<()> {
-    let page = page()?;
-    console::print(&table(&page));
-    docs::renew(PAGE.0, &page, false, &mut Vec::new())
+    docs::renew(PAGE.0, &page()?, false, &mut Vec::new())
 }
 
 /// Runs the image of every core and compares its digest with this machine's. Returns the page with the table.
@@ -95,11 +93,6 @@ pub fn example() -> Result<()> {
     ensure!(measures > bytes + 7_000, "{EXAMPLE} has {bytes} bytes, and {measures} with the feature `measure`");
     console::print(&format!("{EXAMPLE}: {bytes} bytes of flash, {measures} with the motions that measure"));
     Ok(())
-}
-
-fn table(page: &str) -> String {
-    let lines = page.lines().skip_while(|line| !line.starts_with("<!-- cores"));
-    lines.skip(1).take_while(|line| line.starts_with('|')).collect::<Vec<_>>().join("\n")
 }
 
 // The core on an emulated Cortex-M4F.

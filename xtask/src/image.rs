@@ -135,62 +135,35 @@ pub fn apart(subcommand: &str, folder: &str, target: &str, flags: &[&str]) -> Co
 }
 
 /// Flash that the image may take.
-pub const FLASH_MAX_BYTES: u64 = 128 << 10;
+const FLASH_MAX_BYTES: u64 = 128 << 10;
 /// RAM that statics may take, 44 KiB of it the memory for captures; the stack comes on top.
-pub const RAM_MAX_BYTES: u64 = 76 << 10;
+const RAM_MAX_BYTES: u64 = 76 << 10;
 /// First address of the microcontroller's RAM.
 const RAM_BASE: u64 = 0x2000_0000;
 
-pub struct Sizes {
-    /// Bytes of flash, gaps and initial values included.
-    pub flash: u64,
-    /// Bytes of RAM with a fixed address.
-    pub ram: u64,
-    pub stack: u64,
+/// Flash with gaps and initial values, RAM with a fixed address, and stack, a line each. Fails beyond a limit.
+pub fn sizes(image: &Image) -> Result<String> {
+    let data = fs::read(&image.elf)?;
+    let file = object::File::parse(&*data)?;
+    let in_ram = file.sections().filter(|section| {
+        let SectionFlags::Elf { sh_flags } = section.flags() else { return false };
+        sh_flags & u64::from(SHF_ALLOC) != 0 && section.address() >= RAM_BASE
+    });
+    let address = |name: &str| {
+        let symbol = file.symbol_by_name(name).with_context(|| format!("the image has no symbol {name}"));
+        symbol.map(|symbol| symbol.address())
+    };
+    let flash = share("flash", image.bytes.len() as u64, FLASH_MAX_BYTES)?;
+    let ram = share("static RAM", in_ram.map(|section| section.size()).sum(), RAM_MAX_BYTES)?;
+    let stack = address("_stack_start")?.saturating_sub(address("_stack_end")?);
+    Ok(format!("{flash}\n{ram}\nstack       {stack:6} bytes reserved"))
 }
 
-impl Sizes {
-    pub fn of(image: &Image) -> Result<Self> {
-        let data = fs::read(&image.elf)?;
-        let file = object::File::parse(&*data)?;
-        let in_ram = file.sections().filter(|section| {
-            let SectionFlags::Elf { sh_flags } = section.flags() else { return false };
-            sh_flags & u64::from(SHF_ALLOC) != 0 && section.address() >= RAM_BASE
-        });
-        let address = |name: &str| {
-            let symbol = file.symbol_by_name(name).with_context(|| format!("the image has no symbol {name}"));
-            symbol.map(|symbol| symbol.address())
-        };
-        Ok(Self {
-            flash: image.bytes.len() as u64,
-            ram: in_ram.map(|section| section.size()).sum(),
-            stack: address("_stack_start")?.saturating_sub(address("_stack_end")?),
-        })
+fn share(what: &str, bytes: u64, limit: u64) -> Result<String> {
+    if bytes > limit {
+        bail!("{what}: {bytes} bytes are {} more than the limit of {limit}", bytes - limit);
     }
-
-    pub fn check(&self) -> Result<()> {
-        for (what, bytes, limit) in [("flash", self.flash, FLASH_MAX_BYTES), ("static RAM", self.ram, RAM_MAX_BYTES)] {
-            if bytes > limit {
-                bail!("{what}: {bytes} bytes are {} more than the limit of {limit}", bytes - limit);
-            }
-        }
-        Ok(())
-    }
-
-    /// Flash, static RAM and stack, a line each.
-    pub fn verdict(&self) -> String {
-        let share = |bytes: u64, limit: u64| 100.0 * bytes as f64 / limit as f64;
-        format!(
-            "flash       {:6} of {FLASH_MAX_BYTES} bytes ({:.0} %)\n\
-             static RAM  {:6} of {RAM_MAX_BYTES} bytes ({:.0} %)\n\
-             stack       {:6} bytes reserved",
-            self.flash,
-            share(self.flash, FLASH_MAX_BYTES),
-            self.ram,
-            share(self.ram, RAM_MAX_BYTES),
-            self.stack
-        )
-    }
+    Ok(format!("{what:<12}{bytes:6} of {limit} bytes ({:.0} %)", 100.0 * bytes as f64 / limit as f64))
 }
 
 // The panic-free proof: an image of the control step alone, which a reachable panic keeps from linking.
@@ -277,11 +250,9 @@ mod tests {
 
     #[test]
     fn a_byte_beyond_a_limit_fails() {
-        let sizes = |flash, ram| Sizes { flash, ram, stack: 0 };
-        assert!(sizes(FLASH_MAX_BYTES, RAM_MAX_BYTES).check().is_ok());
-        let why = |sizes: Sizes| sizes.check().unwrap_err().to_string();
-        assert!(why(sizes(FLASH_MAX_BYTES + 1, 0)).contains("flash: 131073 bytes are 1 more"));
-        assert!(why(sizes(0, RAM_MAX_BYTES + 1)).contains("static RAM"));
+        assert!(share("flash", 1_000, 1_000).is_ok());
+        let error = share("flash", 1_001, 1_000).unwrap_err().to_string();
+        assert_eq!(error, "flash: 1001 bytes are 1 more than the limit of 1000");
     }
 
     #[test]

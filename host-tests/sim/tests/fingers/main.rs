@@ -182,8 +182,3 @@ fn replaced(text: &str, changes: &[(&str, &str)]) -> String {
         text.replace(from, to)
     })
 }
-
-/// A number from the environment, or the usual one.
-fn number(name: &str, usual: u64) -> u64 {
-    std::env::var(name).map_or(usual, |text| text.parse().unwrap_or_else(|_| panic!("{name} of {text} is no number")))
-}

@@ -1,8 +1,6 @@
 //! Random sequences of requests and of motions of the object, judged by the true force and the table of modes.
 //!
-//! The first sequences that fail are printed. `SEQUENCES=n` tries n in all, the first 40 of them without
-//! `--ignored`. The core checks its arithmetic for overflow:
-//! `SEQUENCES=2000 cargo test -p sim --test fingers sequences -- --ignored --nocapture`
+//! The first sequences that fail are printed. The core checks its arithmetic for overflow.
 
 use crate::*;
 use fingertip::command::Command;
@@ -122,7 +120,7 @@ fn broken(sequence: &Sequence) -> Option<String> {
 sim::sizes!(
     random_sequences_keep_the_force_in_bounds_and_the_table_of_modes,
     keep_the_rules(0..USUAL / 15),
-    keep_the_rules(USUAL / 15..number("SEQUENCES", USUAL).max(USUAL / 15))
+    keep_the_rules(USUAL / 15..USUAL)
 );
 
 fn keep_the_rules(seeds: Range<u64>) {
@@ -396,7 +394,7 @@ fn press(goal_n: f64, yield_mm_per_n: f64, first: u64, every: u64) -> [(f64, f64
 sim::sizes!(
     an_event_at_any_instant_of_a_press_does_not_let_the_force_rise,
     keep_the_force(100),
-    keep_the_force(number("INSTANTS_STEP", 20).clamp(1, INSTANTS))
+    keep_the_force(std::env::var("INSTANTS_STEP").map_or(20, |step| step.parse().expect("a number from 1 on")))
 );
 
 fn keep_the_force(every: u64) {

@@ -78,8 +78,10 @@ pub struct Posed {
     pub pose: Pose,
     /// Force of each step of the press, N.
     pub forces_n: Vec<f64>,
+    /// Yield of the plate, mm/N, and its standard uncertainty.
+    pub yields_mm_per_n: [f64; 2],
     /// Was it a press onto a hard plate that stood still?
-    pub judgement: Judgement,
+    pub verdict: Verdict,
 }
 
 /// Result for the whole array.
@@ -116,6 +118,8 @@ pub enum NoGains {
     Taxels(usize),
     #[error("the poses still change by {0} radii after the last round; 0.02 is allowed")]
     Unsettled(f64),
+    #[error("force over travel of {0} presses does not follow the model")]
+    Fit(usize),
 }
 
 /// Poses and gains, and the presses that they rest on, without creep.
@@ -163,7 +167,7 @@ pub(crate) fn settle(presses: &[Press]) -> Result<Settled, NoGains> {
         }
         let press = without_creep(press, creep);
         let alone = joint(std::slice::from_ref(&press), 0.0);
-        match alone.map(|alone| alone.presses[0].judgement.verdict) {
+        match alone.map(|alone| alone.presses[0].verdict) {
             Ok(Verdict::Good) => kept.push(press),
             Ok(Verdict::Soft(_)) => {
                 kept.push(press);
@@ -207,8 +211,8 @@ impl fmt::Display for Gains {
             write!(f, " Press {} does not count: {why}.", press + 1)?;
         }
         for posed in &self.presses {
-            if let Verdict::Soft(_) = posed.judgement.verdict {
-                write!(f, " In one press {}.", posed.judgement.verdict)?;
+            if let Verdict::Soft(_) = posed.verdict {
+                write!(f, " In one press {}.", posed.verdict)?;
             }
         }
         Ok(())
@@ -228,13 +232,6 @@ pub struct Shift {
     pub shift_mm: f64,
     /// Standard deviation of the shift, mm.
     pub sigma_mm: f64,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Judgement {
-    /// Yield of the plate, mm/N, and its standard uncertainty.
-    pub yields_mm_per_n: [f64; 2],
-    pub verdict: Verdict,
 }
 
 /// Verdict on a press, with the number behind it.
@@ -310,7 +307,7 @@ pub fn shifts(press: &Press, pose: &Pose, taxels: &[Gain], forces_n: &[f64]) -> 
     shifts
 }
 
-pub fn judge(pose: &Pose, yields_mm_per_n: [f64; 2], shifts: &[Shift]) -> Judgement {
+pub fn judge(pose: &Pose, yields_mm_per_n: [f64; 2], shifts: &[Shift]) -> Verdict {
     let depth_mm = |shift: &Shift| shift.travel_mm - pose.touch_mm;
     let deepest_mm = shifts.iter().map(depth_mm).fold(0.0, f64::max);
     let seen: Vec<&Shift> =
@@ -321,7 +318,7 @@ pub fn judge(pose: &Pose, yields_mm_per_n: [f64; 2], shifts: &[Shift]) -> Judgem
     let moving = moves_mm_per_s[0].abs() > MOVES_MM_PER_S.max(SIGMAS * moves_mm_per_s[1]);
     let largest_n = shifts.iter().map(|shift| shift.force_n).fold(0.0, f64::max);
     let yields = yields_mm_per_n[0] > (YIELD_PART * deepest_mm / largest_n).max(SIGMAS * yields_mm_per_n[1]);
-    let verdict = if deepest_mm < LEAST_MM {
+    if deepest_mm < LEAST_MM {
         Verdict::TooLittle(deepest_mm)
     } else if least < LEAST_SHARE {
         Verdict::Lost(least.max(0.0))
@@ -333,8 +330,7 @@ pub fn judge(pose: &Pose, yields_mm_per_n: [f64; 2], shifts: &[Shift]) -> Judgem
         Verdict::NotFlat(pose.roundness)
     } else {
         Verdict::Good
-    };
-    Judgement { yields_mm_per_n, verdict }
+    }
 }
 
 /// Slope of the shift by time, beside one by the force, with its standard uncertainty.

@@ -3,8 +3,7 @@
 //! Each residual meets one pose, one stiffness and one gain, so the normal equations are summed row by row: some hundred
 //! unknowns and ten thousand residuals for three presses.
 
-use crate::gains::{Condition, Gain, Gains, NoGains, Posed};
-use crate::gains::{judge, shifts};
+use crate::gains::{Condition, Gain, Gains, NoGains, Posed, judge, shifts};
 use crate::model::{At, Pose, Share, Square, UNKNOWNS};
 use crate::press::{Array, Press, Step, first_pose, forces};
 use crate::robust::{HUBER, huber, huber_cost, median, spread};
@@ -432,7 +431,7 @@ impl<'a> Joint<'a> {
         let forces_n = forces(press, &pose, taxels);
         let yields = pose.yields_mm_per_n + press.radius_mm * change[yields_at];
         let sigma = covariance[(yields_at, yields_at)].sqrt() * press.radius_mm;
-        let judgement = judge(&pose, [yields, sigma], &shifts(press, &pose, taxels, &forces_n));
-        Posed { pose, forces_n, judgement }
+        let verdict = judge(&pose, [yields, sigma], &shifts(press, &pose, taxels, &forces_n));
+        Posed { pose, forces_n, yields_mm_per_n: [yields, sigma], verdict }
     }
 }

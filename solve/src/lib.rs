@@ -1,19 +1,9 @@
 //! The host's solver: Young's modulus, taxel gains, poses, scale, creep and temperature from recorded presses, and the drive
 //! from recorded strokes.
 //!
-//! The chip moves the tip and records; nothing is fitted there. [`record`] reads its bytes. On the host, in double precision:
-//!
-//! | function | gives |
-//! | --- | --- |
-//! | [`gains()`] | poses of the presses, gains of the taxels, dead and odd taxels, a judgement of each press |
-//! | [`modulus()`] | Young's modulus and contact point, with hysteresis, creep and relaxation of tip and ink |
-//! | [`scale()`] | scale of the array from forces on a kitchen scale |
-//! | [`creep()`] | the chip's creep term from a held force |
-//! | [`temperature()`] | temperature coefficient from a cold and a warm press |
-//! | [`strokes::solve`] | torque constant, time constant, inertia and friction from strokes in the air |
-//!
-//! Every number comes with its standard uncertainty, every refusal with the number behind it. `docs/solve.md` has the motion
-//! that the chip must make, why each method was chosen, and the accuracy on simulated fingers.
+//! The chip moves the tip and records; nothing is fitted there. [`record`] reads its bytes. Every number comes with its
+//! standard uncertainty, every refusal with the number behind it. `docs/solve.md` lists the calls, and has the motion that the
+//! chip must make, why each method was chosen, and the accuracy on simulated fingers.
 //!
 //! ```
 //! use solve::scale::Held;

@@ -72,18 +72,8 @@ pub struct Parts {
     pub memory: f64,
 }
 
-/// Reason why there is no modulus.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "their texts say it")]
-pub enum NoModulus {
-    #[error("{0}")]
-    Gains(#[from] NoGains),
-    #[error("force over travel of {0} presses does not follow the model")]
-    Fit(usize),
-}
-
 /// Young's modulus of presses of one tip.
-pub fn modulus(presses: &[Press]) -> Result<Modulus, NoModulus> {
+pub fn modulus(presses: &[Press]) -> Result<Modulus, NoGains> {
     let Settled { presses, gains, creep } = settle(presses)?;
     let mut found = Vec::new();
     for (index, mut one) in
@@ -92,7 +82,7 @@ pub fn modulus(presses: &[Press]) -> Result<Modulus, NoModulus> {
         one.memory.creep += creep;
         let posed = &gains.presses[index];
         // A yield that was solved for leaves its uncertainty; one that was not, half of its effect.
-        let [yields, sigma] = posed.judgement.yields_mm_per_n;
+        let [yields, sigma] = posed.yields_mm_per_n;
         let plate = if posed.pose.yields_mm_per_n.abs() > 1e-4 { 2.0 * sigma } else { yields.abs() };
         let depth_mm = presses[index].deepest_mm() - one.touch_mm;
         let force_n = posed.forces_n.iter().copied().fold(0.0, f64::max);
@@ -100,7 +90,7 @@ pub fn modulus(presses: &[Press]) -> Result<Modulus, NoModulus> {
         found.push(one);
     }
     if found.is_empty() {
-        return Err(NoModulus::Fit(presses.len()));
+        return Err(NoGains::Fit(presses.len()));
     }
     let weight = |one: &OfPress| (one.kpa / one.sigma_kpa).powi(2);
     let weights: f64 = found.iter().map(weight).sum();

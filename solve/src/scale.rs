@@ -12,7 +12,8 @@
 //! a single misread number hardly changes k.
 
 use crate::Value;
-use crate::modulus::{NoModulus, modulus};
+use crate::gains::NoGains;
+use crate::modulus::modulus;
 use crate::press::Press;
 use crate::robust::minimise;
 use nalgebra::DVector;
@@ -64,13 +65,6 @@ pub fn scale(held: &[Held]) -> Result<Value, NoScale> {
     Ok(factor)
 }
 
-/// Readings under a force that does not change: a weight, or a loop that holds a scale's number.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct HeldSeries {
-    /// Time from the begin of the hold, s, and force by the array's sum, N.
-    pub readings: Vec<[f64; 2]>,
-}
-
 /// Creep of an array.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Creep {
@@ -95,7 +89,7 @@ pub enum NoDrift {
     #[error("the presses differ by {0:.1} K; 3 K are needed")]
     Warming(f64),
     #[error("{0}")]
-    Press(#[from] NoModulus),
+    Press(#[from] NoGains),
     #[error("the fit has no solution")]
     Fit,
 }
@@ -103,12 +97,12 @@ pub enum NoDrift {
 /// Least time for which a weight must be recorded to solve creep, s.
 pub const CREEP_LEAST_S: f64 = 5.0;
 
-/// Creep by a hold.
+/// Creep by readings under a force that does not change: time from the begin of the hold, s, and force by the array's
+/// sum, N.
 ///
 /// The chip knows one term: under a force F the reading goes to F (1 + k) with a time constant tau (`src/control.rs`).
 /// Ink creeps with the logarithm of time instead, so k and tau are those that serve this hold best; `left` shows how well.
-pub fn creep(series: &HeldSeries) -> Result<Creep, NoDrift> {
-    let readings = &series.readings;
+pub fn creep(readings: &[[f64; 2]]) -> Result<Creep, NoDrift> {
     if readings.len() < 10 {
         return Err(NoDrift::Readings(readings.len()));
     }
@@ -159,7 +153,7 @@ pub fn temperature(cold: &Press, warm: &Press) -> Result<Temperature, NoDrift> {
     }
     let found = modulus(&[cold.clone(), warm.clone()])?;
     if let [(_, why), ..] = found.gains.left_out.as_slice() {
-        return Err(NoModulus::Gains(*why).into());
+        return Err((*why).into());
     }
     let [before, after] = found.presses.as_slice() else { return Err(NoDrift::Fit) };
     let ratio = after.kpa / before.kpa;

@@ -11,7 +11,7 @@ use fingertip::params::Params;
 use solve::gains::{Condition, NoGains, Verdict};
 use solve::press::{Branch, Press};
 use solve::record::{Ended, Reason};
-use solve::scale::{Held, HeldSeries, NoDrift};
+use solve::scale::{Held, NoDrift};
 use solve::strokes::NoDrive;
 use solve::{Value, creep, gains, scale, temperature};
 use std::f64::consts::TAU;
@@ -45,8 +45,8 @@ fn a_hold_shows_the_creep() {
         let ends_s = (1..=120).map(|n| 0.25 * f64::from(n)).collect();
         let press =
             finger.press(&[Part::Ramp { to_mm: 2.0, mm_per_s: 10.0, step_mm: 9.0 }, Part::Hold { ends_s }], 8.0);
-        let readings = press.steps[1..].iter().map(|step| [step.middle_s(), step.force_n(&press.array)]).collect();
-        let found = creep(&HeldSeries { readings }).expect("a hold");
+        let readings = press.steps[1..].iter().map(|step| [step.middle_s(), step.force_n(&press.array)]);
+        let found = creep(&readings.collect::<Vec<_>>()).expect("a hold");
         assert!(found.share.value > 0.005 * percent && found.left < 0.002 * percent, "{found:?}");
     }
 }
@@ -167,7 +167,7 @@ fn refusals_are_sentences_with_their_number() {
         touched,
         "the strokes were ended early: the array measured 0.051 N, more than allowed here: clear the tip's way, hold the plate fast"
     );
-    assert_eq!(creep(&HeldSeries::default()), Err(NoDrift::Readings(0)));
+    assert_eq!(creep(&[]), Err(NoDrift::Readings(0)));
     assert_eq!(scale(&[]).unwrap_err().to_string(), "the largest force is 0.000 N; 0.1 N is needed");
 }
 

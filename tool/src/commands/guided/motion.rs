@@ -15,7 +15,7 @@ use solve::gains::Condition;
 use solve::modulus::Modulus;
 use solve::press::Press;
 use solve::record::{self, Reason};
-use solve::scale::{Held, HeldSeries, SWINGS};
+use solve::scale::{Held, SWINGS};
 use std::time::{Duration, Instant};
 
 /// Time between two looks at the motion.
@@ -292,7 +292,7 @@ impl Procedure<'_> {
 
     /// Readings under a weight that a person lays on the tip, with torque off. A force that the loop holds would not do: the
     /// loop keeps the reading constant, and creep would be in the force.
-    pub fn weight(&mut self, seconds: f64) -> Result<HeldSeries, Error> {
+    pub fn weight(&mut self, seconds: f64) -> Result<Vec<[f64; 2]>, Error> {
         if !self.reuses(WEIGHT) {
             self.ready()?;
             let what = "lay a weight of 50 to 500 g on the tip within 60 s, and leave it there for";
@@ -321,7 +321,7 @@ impl Procedure<'_> {
             }
         }
         let pair = |pair: &Value| Some([pair[0].as_f64()?, pair[1].as_f64()?]);
-        Ok(HeldSeries { readings: self.session.numbers(WEIGHT).iter().filter_map(pair).collect() })
+        Ok(self.session.numbers(WEIGHT).iter().filter_map(pair).collect())
     }
 
     /// Waits for a force on the tip, with torque off. Returns false if it does not come in time.

@@ -155,16 +155,13 @@ impl Client {
     }
 
     pub fn ping_all(&mut self) -> Result<Vec<Pong>, Error> {
-        let heard = self.pass(&packet(BROADCAST, instruction::PING, &[]), None, usize::MAX)?;
-        let (mut receiver, mut found) = (Receiver::new(), Vec::new());
-        for byte in heard {
-            if receiver.push(byte) == Some(Event::Packet)
-                && let Packet { id, instruction: instruction::STATUS, params: &[_, low, high, firmware], .. } =
-                    receiver.packet()
-            {
-                found.push(Pong { id, model: u16::from_le_bytes([low, high]), firmware });
+        let mut found = Vec::new();
+        self.exchange(&packet(BROADCAST, instruction::PING, &[]), usize::MAX, |event, answer| {
+            if let (Event::Packet, &[_, low, high, firmware]) = (event, answer.params) {
+                found.push(Pong { id: answer.id, model: u16::from_le_bytes([low, high]), firmware });
             }
-        }
+            true
+        })?;
         Ok(found)
     }
 
@@ -226,16 +223,16 @@ impl Client {
     /// Sends a packet unchanged. Returns the bytes received until this number of status packets arrived, or until the
     /// time-out. Of a packet for one device, `from`, only answers of that device count.
     pub fn pass(&mut self, packet: &[u8], from: Option<u8>, answers: usize) -> Result<Vec<u8>, Error> {
-        self.exchange(packet, from, |_| true, answers)
+        self.exchange(packet, answers, |_, answer| from.is_none_or(|id| id == answer.id))
     }
 
-    /// The same; undamaged answers count only if their parameters fit.
+    /// Does the same with the answers that `counts`, which gets each status packet, whole or damaged, in turn. On a line that
+    /// echoes, the instruction comes back too.
     fn exchange(
         &mut self,
         packet: &[u8],
-        from: Option<u8>,
-        fits: impl Fn(&[u8]) -> bool,
         mut answers: usize,
+        mut counts: impl FnMut(Event, &Packet<'_>) -> bool,
     ) -> Result<Vec<u8>, Error> {
         self.transmit(packet)?;
         let all = answers == usize::MAX;
@@ -246,13 +243,15 @@ impl Client {
         {
             let bytes = self.receive(left)?;
             for byte in &bytes {
-                let event = receiver.push(*byte);
+                let event = receiver.push(*byte).filter(|event| *event != Event::Framing);
                 let packet = receiver.packet();
-                let awaited = packet.instruction == instruction::STATUS && from.is_none_or(|id| id == packet.id);
-                let bad = event == Some(Event::BadCrc) && awaited;
-                let good = event == Some(Event::Packet) && awaited && fits(packet.params);
-                damaged |= bad;
-                answers = answers.saturating_sub(usize::from(bad || good));
+                if let Some(event) = event
+                    && packet.instruction == instruction::STATUS
+                    && counts(event, &packet)
+                {
+                    damaged |= event == Event::BadCrc;
+                    answers = answers.saturating_sub(1);
+                }
             }
             heard.extend(bytes);
         }
@@ -268,40 +267,34 @@ impl Client {
     /// Sends an instruction and waits for its answer: the error and `length` bytes, or the error alone. An answer of another
     /// length is passed over: it is that to the last request of a program that was killed.
     fn ask(&mut self, doing: &str, instruction: u8, params: &[u8], length: usize) -> Result<Vec<u8>, Error> {
-        let (id, mut receiver, mut other_length) = (self.id, Receiver::new(), false);
-        let fits = |answer: &[u8]| matches!(answer, [error, data @ ..] if data.len() == length || error & !ALERT != 0);
-        let heard = self.exchange(&packet(id, instruction, params), Some(id), fits, 1)?;
-        let mut damaged = |what| {
-            // The right answer may come yet.
-            self.owed = true;
-            let cause = "is the line noisy, or are there two devices with this ID?";
-            Err(Error::Damaged(format!("{doing}: a damaged answer of ID {id} ({what}); {cause}")))
-        };
-        for byte in heard {
-            let event = receiver.push(byte);
-            let packet = receiver.packet();
-            // On a line that echoes, the instruction comes back too.
-            if packet.id != id || packet.instruction != instruction::STATUS {
-                continue;
-            }
-            let (number, data) = match (event, packet.params) {
-                (Some(Event::Packet), [error, data @ ..]) if fits(packet.params) => (error & !ALERT, data),
-                (Some(Event::Packet), _) => {
-                    other_length = true;
-                    continue;
+        let (id, mut answered, mut other_length) = (self.id, None, None);
+        self.exchange(&packet(id, instruction, params), 1, |event, answer| {
+            let answer = match (event, answer.params) {
+                _ if answer.id != id => return false,
+                (Event::Packet, [error, data @ ..]) if data.len() == length || error & !ALERT != 0 => {
+                    Ok((error & !ALERT, data.to_vec()))
                 }
-                (Some(Event::BadCrc), _) => return damaged("its check sum is wrong"),
-                _ => continue,
+                (Event::Packet, _) => {
+                    other_length = Some(Err("it has another length than what was asked for"));
+                    return false;
+                }
+                _ => Err("its check sum is wrong"),
             };
-            if number != 0 {
+            answered.get_or_insert(answer);
+            true
+        })?;
+        match answered.or(other_length) {
+            Some(Ok((0, data))) => return Ok(data),
+            Some(Ok((number, _))) => {
                 let meaning = table::meaning_of_error(number);
                 let text = format!("{doing}: refused by ID {id} with error {number}: {meaning}");
                 return Err(Error::Refused(text, number));
             }
-            return Ok(data.to_vec());
-        }
-        if other_length {
-            return damaged("it has another length than what was asked for");
+            Some(Err(what)) => {
+                let cause = "is the line noisy, or are there two devices with this ID?";
+                return Err(Error::Damaged(format!("{doing}: a damaged answer of ID {id} ({what}); {cause}")));
+            }
+            None => {}
         }
         let (port, baud, waited_ms) = (&self.port, self.baud, self.timeout.as_millis());
         // A ping is answered at every level.

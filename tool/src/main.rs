@@ -139,7 +139,7 @@ fn run(cli: &Cli) -> Result<(), Error> {
         Command::Share(args) => share::run(args, &cli.reach, cli.json),
         Command::View(args) => view::run(args, &mut connect()?),
         Command::Stream(args) => stream::run(args, &mut connect()?),
-        Command::Record(args) => record::run(args, record::format(args)?, &mut connect()?, cli.json),
+        Command::Record(args) => record::run(args, args.mcap()?, &mut connect()?, cli.json),
         Command::Capture(args) => args.check().and_then(|()| capture::run(args, &mut connect()?, cli.json)),
         Command::Replay(args) => capture::replay_all(args, cli.json),
         Command::Params(command) => params::run(command, &mut connect()?, cli.json),

@@ -5,7 +5,6 @@ use crate::recordings::{About, Topic, device, in_words, write_options};
 use crate::state::{RESTARTED, SHAPE, Stamp, Stamps, State};
 use crate::whole::Part;
 use crate::{Client, Error, numbers};
-use clap::ValueEnum;
 use mcap::Writer;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
@@ -32,7 +31,7 @@ const BUFFER: usize = 1 << 20;
     fingertip record --pressures --seconds 60 grip.mcap    (opens in Foxglove)\n  \
     fingertip record --seconds 1 - | head")]
 pub struct Args {
-    /// The file, `.csv` or `.mcap`; `-` is the standard output, as CSV without --format
+    /// The file, `.csv` or `.mcap`; `-` is the standard output, as CSV
     file: PathBuf,
     /// Duration; without it, until Ctrl-C
     #[arg(long, value_parser = numbers::seconds)]
@@ -46,17 +45,22 @@ pub struct Args {
     /// Write over a file that is there
     #[arg(long)]
     force: bool,
-    /// Format, if not by the end of the file's name
-    #[arg(long, value_enum)]
-    format: Option<Format>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Format {
-    /// A row for each state.
-    Csv,
-    /// A message for each state.
-    Mcap,
+impl Args {
+    /// True for MCAP, by the end of the file's name.
+    pub fn mcap(&self) -> Result<bool, Error> {
+        let file = &self.file;
+        match file.extension().and_then(|extension| extension.to_str()) {
+            Some("mcap") => Ok(true),
+            Some("csv") => Ok(false),
+            _ if file.as_os_str() == "-" => Ok(false),
+            _ => Err(Error::NotUnderstood(format!(
+                "{}: a name that ends with .csv or .mcap is asked for",
+                file.display()
+            ))),
+        }
+    }
 }
 
 /// Takes states in turn.
@@ -69,20 +73,20 @@ trait Sink {
 }
 
 /// Records until the time is over, Ctrl-C, or the line is lost; what was recorded by then is whole.
-pub fn run(args: &Args, format: Format, client: &mut Client, json: bool) -> Result<(), Error> {
+pub fn run(args: &Args, mcap: bool, client: &mut Client, json: bool) -> Result<(), Error> {
     let interrupt = Interrupt::catch()?;
     let whole = args.file.as_os_str() != "-";
     let part = whole.then(|| Part::begin(&args.file, args.force)).transpose()?;
     let file = |why: io::Error| Error::file("write", &args.file, why);
     let device = device(client)?;
     let to = part.as_ref().map(Part::file).transpose().map_err(file)?;
-    let mut sink: Box<dyn Sink> = match format {
-        Format::Csv => {
+    let mut sink: Box<dyn Sink> = match to {
+        Some(to) if mcap => Box::new(Mcap::new(to, client.id, device, args.pressures).map_err(in_words).map_err(file)?),
+        to => {
             let to: Box<dyn Write> = to.map_or_else(|| Box::new(io::stdout()) as _, |file| Box::new(file) as _);
             let to = BufWriter::with_capacity(BUFFER, to);
             Box::new(Csv::new(to, args.pressures).map_err(file)?)
         }
-        Format::Mcap => Box::new(Mcap::new(to, client.id, device, args.pressures).map_err(in_words).map_err(file)?),
     };
     let begun = Instant::now();
     let taken = take(args, client, &interrupt, &mut *sink);
@@ -172,21 +176,6 @@ fn take(args: &Args, client: &mut Client, interrupt: &Interrupt, sink: &mut dyn 
     Ok((counts, None))
 }
 
-/// The format: the one requested, else that of the file's name.
-pub fn format(args: &Args) -> Result<Format, Error> {
-    let file = &args.file;
-    match (args.format, file.extension().and_then(|extension| extension.to_str())) {
-        (Some(format), _) => Ok(format),
-        (None, Some("csv")) => Ok(Format::Csv),
-        _ if file.as_os_str() == "-" => Ok(Format::Csv),
-        (None, Some("mcap")) => Ok(Format::Mcap),
-        _ => {
-            let why = "a name that ends with .csv or .mcap is asked for, or --format";
-            Err(Error::NotUnderstood(format!("{}: {why}", file.display())))
-        }
-    }
-}
-
 // A row for each state: numbers only, so there is nothing to quote.
 
 struct Csv(BufWriter<Box<dyn Write>>);
@@ -229,24 +218,18 @@ struct Mcap {
     sequence: u32,
 }
 
-/// Chunks on their way to a file, or to standard output without one. In a file the end of an MCAP file without a summary
-/// follows each chunk, by the same call of the system, and the next chunk takes its place: a program that is killed leaves
-/// a file that every reader opens.
+/// Chunks on their way to a file. The end of an MCAP file without a summary follows each chunk, by the same call of the
+/// system, and the next chunk takes its place: a program that is killed leaves a file that every reader opens.
 struct Chunks {
-    file: Option<File>,
+    file: File,
     buffer: Vec<u8>,
 }
 
 impl Chunks {
     fn hand_on(&mut self, end: &[u8]) -> io::Result<()> {
-        if let Some(file) = &mut self.file {
-            self.buffer.extend(end);
-            file.write_all(&self.buffer)?;
-            file.seek_relative(-(end.len() as i64))?;
-        } else {
-            io::stdout().write_all(&self.buffer)?;
-            io::stdout().flush()?;
-        }
+        self.buffer.extend(end);
+        self.file.write_all(&self.buffer)?;
+        self.file.seek_relative(-(end.len() as i64))?;
         self.buffer.clear();
         Ok(())
     }
@@ -266,8 +249,7 @@ impl Write for Chunks {
 }
 
 impl Mcap {
-    /// Into a file, or to standard output.
-    fn new(file: Option<File>, id: u8, device: About, pressures: bool) -> mcap::McapResult<Self> {
+    fn new(file: File, id: u8, device: About, pressures: bool) -> mcap::McapResult<Self> {
         let to = NoSeek::new(Chunks { file, buffer: Vec::new() });
         let mut out = write_options().disable_seeking(true).create(to)?;
         let metadata = Metadata { name: "fingertip.device".into(), metadata: device };
@@ -299,7 +281,8 @@ impl Sink for Mcap {
         let mut chunks = self.out.into_inner().into_inner();
         chunks.hand_on(&[])?;
         // The library may have flushed behind the summary.
-        chunks.file.map_or(Ok(()), |mut file| file.stream_position().and_then(|end| file.set_len(end)))
+        let end = chunks.file.stream_position()?;
+        chunks.file.set_len(end)
     }
 }
 
@@ -312,7 +295,7 @@ mod tests {
     fn a_file_is_whole_after_every_flush() {
         let path = std::env::temp_dir().join(format!("fingertip-flushed-{}.mcap", std::process::id()));
         let file = File::create(&path).expect("a file");
-        let mut sink = Box::new(Mcap::new(Some(file), 1, About::new(), true).expect("it can be written"));
+        let mut sink = Box::new(Mcap::new(file, 1, About::new(), true).expect("it can be written"));
         let read = || {
             let bytes = std::fs::read(&path).expect("it is there");
             let messages = MessageStream::new(&bytes).expect("MCAP").map(|message| message.expect("whole").sequence);

@@ -258,7 +258,8 @@ fn only_files_are_written_in_place_and_by_one_at_a_time() {
         assert!(fs::metadata(&pipe).expect("it is there").file_type().is_fifo());
     }
     // The folder is refused before anything is recorded, so nothing is lost.
-    finger.refuses(&["record", "--seconds", "0", "--format", "csv", &finger.file("")], &["it is no file"]);
+    fs::create_dir(finger.file("folder.csv")).expect("a folder");
+    finger.refuses(&["record", "--seconds", "0", &finger.file("folder.csv")], &["it is no file"]);
 
     let other = Served::begin("wall");
     let file = finger.file("both.csv");

@@ -78,6 +78,11 @@ fn say_json(value: &Value) {
     }
 }
 
+/// Says an answer, for scripts or for people.
+fn answer(json: bool, value: &Value, text: impl std::fmt::Display) {
+    if json { say_json(value) } else { say(text) }
+}
+
 /// Runs a command for each of these IDs, or for all fingertips, also after an error of one. Before that, all of them get the
 /// values `first`, in one packet each, which no absent ID delays. Several answers in JSON are one array.
 pub fn each(

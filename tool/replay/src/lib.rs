@@ -31,32 +31,16 @@ pub struct Replayed<const ROWS: usize, const COLUMNS: usize> {
 pub struct Difference {
     /// The frame, from 0.
     pub frame: u32,
-    pub field: Field,
+    /// `duty` (Q15), `mode`, `fault`, or `digest`: that of the whole status.
+    pub field: &'static str,
     pub captured: i64,
     pub replayed: i64,
-}
-
-/// Outputs of a step that a capture keeps.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Field {
-    /// The duty, Q15.
-    Duty,
-    Mode,
-    Fault,
-    /// The digest of the whole status.
-    Digest,
-}
-
-impl Field {
-    pub const fn name(self) -> &'static str {
-        ["duty", "mode", "fault", "digest"][self as usize]
-    }
 }
 
 impl std::fmt::Display for Difference {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { frame, field, captured, replayed } = self;
-        write!(f, "differs first at frame {frame}: {} captured {captured}, replayed {replayed}", field.name())
+        write!(f, "differs first at frame {frame}: {field} captured {captured}, replayed {replayed}")
     }
 }
 
@@ -82,10 +66,10 @@ pub fn replay<const ROWS: usize, const COLUMNS: usize>(
         let (duty, status) = pipeline.step(&taken.frame, &taken.sense, &taken.command);
         running = digest_step(running, duty, status);
         let fields = [
-            (Field::Duty, i64::from(taken.duty.0), i64::from(duty.0)),
-            (Field::Mode, taken.mode.into(), status.mode as i64),
-            (Field::Fault, taken.fault.into(), status.fault.map_or(0, |fault| fault as i64)),
-            (Field::Digest, taken.digest.into(), short_digest(running).into()),
+            ("duty", i64::from(taken.duty.0), i64::from(duty.0)),
+            ("mode", taken.mode.into(), status.mode as i64),
+            ("fault", taken.fault.into(), status.fault.map_or(0, |fault| fault as i64)),
+            ("digest", taken.digest.into(), short_digest(running).into()),
         ];
         let first = fields.into_iter().find(|(_, captured, replayed)| captured != replayed);
         difference =
@@ -96,7 +80,7 @@ pub fn replay<const ROWS: usize, const COLUMNS: usize>(
     if running != head.digest && difference.is_none() {
         let frame = head.frames.saturating_sub(1);
         let [captured, replayed] = [head.digest, running].map(i64::from);
-        difference = Some(Difference { frame, field: Field::Digest, captured, replayed });
+        difference = Some(Difference { frame, field: "digest", captured, replayed });
     }
     Ok(Replayed { head, difference })
 }

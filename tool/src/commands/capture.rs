@@ -1,7 +1,7 @@
 //! `fingertip capture`, and `fingertip replay` of what it wrote.
 
 use super::stop::{Moving, no_tare};
-use super::{Interrupt, TOUCHED, no_fault_nor_motion, press, report, say, say_json, stopped, wait_for};
+use super::{Interrupt, TOUCHED, answer, no_fault_nor_motion, press, report, say, say_json, stopped, wait_for};
 use crate::recordings::{self, About, ENDED, device};
 use crate::state::unix_ns;
 use crate::whole::Part;
@@ -102,15 +102,13 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     let (frames, seconds) =
         (replayed.head.frames, f64::from(replayed.head.frames) * f64::from(replayed.head.frame_ns) * 1e-9);
     let difference = replayed.difference.map(|difference| difference.to_string());
-    if json {
-        say_json(&json!({
-            "file": args.out, "frames": frames, "seconds": seconds, "bytes": bytes.len(), "ended": ended,
-            "replays": difference.is_none(), "difference": difference, "touched": touched,
-        }));
-    } else {
-        let replays = difference.as_ref().map_or("replays here to the bit".to_owned(), |at| format!("here it {at}"));
-        say(format_args!("{frames} frames, {seconds:.4} s, {} bytes; ended: {ended}; {replays}", bytes.len()));
-    }
+    let value = json!({
+        "file": args.out, "frames": frames, "seconds": seconds, "bytes": bytes.len(), "ended": ended,
+        "replays": difference.is_none(), "difference": difference, "touched": touched,
+    });
+    let replays = difference.as_ref().map_or("replays here to the bit".to_owned(), |at| format!("here it {at}"));
+    let text = format_args!("{frames} frames, {seconds:.4} s, {} bytes; ended: {ended}; {replays}", bytes.len());
+    answer(json, &value, text);
     // The file is what shows it, so it is kept.
     match difference {
         None if touched => Err(TOUCHED.into()),
@@ -293,9 +291,9 @@ fn replay(file: &Path) -> (Value, String, bool) {
         Ok(replayed) => {
             let frames = replayed.head.frames;
             let at = replayed.difference;
-            let difference = at.map(|at| {
-                json!({ "frame": at.frame, "field": at.field.name(), "captured": at.captured, "replayed": at.replayed })
-            });
+            let difference = at.map(
+                |at| json!({ "frame": at.frame, "field": at.field, "captured": at.captured, "replayed": at.replayed }),
+            );
             let text = at.map_or("the same to the bit".into(), |at| at.to_string());
             let verdict = json!({ "file": file, "firmware": firmware, "frames": frames, "difference": difference });
             (verdict, format!("{frames} frames, {text}"), at.is_none())

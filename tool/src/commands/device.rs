@@ -1,6 +1,6 @@
 //! Commands that only look: `fingertip scan`, `info` and `latency`.
 
-use super::{Interrupt, aside, say, say_json};
+use super::{Interrupt, answer, aside, say, say_json};
 use crate::client::{BAUD_MIN, Pong, Reach};
 use crate::state::{SHAPE, State};
 use crate::{Client, Error, client, numbers, table};
@@ -166,18 +166,15 @@ pub fn latency(args: &Latency, client: &mut Client, json: bool) -> Result<(), Er
     let at = |percent: usize| took.get(took.len() * percent / 100).copied().unwrap_or_default();
     let ms = |time: Duration| time.as_secs_f64() * 1e3;
     let (median_ms, most_ms, longest_ms) = (ms(at(50)), ms(at(99)), ms(took.last().copied().unwrap_or_default()));
-    if json {
-        say_json(&json!({
-            "reads": took.len(), "unanswered": unanswered, "reads_per_s": per_s, "return_delay_us": delay_us,
-            "median_ms": median_ms, "percentile_99_ms": most_ms, "longest_ms": longest_ms,
-        }));
-    } else {
-        say(format_args!(
-            "{} reads of {STATE_LENGTH} bytes, {per_s:.0} a second; an answer takes {median_ms:.2} ms in the middle, \
-             {most_ms:.2} ms at 99 %, {longest_ms:.2} ms at most ({delay_us} us of it return delay); \
-             {unanswered} unanswered",
-            took.len()
-        ));
-    }
+    let reads = took.len();
+    let value = json!({
+        "reads": reads, "unanswered": unanswered, "reads_per_s": per_s, "return_delay_us": delay_us,
+        "median_ms": median_ms, "percentile_99_ms": most_ms, "longest_ms": longest_ms,
+    });
+    let text = format_args!(
+        "{reads} reads of {STATE_LENGTH} bytes, {per_s:.0} a second; an answer takes {median_ms:.2} ms in the middle, \
+         {most_ms:.2} ms at 99 %, {longest_ms:.2} ms at most ({delay_us} us of it return delay); {unanswered} unanswered"
+    );
+    answer(json, &value, text);
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! Commands at whose end the finger is at rest: [`Moving`] guards those that move it; `fingertip stop`, `recover` and `tare`
 //! begin or end there.
 
-use super::{Interrupt, TOUCHED, aside, no_fault, no_fault_nor_motion, say, say_json, wait_for};
+use super::{Interrupt, TOUCHED, answer, aside, no_fault, no_fault_nor_motion, say, say_json, wait_for};
 use crate::client::Reach;
 use crate::state::{Clock, State};
 use crate::{Client, Error, numbers, table};
@@ -241,7 +241,7 @@ pub fn recover(client: &mut Client, json: bool) -> Result<(), Error> {
         let words = table::meaning(address::FAULT, left);
         return Err(format!("fault {left} ({words}) is back: what causes it is still there").into());
     }
-    let untared = client.number(address::LIMITS)? as u16 & fingertip::state::Limits::NOT_TARED != 0;
+    let untared = client.number(address::LIMITS)? as u16 & Limits::NOT_TARED != 0;
     let on = client.number(address::TORQUE_ENABLE)? != 0;
     if json {
         say_json(&json!({
@@ -294,12 +294,8 @@ pub fn tare(args: &Tare, client: &mut Client, json: bool) -> Result<(), Error> {
     }
     let request = if args.force { TARE_FORCED } else { TARE };
     let Tared { touched, least, most } = measure_tare(request, Duration::from_secs_f64(args.within_s), client)?;
-    if json {
-        let id = client.id;
-        say_json(&json!({ "id": id, "tared": true, "touched": touched, "least_codes": least, "most_codes": most }));
-    } else {
-        say(format_args!("tared: zeros of {least} to {most} codes"));
-    }
+    let value = json!({ "id": client.id, "tared": true, "touched": touched, "least_codes": least, "most_codes": most });
+    answer(json, &value, format_args!("tared: zeros of {least} to {most} codes"));
     if !touched {
         return Ok(());
     }

@@ -19,7 +19,7 @@ const GOALS_N: [f64; 3] = [1.0, 2.5, 4.0];
 const NO_CHIP_MC: i64 = -273_150;
 const NO_CHIP: &str = "the controller does not measure its temperature: leave --warm out";
 /// End of the name of a press after the controller became warmer, behind the name of the press at the same place.
-const WARM: &str = "-warm.fts";
+const WARM: &str = "-warm";
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
@@ -84,7 +84,7 @@ impl Calibrate {
             let [shown, goals] = [shown.len(), goals.len()];
             return Err(Error::NotUnderstood(format!("--shown-n has {shown} numbers for {goals} forces of --scale-n")));
         }
-        let Params { contact_on_mn, force_max_mn, .. } = session.before.params;
+        let Params { contact_on_mn, force_max_mn, .. } = session.before.params();
         let [least, most] = [contact_on_mn, force_max_mn].map(i64::from);
         if let Some(goal) = goals.iter().find(|goal| !(least..=most).contains(*goal)) {
             return Err(format!("{goal} mN cannot be held: give --scale-n forces of {least} to {most} mN").into());
@@ -155,7 +155,7 @@ fn scale(args: &Calibrate, goals_mn: &[i64], modulus: &Modulus, procedure: &mut 
     let left = held.iter().map(|one| (factor * one.read_n / one.shown_n - 1.0).abs()).fold(0.0, f64::max);
     let parts = modulus.parts;
     let of_modulus = parts.residuals.hypot(parts.presses).hypot(parts.memory).hypot(part);
-    let codes = f64::from(before.params.codes_per_kpa_milli) / factor;
+    let codes = f64::from(before.params().codes_per_kpa_milli) / factor;
     procedure.session.done(HOLDS, holds.into())?;
     let found = &mut procedure.found;
     found.row("modulus_pa", 1e3 * modulus.kpa * factor, Some(1e3 * modulus.kpa * factor * of_modulus));
@@ -185,18 +185,18 @@ fn creep(seconds: f64, args: &Calibrate, procedure: &mut Procedure<'_>) -> Resul
 /// Names of two presses at the same place, cold and warm, for a session that has these records. A place whose warm press is
 /// still to be made is that of the last press: finger and plate are there.
 fn pair(names: &[&str]) -> (String, String) {
-    let warm = names.iter().find_map(|name| name.strip_suffix(WARM)).map(|cold| format!("{cold}.fts"));
+    let warm = names.iter().find_map(|name| name.strip_suffix(WARM)).map(str::to_owned);
     let last = || (1..).map(press_name).take_while(|name| names.contains(&name.as_str())).last();
     let cold = warm.or_else(last).unwrap_or_else(|| press_name(1));
-    let warm = cold.replace(".fts", WARM);
+    let warm = format!("{cold}{WARM}");
     (cold, warm)
 }
 
 fn temperature(args: &Calibrate, procedure: &mut Procedure<'_>) -> Result<(), Error> {
-    let names: Vec<&str> = procedure.session.records.keys().map(String::as_str).collect();
+    let names: Vec<&str> = procedure.session.steps.keys().map(String::as_str).collect();
     let (cold, warm) = pair(&names);
     let cold = procedure.pressed(&cold)?;
-    if !procedure.session.records.contains_key(&warm) {
+    if !procedure.session.steps.contains_key(&warm) {
         let chip_c = cold.steps.iter().find_map(|step| step.chip_c);
         let chip_c = chip_c.ok_or(NO_CHIP)?;
         procedure.warm(chip_c + 5.0, Duration::from_secs_f64(args.warm_within_s))?;
@@ -244,7 +244,7 @@ pub fn identify(args: &Identify, client: &mut Client, json: bool) -> Result<(), 
 const OHMMETER: f64 = 0.01;
 /// Steps of the session.
 const JOG: &str = "jog";
-const STROKES: &str = "strokes.fts";
+const STROKES: &str = "strokes";
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
@@ -279,8 +279,8 @@ pub fn commission(args: &Commission, client: &mut Client, json: bool) -> Result<
         procedure.tare()?;
         procedure.run.report("strokes: 1 mm to both sides, some 10 s");
         let bytes = procedure.motion(Task::Strokes)?;
-        solve::record::strokes(&bytes, &procedure.session.before.params).map_err(|why| why.to_string())?;
-        procedure.session.recorded(STROKES, bytes)?;
+        solve::record::strokes(&bytes, &procedure.session.before.params()).map_err(|why| why.to_string())?;
+        procedure.session.recorded(STROKES, &bytes)?;
     }
     solve_strokes(args, &mut procedure)?;
     procedure.finish()
@@ -312,8 +312,8 @@ fn direction(args: &Commission, procedure: &mut Procedure<'_>) -> Result<bool, E
 
 fn solve_strokes(args: &Commission, procedure: &mut Procedure<'_>) -> Result<(), Error> {
     let (session, found) = (&mut procedure.session, &mut procedure.found);
-    let bytes = session.records.get(STROKES).map(Vec::as_slice).unwrap_or_default();
-    let mut record = solve::record::strokes(bytes, &session.before.params).map_err(|why| why.to_string())?;
+    let mut record = solve::record::strokes(&session.record(STROKES)?, &session.before.params())
+        .map_err(|why| format!("{STROKES}: {why}"))?;
     found.row(DIRECTION, 1.0, None);
     if let Some(ohm) = args.resistance_ohm {
         record.resistance = Value { value: ohm, sigma: OHMMETER * ohm };
@@ -346,8 +346,8 @@ mod tests {
     #[test]
     fn a_warm_press_is_compared_with_the_cold_one_at_its_place() {
         let [first, second] = [1, 2].map(press_name);
-        let warm = "press-1-warm.fts";
+        let warm = "press-1-warm";
         assert_eq!(pair(&[warm, &first, &second]), (first.clone(), warm.into()));
-        assert_eq!(pair(&[&first, &second]), (second, "press-2-warm.fts".into()));
+        assert_eq!(pair(&[&first, &second]), (second, "press-2-warm".into()));
     }
 }

@@ -3,16 +3,16 @@
 
 pub(super) mod motion;
 
-use super::{Interrupt, aside, params, report, say};
+use super::params::{self, Stored};
+use super::{Interrupt, aside, report, say};
 use crate::{Client, Error, numbers, table, whole};
-use fingertip::params::Params;
+use base64::prelude::{BASE64_STANDARD, Engine as _};
 use fingertip::pressure::GAIN_ONE;
 use fingertip::shipped::address;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::{Errno, read};
 use rustix::termios::{QueueSelector, tcflush};
 use serde_json::{Map, Value, json};
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
@@ -160,66 +160,20 @@ pub fn yes_or_no(text: &str) -> Result<bool, String> {
     }
 }
 
-// A session: parameters and gains before it, and the steps that are done. With a folder it outlives the program.
-//
-// | file | content |
-// | --- | --- |
-// | `session.json` | command, device, parameters and gains before, and the steps by name |
-// | `press-1.fts`, `strokes.fts` | a motion's record, byte for byte as the controller delivered it |
-//
-// A file is written beside its place and renamed once it is whole. A record is listed in `session.json` after it was
-// written: a kill between the two repeats the motion.
+// A session: parameters and gains before it, and the steps that are done. With a folder it outlives the program:
+// `session.json` has command, device, parameters and gains before, and the steps by name. The record of a motion is such a
+// step, byte for byte as the controller delivered it, in base64.
 
-const VERSION: u64 = 4;
-
-/// Parameters and gains of the controller at one time.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Settings {
-    pub params: Params,
-    /// Gains in 1/16384, row by row.
-    pub gains: Vec<Vec<u16>>,
-}
-
-impl Settings {
-    fn read(client: &mut Client) -> Result<Self, Error> {
-        let stored = client.again(params::Stored::read)?;
-        Ok(Self { params: stored.params(), gains: stored.gains })
-    }
-
-    fn named(&self) -> impl Iterator<Item = (&'static str, i32)> {
-        Params::RANGES.into_iter().map(|(name, ..)| name).zip(self.params.to_array())
-    }
-
-    fn get(&self, name: &str) -> Option<i32> {
-        self.named().find_map(|(known, value)| (known == name).then_some(value))
-    }
-
-    fn json(&self) -> Value {
-        json!({ "params": params::named(&self.params), "gains": self.gains })
-    }
-
-    fn of(value: &Value) -> Option<Self> {
-        let mut values = [0; Params::COUNT];
-        for (value_, (name, ..)) in values.iter_mut().zip(Params::RANGES) {
-            *value_ = value["params"][name].as_i64()?.try_into().ok()?;
-        }
-        let row = |row: &Value| -> Option<Vec<u16>> {
-            row.as_array()?.iter().map(|gain| gain.as_u64()?.try_into().ok()).collect()
-        };
-        let gains = value["gains"].as_array()?.iter().map(row).collect::<Option<_>>()?;
-        Some(Self { params: Params::from_array(&values), gains })
-    }
-}
+const VERSION: u64 = 5;
 
 pub(super) struct Session {
     folder: Option<PathBuf>,
     command: &'static str,
     id: u8,
     chip_id: i64,
-    /// Settings with which all records were made.
-    pub before: Settings,
+    /// Parameters and gains with which all records were made.
+    pub before: Stored,
     pub steps: Map<String, Value>,
-    pub records: BTreeMap<String, Vec<u8>>,
 }
 
 impl Session {
@@ -230,9 +184,8 @@ impl Session {
             command,
             id: client.id,
             chip_id: client.number(address::CHIP_ID)?,
-            before: Settings::read(client)?,
+            before: Stored::settings(client)?,
             steps: Map::new(),
-            records: BTreeMap::new(),
         };
         let Some(folder) = folder else { return Ok(session) };
         fs::create_dir_all(folder).map_err(|why| Error::file("make the folder", folder, why))?;
@@ -258,13 +211,8 @@ impl Session {
         if *before != now {
             return Err(not_one(&format!("a session of the finger with chip_id {before}; this one has {now}")));
         }
-        session.before = Settings::of(&value["before"]).ok_or_else(|| not_one("the settings before are damaged"))?;
+        session.before = Stored::of(&value["before"]).ok_or_else(|| not_one("the settings before are damaged"))?;
         session.steps = value["steps"].as_object().cloned().ok_or_else(|| not_one("the steps are damaged"))?;
-        for name in session.steps.keys().filter(|name| name.ends_with(".fts")) {
-            let file = folder.join(name);
-            let bytes = fs::read(&file).map_err(|why| Error::file("read", &file, why))?;
-            session.records.insert(name.clone(), bytes);
-        }
         Ok(session)
     }
 
@@ -278,19 +226,19 @@ impl Session {
         self.keep()
     }
 
-    pub fn recorded(&mut self, name: &str, bytes: Vec<u8>) -> Result<(), Error> {
-        if let Some(folder) = &self.folder {
-            whole::write(&folder.join(name), true, &bytes)?;
-        }
-        let length = bytes.len();
-        self.records.insert(name.into(), bytes);
-        self.done(name, json!({ "bytes": length }))
+    pub fn recorded(&mut self, name: &str, bytes: &[u8]) -> Result<(), Error> {
+        self.done(name, BASE64_STANDARD.encode(bytes).into())
+    }
+
+    /// Bytes of a record; none of a step that is not done.
+    pub fn record(&self, name: &str) -> Result<Vec<u8>, Error> {
+        let text = self.steps.get(name).and_then(Value::as_str).unwrap_or_default();
+        BASE64_STANDARD.decode(text).map_err(|why| format!("the session's record {name} is damaged: {why}").into())
     }
 
     /// Forgets steps that begin with this, so that the next run repeats them.
     pub fn forget(&mut self, begin: &str) -> Result<(), Error> {
         self.steps.retain(|name, _| !name.starts_with(begin));
-        self.records.retain(|name, _| !name.starts_with(begin));
         self.keep()
     }
 
@@ -356,20 +304,21 @@ const WRITTEN: &str = "written";
 impl Session {
     /// Names of parameters, and `gains`, that have neither the value before the session nor, with `written`, one that the
     /// session sent.
-    fn changed(&self, now: &Settings, written: bool) -> Vec<&'static str> {
+    fn changed(&self, now: &Stored, written: bool) -> Vec<String> {
         let written = if written { self.numbers(WRITTEN) } else { &[] };
-        let sent: Vec<Settings> = written.iter().filter_map(Settings::of).chain([self.before.clone()]).collect();
+        let sent: Vec<Stored> = written.iter().filter_map(Stored::of).chain([self.before.clone()]).collect();
+        let names = now.values.iter().map(|(register, value)| (table::name(register), *value));
         let differs =
-            |(name, value): &(&str, i32)| *name != DIRECTION && sent.iter().all(|sent| sent.get(name) != Some(*value));
-        let gains = sent.iter().all(|sent| sent.gains != now.gains);
-        now.named().filter(differs).map(|(name, _)| name).chain(gains.then_some("gains")).collect()
+            |(name, value): &(String, i64)| name != DIRECTION && sent.iter().all(|sent| sent.get(name) != Some(*value));
+        let gains = sent.iter().all(|sent| sent.gains != now.gains).then(|| "gains".into());
+        names.filter(differs).map(|(name, _)| name).chain(gains).collect()
     }
 }
 
 impl Procedure<'_> {
     /// Reads parameters and gains. Fails if one is neither as before the session nor as the session sent it.
-    fn settings(&mut self) -> Result<Settings, Error> {
-        let now = Settings::read(self.client)?;
+    fn settings(&mut self) -> Result<Stored, Error> {
+        let now = Stored::settings(self.client)?;
         let names = self.session.changed(&now, true).join(", ");
         if names.is_empty() {
             return Ok(now);
@@ -424,20 +373,24 @@ impl Procedure<'_> {
     }
 
     /// Settings before the session with what it found: nothing else that an earlier run of it wrote is left.
-    fn after(&self, now: &Settings) -> Settings {
-        let row = |name| self.found.rows.iter().find(|row| row.name == name);
-        let direction = now.params.direction_confirmed;
-        let before = Params { direction_confirmed: direction, ..self.session.before.params };
-        let mut values = before.to_array();
-        for (value, (name, ..)) in values.iter_mut().zip(Params::RANGES) {
-            *value = row(name).map_or(*value, |row| row.after.round() as i32);
+    fn after(&self, now: &Stored) -> Stored {
+        let mut after = self.session.before.clone();
+        for (register, value) in &mut after.values {
+            let name = table::name(register);
+            if let Some(row) = self.found.rows.iter().find(|row| row.name == name) {
+                *value = row.after.round() as i64;
+            } else if name == DIRECTION {
+                *value = now.get(DIRECTION).unwrap_or(*value);
+            }
         }
-        let gains = self.found.gains.as_ref().map_or(&self.session.before.gains, |gains| &gains.after);
-        Settings { params: Params::from_array(&values), gains: gains.clone() }
+        if let Some(gains) = &self.found.gains {
+            after.gains.clone_from(&gains.after);
+        }
+        after
     }
 
     /// Writes gains and parameters, all of them or none; tares if new gains need that, and saves.
-    fn write(&mut self, after: &Settings, is_set: bool) -> Result<(), Error> {
+    fn write(&mut self, after: &Stored, is_set: bool) -> Result<(), Error> {
         if !is_set {
             // The controller may have restarted while the question waited.
             self.settings()?;
@@ -447,9 +400,9 @@ impl Procedure<'_> {
         }
         // Only commissioning confirms the direction.
         let confirms = self.found.rows.iter().any(|row| row.name == DIRECTION);
-        let values = after.named().filter(|(name, _)| confirms || *name != DIRECTION);
-        let values = values.map(|(name, value)| Ok((table::find(name)?, value.into())));
-        let values: Vec<params::Value> = values.collect::<Result<_, String>>()?;
+        let values =
+            after.values.iter().copied().filter(|(register, _)| confirms || table::name(register) != DIRECTION);
+        let values: Vec<params::Value> = values.collect();
         let meant = params::set(&values, Some(after.gains.clone()), self.client)?.meant;
         if !is_set {
             self.run.report("written; `fingertip params save` or --save keeps them over a reset");

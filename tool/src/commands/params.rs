@@ -1,6 +1,6 @@
 //! `fingertip params`: what outlives a reset. A backup of it is TOML, a line each with its meaning.
 
-use super::{Interrupt, aside, say, say_json};
+use super::{Interrupt, answer, aside, say, say_json};
 use crate::state::RESTARTED;
 use crate::table::{self, name};
 use crate::{Client, Error, whole};
@@ -91,7 +91,8 @@ pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Err
             let stored = Stored::read(client)?;
             write_backup(file, *force, client, &stored)?;
             let count = stored.values.len();
-            told(json, &stored.values, &format!("{count} parameters and the taxels' gains in {}", file.display()));
+            let text = format_args!("{count} parameters and the taxels' gains in {}", file.display());
+            answer(json, &as_json(&stored.values), text);
             Ok(())
         }
         Command::Restore { file, save } => {
@@ -141,7 +142,7 @@ fn conclude(set: &Set, save_too: bool, client: &mut Client, json: bool) -> Resul
     let lines: Vec<String> = lines.chain(gains).collect();
     let now: Vec<Value> = changed().map(|(_, to)| *to).collect();
     let what = if lines.is_empty() { "nothing differs: nothing was changed".into() } else { lines.join("\n") };
-    told(json, &now, &what);
+    answer(json, &as_json(&now), what);
     if save_too {
         set.interrupt.check()?;
         save(&set.meant, client, json)?;
@@ -248,10 +249,6 @@ fn as_json(values: &[Value]) -> serde_json::Value {
     json!(values.iter().map(|(register, value)| (name(register), json!(value))).collect::<Map<_, _>>())
 }
 
-fn told(json: bool, values: &[Value], text: &str) {
-    if json { say_json(&as_json(values)) } else { say(text) }
-}
-
 // Sets what is stored, all of it or nothing.
 //
 // The gains have a packet, and the parameters another one: the controller takes each whole or not at all. The few other
@@ -260,13 +257,36 @@ fn told(json: bool, values: &[Value], text: &str) {
 /// Registers and gains that a save keeps over a reset.
 #[derive(Clone, PartialEq)]
 pub(super) struct Stored {
-    values: Vec<Value>,
+    pub values: Vec<Value>,
+    /// Gains in 1/16384, row by row.
     pub gains: Vec<Vec<u16>>,
 }
 
 impl Stored {
     pub fn read(client: &mut Client) -> Result<Self, Error> {
         Ok(Self { values: read_all(client)?, gains: read_gains(client)? })
+    }
+
+    /// Parameters and gains alone: registers beside the parameters have nothing to do with what is measured.
+    pub fn settings(client: &mut Client) -> Result<Self, Error> {
+        let mut stored = client.again(Self::read)?;
+        stored.values.retain(|(register, _)| is_param(register));
+        Ok(stored)
+    }
+
+    /// Inverse of [`Stored::json`]; none if a parameter is missing or of another type.
+    pub fn of(value: &serde_json::Value) -> Option<Self> {
+        let one = |register| Some((register, value["params"][name(register)].as_i64()?));
+        let values = table::stored().filter(|register| is_param(register)).map(one).collect::<Option<_>>()?;
+        Some(Self { values, gains: serde_json::from_value(value["gains"].clone()).ok()? })
+    }
+
+    pub fn json(&self) -> serde_json::Value {
+        json!({ "params": as_json(&self.values), "gains": self.gains })
+    }
+
+    pub fn get(&self, wanted: &str) -> Option<i64> {
+        self.values.iter().find_map(|(register, value)| (name(register) == wanted).then_some(*value))
     }
 
     /// Fails if the controller has something else.

@@ -137,6 +137,17 @@ pub(super) fn begin(goal_mn: i64, client: &mut Client) -> Result<(), Error> {
     Err(format!("{why}: the parameter force_max_mn is {most_mn}").into())
 }
 
+/// Fails in a fault, and where the finger has another goal.
+pub(super) fn has_goal(goal_mn: i64, state: &State) -> Result<(), Error> {
+    if state.fault != 0 {
+        return Err(stopped(state.fault));
+    }
+    if state.goal_mn != goal_mn {
+        return Err(format!("another program stopped the finger or set another goal: {} mN", state.goal_mn).into());
+    }
+    Ok(())
+}
+
 fn press(args: &Args, client: &mut Client, json: bool, clear: &str, interrupt: &Interrupt) -> Result<Held, Error> {
     let (every, end) = if clear.is_empty() { (SAY, "\n") } else { (REWRITE, "") };
     let goal_mn = args.goal_mn;
@@ -148,12 +159,7 @@ fn press(args: &Args, client: &mut Client, json: bool, clear: &str, interrupt: &
     loop {
         let state = client.again(State::read)?;
         let time_s = clock.time_s(&state).ok_or(RESTARTED)?;
-        if state.fault != 0 {
-            return Err(stopped(state.fault));
-        }
-        if state.goal_mn != goal_mn {
-            return Err(format!("another program stopped the finger or set another goal: {} mN", state.goal_mn).into());
-        }
+        has_goal(goal_mn, &state)?;
         let force_mn = state.force_mn;
         let near = state.mode == Mode::Force as i64 && ((force_mn - goal_mn) as f64).abs() <= tolerance_mn(args);
         near_s = if near { near_s.or(Some(time_s)) } else { None };

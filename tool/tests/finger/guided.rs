@@ -83,21 +83,28 @@ fn a_program_commissions_and_calibrates_a_finger() {
     finger.refuses(&commission, &["a session of the command \"calibrate\""]);
 }
 
+/// A record of a session, in base64.
+fn step(session: &str, name: &str) -> String {
+    let session: Value = serde_json::from_str(session).expect("JSON");
+    session["steps"][name].as_str().expect("it was kept").to_owned()
+}
+
 #[test]
 fn a_killed_session_resumes_where_it_was() {
     let finger = Served::patient("wall");
-    let (session, record) = (finger.file("killed"), finger.file("killed/press-1.fts"));
+    let session = finger.file("killed");
+    let file = finger.file("killed/session.json");
     let calibrate = [&QUICK[..], &["--presses", "2", "--no-scale", "--session", &session]].concat();
     let before = parameters(&finger);
-    let listed = || fs::read_to_string(finger.file("killed/session.json")).is_ok_and(|text| text.contains("press-1"));
+    let kept = || fs::read_to_string(&file).unwrap_or_default();
     let mut child = finger.start(&[&calibrate[..], &["--json"]].concat());
-    Served::wait_for(listed);
+    Served::wait_for(|| kept().contains("press-1"));
     Served::kill(&mut child);
     finger.done(&["stop"]);
     finger.done(&["recover"]);
-    let bytes = fs::read(&record).expect("it was kept");
+    let first = step(&kept(), "press-1");
     let resumed = finger.json(&calibrate);
-    assert_eq!(fs::read(&record).expect("it is there"), bytes, "the first press was not repeated");
+    assert_eq!(step(&kept(), "press-1"), first, "the first press was not repeated");
     assert_eq!(finger.json(&calibrate), resumed, "the same records give the same numbers");
     assert_eq!((&resumed["applied"], parameters(&finger)), (&false.into(), before), "{resumed}");
     assert!(near(&resumed["after"]["modulus_pa"], 250_000.0, 0.05), "{resumed}");
@@ -119,8 +126,8 @@ fn a_killed_session_resumes_where_it_was() {
     let weighed = finger.json(&creep);
     assert_eq!((&weighed["after"]["creep_permille"], &weighed["refused"]), (&0.into(), &json!([])), "{weighed}");
     // A damaged record is not solved.
-    fs::write(&record, &bytes[..bytes.len() - 4]).expect("a file");
-    finger.refuses(&calibrate, &["press-1.fts: the series has"]);
+    fs::write(&file, kept().replace(&first, &first[..first.len() - 8])).expect("a file");
+    finger.refuses(&calibrate, &["press-1: the series has"]);
 }
 
 #[test]
@@ -365,11 +372,11 @@ fn a_jog_that_is_repeated_repeats_the_strokes() {
     let finger = Served::patient("wall");
     let session = finger.file("drive");
     let commission = ["commission", "--forward", "yes", "--within-s", "3600", "--session", &session];
-    let strokes = || fs::read(finger.file("drive/strokes.fts")).expect("it was kept");
+    let strokes = || step(&fs::read_to_string(finger.file("drive/session.json")).expect("it was kept"), "strokes");
     finger.json(&commission);
     let first = strokes();
     let (_, _, said) = output(&finger, &commission);
-    assert!(said.contains("step jog: it is reused") && said.contains("step strokes.fts: it is reused"), "{said}");
+    assert!(said.contains("step jog: it is reused") && said.contains("step strokes: it is reused"), "{said}");
     finger.done(&["params", "set", "direction_confirmed=0"]);
     finger.json(&commission);
     assert!(strokes() != first, "another finger, by all that is known");

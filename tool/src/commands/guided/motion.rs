@@ -2,7 +2,7 @@
 
 use super::{GainRows, Presses, Procedure, Run};
 use crate::commands::stop::{Moving, TARE, measure_tare};
-use crate::commands::{TOUCHED, capture, no_fault, no_fault_nor_motion, press, stopped, wait_for};
+use crate::commands::{TOUCHED, capture, no_fault, no_fault_nor_motion, press, wait_for};
 use crate::state::{RESTARTED, State};
 use crate::{Client, Error, numbers, table};
 use fingertip::capture::CaptureState;
@@ -42,7 +42,7 @@ fn ended_early(task: Task, number: i64, value: i64) -> Error {
 
 /// Name of a press in the session, from 1 on.
 pub fn press_name(number: u32) -> String {
-    format!("press-{number}.fts")
+    format!("press-{number}")
 }
 
 impl Procedure<'_> {
@@ -157,13 +157,13 @@ impl Procedure<'_> {
         self.run.report("press: takes about 10 s");
         let bytes = self.motion(Task::Press)?;
         // Damaged bytes are no step that is done.
-        record::press(&bytes, &self.session.before.params).map_err(|why| why.to_string())?;
-        self.session.recorded(name, bytes)
+        record::press(&bytes, &self.session.before.params()).map_err(|why| why.to_string())?;
+        self.session.recorded(name, &bytes)
     }
 
     pub fn pressed(&self, name: &str) -> Result<Press, Error> {
-        let bytes = self.session.records.get(name).ok_or_else(|| format!("the session has no {name}"))?;
-        Ok(record::press(bytes, &self.session.before.params).map_err(|why| format!("{name}: {why}"))?)
+        let bytes = self.session.record(name)?;
+        Ok(record::press(&bytes, &self.session.before.params()).map_err(|why| format!("{name}: {why}"))?)
     }
 
     /// Solves all presses together, and reports those that do not count, and taxels that are dead or odd. Returns
@@ -195,11 +195,12 @@ impl Procedure<'_> {
     pub fn find_gains(&mut self, modulus: &Modulus) {
         let (before, found) = (&self.session.before, &mut self.found);
         let (mut after, mut sigma) = (before.gains.clone(), Vec::new());
+        let curve_permille = before.params().curve_permille;
         let [least, most] = [f64::from(GAIN_ONE) / 2.0, f64::from(GAIN_MAX)];
         let taxels = modulus.gains.taxels.chunks(modulus.gains.columns);
         for (row, (gains, taxels)) in after.iter_mut().zip(taxels).enumerate() {
             let one = |(column, (gain, taxel)): (usize, (&mut u16, &solve::gains::Gain))| {
-                let wanted = (f64::from(*gain) * taxel.factor(before.params.curve_permille)).round();
+                let wanted = (f64::from(*gain) * taxel.factor(curve_permille)).round();
                 if taxel.condition != Condition::Sound {
                     return None;
                 }
@@ -425,16 +426,10 @@ fn reach(goal_mn: i64, run: &Run<'_>, client: &mut Client) -> Result<(), Error> 
     }
 }
 
-/// The state. Fails in a fault, and where another program stopped the finger. Reading it also feeds the bus watchdog.
+/// The state. Fails in a fault, and where the finger has another goal. Reading it also feeds the bus watchdog.
 fn same_goal(goal_mn: i64, client: &mut Client) -> Result<State, Error> {
     let state = client.again(State::read)?;
-    if state.fault != 0 {
-        return Err(stopped(state.fault));
-    }
-    if state.goal_mn != goal_mn {
-        return Err("another program stopped the finger while the force was held".into());
-    }
-    Ok(state)
+    press::has_goal(goal_mn, &state).map(|()| state)
 }
 
 #[cfg(test)]

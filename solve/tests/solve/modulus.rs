@@ -4,13 +4,13 @@ use crate::*;
 use solve::modulus;
 use solve::modulus::Modulus;
 
-/// Errors and uncertainties in percent, of tips that are drawn by these seeds.
-fn errors(seeds: Range<u64>, count: usize, plan: &[Part]) -> Vec<[f64; 2]> {
-    let solved = seeds.map(|seed| {
-        let draw = Draw::any(seed, [0.0, 10.0], [0, 2]);
-        solved(&draw, &presses(&draw, count, plan)).1
+/// Errors of tips that are drawn by these seeds, with gains that spread by up to this, and pressed in this way.
+fn errors(name: &str, seeds: Range<u64>, percent: f64, press: impl Fn(&Draw) -> Vec<Press>) -> [f64; 4] {
+    let errors = seeds.map(|seed| {
+        let draw = Draw::any(seed, [0.0, percent], [0, 2]);
+        solved(&draw, &press(&draw)).1
     });
-    solved.collect()
+    summary(name, &errors.collect::<Vec<_>>())
 }
 
 /// Modulus of a tip, with its error and uncertainty in percent.
@@ -34,14 +34,16 @@ fn summary(name: &str, errors: &[[f64; 2]]) -> [f64; 4] {
 sim::sizes!(three_presses_give_a_better_one, better(200..202), better(200..203));
 
 fn better(seeds: Range<u64>) {
-    let [median, worst, sigma, within] = summary("three presses", &errors(seeds, 3, &plan()));
+    let three = |draw: &Draw| presses(draw, 3, &plan());
+    let [median, worst, sigma, within] = errors("three presses", seeds, 10.0, three);
     assert!(median < 1.0 && worst < 4.0 && within >= 2.0 && sigma < 1.4, "{median} {worst} {within} {sigma}");
 }
 
 /// A record that ends at the deepest place, as one that filled the memory, shows less than both strokes.
 #[test]
 fn the_forward_stroke_alone_is_solved_too() {
-    let [median, worst, .., within] = summary("in alone", &errors(300..303, 1, &cycle(5.0, 3.0)[..2]));
+    let forward = |draw: &Draw| presses(draw, 1, &cycle(5.0, 3.0)[..2]);
+    let [median, worst, .., within] = errors("in alone", 300..303, 10.0, forward);
     assert!(median < 6.0 && within >= 2.0, "{median} {worst} {within}");
 }
 
@@ -82,14 +84,12 @@ fn an_array_of_any_shape_gives_the_modulus() {
 /// A contact that reaches over the array's edge is measured by what lies on the array.
 #[test]
 fn an_edge_does_not_refuse_a_press() {
-    let errors = (0..3).map(|seed| {
-        let draw = Draw::any(400 + seed, [0.0, 3.0], [0, 2]);
-        let mut finger = Finger::new(&draw);
+    let [_, worst, ..] = errors("over the edge", 400..403, 3.0, |draw| {
+        let mut finger = Finger::new(draw);
         finger.go(&Place { centre_mm: [4.5, -2.0], tilt_deg: [1.0, 1.0] });
         finger.tare();
-        solved(&draw, &[finger.press(&plan(), 8.0)]).1
+        vec![finger.press(&plan(), 8.0)]
     });
-    let [_, worst, ..] = summary("over the edge", &errors.collect::<Vec<_>>());
     assert!(worst < 4.0, "{worst}");
 }
 
@@ -97,13 +97,11 @@ fn an_edge_does_not_refuse_a_press() {
 #[test]
 fn a_wrong_radius_hardly_matters() {
     for share in [0.98, 1.02] {
-        let errors = (0..2).map(|seed| {
-            let draw = Draw::any(500 + seed, [0.0, 3.0], [0, 2]);
-            let mut presses = presses(&draw, 1, &plan());
+        let [_, worst, .., within] = errors("radius", 500..502, 3.0, |draw| {
+            let mut presses = presses(draw, 1, &plan());
             presses[0].radius_mm *= share;
-            solved(&draw, &presses).1
+            presses
         });
-        let [_, worst, .., within] = summary("radius", &errors.collect::<Vec<_>>());
         assert!(worst < 3.0 && within >= 2.0, "{worst} {within}");
     }
 }

@@ -78,6 +78,8 @@ fn an_answer_to_a_killed_program_is_taken_by_none() {
         };
         assert!(matches!(asked, Err(Error::Silent(_))));
         drop(killed);
+        // Two packets in one read would count as one.
+        Served::wait_for(|| finger.command("held") == "1");
         let next = finger.start(&["info"]);
         Served::wait_for(|| finger.command("held") == "2");
         finger.command("go on");
@@ -139,8 +141,7 @@ fn numbers_that_are_none_are_not_understood() {
     ] {
         for wrong in options.split('|') {
             let arguments: Vec<&str> = command.split(' ').chain(wrong.split(' ')).collect();
-            let said = Served::not_understood(&arguments);
-            assert!(!said.contains("panicked") && said.contains("for '"), "{arguments:?}: {said}");
+            Served::not_understood(&arguments, "for '");
         }
     }
 }
@@ -240,7 +241,7 @@ fn an_address_that_another_has_is_refused() {
 fn recover_says_torque_is_off_only_where_it_is() {
     let finger = Served::begin("wall");
     finger.done(&["tare"]);
-    finger.set(&[(fingertip::shipped::address::TORQUE_ENABLE, 1)]);
+    finger.set(&[(address::TORQUE_ENABLE, 1)]);
     let said = finger.done(&["recover"]);
     assert!(said.starts_with("there was nothing to recover from; torque is on"), "{said}");
     assert!(said.contains("`fingertip stop`"), "{said}");

@@ -110,19 +110,9 @@ fn a_killed_session_resumes_where_it_was() {
     assert!(near(&resumed["after"]["modulus_pa"], 250_000.0, 0.05), "{resumed}");
     // A weight that lies on the tip: the object comes to it, and goes.
     let creep = [&calibrate[..], &["--creep-s", "6"]].concat();
-    let mut child = spawned(&finger, &creep, Stdio::null());
-    let mut asked = 0;
-    for line in BufReader::new(child.stderr.take().expect("a pipe")).lines() {
-        let line = line.expect("text");
-        for (words, place) in [("lay a weight", "move -0.5"), ("take the weight off", "move 5")] {
-            if line.contains(words) {
-                finger.command(place);
-                asked += 1;
-            }
-        }
-    }
-    child.wait().expect("it ends");
-    assert_eq!(asked, 2);
+    let [lay, take] = [["lay a weight", "move -0.5", ""], ["take the weight off", "move 5", ""]];
+    let (_, said) = asked(&finger, &creep, "", &[lay, take, ["write these values", "look", "no\n"]]);
+    assert!(said.contains(lay[0]) && said.contains(take[0]), "{said}");
     let weighed = finger.json(&creep);
     assert_eq!((&weighed["after"]["creep_permille"], &weighed["refused"]), (&0.into(), &json!([])), "{weighed}");
     // A damaged record is not solved.
@@ -270,19 +260,19 @@ fn a_program_is_asked_nothing() {
     }
 }
 
-/// Writes `first` to a command, and at `question` does `meanwhile`, then writes `answer`. Exit code and errors.
-fn asked(finger: &Served, arguments: &[&str], talk: [&str; 3], meanwhile: &str) -> (Option<i32>, String) {
-    let [first, question, answer] = talk;
+/// Writes `first` to a command. At each question does the command of the finger, then writes the answer. Exit code and errors.
+fn asked(finger: &Served, arguments: &[&str], first: &str, questions: &[[&str; 3]]) -> (Option<i32>, String) {
     let mut child = spawned(finger, arguments, Stdio::piped());
     let mut input = child.stdin.take().expect("a pipe");
     input.write_all(first.as_bytes()).expect("it reads");
     let mut said = String::new();
     for line in BufReader::new(child.stderr.take().expect("a pipe")).lines() {
-        said += &(line.expect("text") + "\n");
-        if said.lines().last().is_some_and(|line| line.contains(question)) {
+        let line = line.expect("text");
+        for [_, meanwhile, answer] in questions.iter().filter(|[question, ..]| line.contains(question)) {
             finger.command(meanwhile);
             input.write_all(answer.as_bytes()).expect("it reads");
         }
+        said += &(line + "\n");
     }
     (child.wait().expect("it ends").code(), said)
 }
@@ -299,7 +289,7 @@ fn a_session_moves_and_writes_only_under_its_first_settings() {
         (press.to_vec(), ["\n", "write these values", "yes\n"]),
     ] {
         finger.done(&["params", "set", "tip_radius_um=9600"]);
-        let (code, said) = asked(&finger, &arguments, talk, &reboot);
+        let (code, said) = asked(&finger, &arguments, talk[0], &[[talk[1], &reboot, talk[2]]]);
         assert!(code == Some(1) && said.contains("tip_radius_um changed since this session began"), "{talk:?}: {said}");
         assert_eq!(parameters(&finger), before, "{talk:?}");
     }

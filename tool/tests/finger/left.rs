@@ -5,15 +5,14 @@ use crate::shared::{Asker, Shared, sync_write};
 use fingertip::link::packet::instruction;
 use fingertip::shipped::address;
 use fingertip::state::Mode;
-use fingertip_cli::Client;
 use fingertip_cli::client::packet;
 use std::io::Read as _;
 use std::time::Duration;
 
 /// Reads the mode until it is off, with at most this number of packets.
-fn reads_until_off(finger: &Served, reader: &mut Client, packets: u64) {
+fn reads_until_off(finger: &Served, reader: &mut Asker, packets: u64) {
     let begun = finger.heard();
-    while !matches!(reader.number(address::PRESENT_MODE), Ok(mode) if mode == Mode::Off as i64) {
+    while !matches!(reader.once.number(address::PRESENT_MODE), Ok(mode) if mode == Mode::Off as i64) {
         assert!(finger.heard() - begun < packets, "{}", finger.command("look"));
     }
 }
@@ -72,7 +71,7 @@ fn a_finger_of_a_group_is_stopped_once_its_commander_has_left() {
     drop(commander);
     shared.until_released();
     let mut client = shared.client();
-    client.id = 2;
+    client.once.id = 2;
     assert_eq!(client.number(address::TORQUE_ENABLE).expect("it answers"), 1, "nobody commanded it");
 }
 
@@ -86,20 +85,20 @@ fn the_other_fingers_of_a_stopped_commander_are_stopped_once_it_has_left() {
     let shared = Shared::of(finger);
     let (mut first, mut second) = (shared.client(), shared.client());
     for id in [1, 2] {
-        first.id = id;
+        first.once.id = id;
         first.set(address::TORQUE_ENABLE, 1).expect("it obeys");
     }
     first.set(address::BUS_WATCHDOG, 50).expect("it obeys");
     sync_write(&mut second, address::GOAL_FORCE_MN, 4, &[1, 0, 0, 0, 0]);
     second.number(address::TORQUE_ENABLE).expect("it answers");
     first.set(address::GOAL_FORCE_MN, 500).expect_err("it was stopped");
-    first.id = 1;
+    first.once.id = 1;
     let begun_s = shared.finger.now_s();
     while shared.finger.now_s() < begun_s + 3.0 {
         sync_write(&mut first, 0, 0, &[]);
         first.ping().expect("it answers");
     }
-    second.id = 2;
+    second.once.id = 2;
     assert_eq!(second.number(address::TORQUE_ENABLE).expect("it answers"), 1, "{}", shared.finger.command("look"));
     drop(first);
     shared.soon(|| second.number(address::TORQUE_ENABLE).expect("it answers") == 0);
@@ -127,7 +126,7 @@ fn absent_fingers_of_who_left_keep_nobody_from_the_bus() {
     let goals: Vec<u8> = (1..60).flat_map(|id| [id, 1, 0, 0, 0]).collect();
     sync_write(&mut first, address::GOAL_FORCE_MN, 4, &goals);
     first.ping().expect("it answers");
-    press.timeout = Duration::from_millis(5_500);
+    press.once.timeout = Duration::from_millis(5_500);
     for (register, value) in [(address::TORQUE_ENABLE, 0), (address::TORQUE_ENABLE, 1), (address::GOAL_FORCE_MN, 1_000)]
     {
         press.set(register, value).expect("it obeys");
@@ -210,8 +209,9 @@ fn stopped(ways: &[(&str, bool)]) {
             let later = [(instruction::REG_WRITE, &[low, high, 25][..]), (instruction::ACTION, &[])];
             // Both again where an answer was lost: an action without its write is refused.
             let answers = std::iter::repeat_with(|| {
-                later
-                    .map(|(number, params)| commander.pass(&packet(1, number, params), Some(1), 1).expect("it listens"))
+                later.map(|(number, params)| {
+                    commander.once.pass(&packet(1, number, params), Some(1), 1).expect("it listens")
+                })
             });
             let mut answered = answers.skip_while(|answers| answers.iter().any(Vec::is_empty));
             assert_eq!(answered.next().expect("an answer comes").map(|answer| answer[8]), [0; 2]);
@@ -252,7 +252,7 @@ fn the_end_names_the_fingers_that_it_could_not_stop() {
     let shared = tared(Served::patient("grasp"), 1..=2);
     let mut commander = shared.client();
     for id in [1, 2] {
-        commander.id = id;
+        commander.once.id = id;
         commander.set(address::TORQUE_ENABLE, 1).expect("it obeys");
     }
     shared.finger.command(&format!("deaf after 0 for {}", u64::MAX));

@@ -4,14 +4,15 @@ mod failed;
 mod guided;
 mod left;
 mod recorded;
-#[path = "../served/mod.rs"]
 mod served;
 mod shared;
 mod stopped;
+#[cfg(feature = "foxglove")]
+mod streamed;
 
 use fingertip::params::Params;
 use fingertip::shipped::address;
-use served::Served;
+use served::{Served, fails, program};
 use std::collections::BTreeMap;
 use std::fs;
 
@@ -47,15 +48,13 @@ fn who_is_not_there_is_told() {
     Served::interrupt(&first);
     assert!(first.wait().expect("it ends").success());
     finger.done(&["info"]);
-    let why = Served::nobody(&["info"]);
-    assert!(why.contains("--port") && why.contains("FINGERTIP_PORT"), "{why}");
+    fails(&program(&["info"]).output().expect("it starts"), &["--port", "FINGERTIP_PORT"]);
 }
 
 #[test]
 fn several_ids_are_asked_one_after_the_other() {
     let finger = Served::begin("grasp");
-    let why = Served::not_understood(&["--id", "1,2", "press", "1"]);
-    assert!(why.contains("takes one --id"), "{why}");
+    Served::not_understood(&["--id", "1,2", "press", "1"], "takes one --id");
     let infos = || finger.json(&["--id", "all", "--timeout-ms", "1000", "info"]).as_array().expect("a list").clone();
     let why = finger.refused(&["--id", "9,2", "--timeout-ms", "1000", "tare"]);
     assert!(why.contains("ID 9: ping: no answer") && !why.contains("ID 2"), "{why}");
@@ -96,9 +95,7 @@ fn it_tares_presses_and_lets_go() {
     let heard = finger.heard();
     finger.refuses(&["press", "0.001"], &["1 mN are less than the finger can hold: contact_on_mn is 40"]);
     assert!(finger.heard() - heard < 10, "nothing moves");
-    let why = finger.refused(&["press", "9"]);
-    assert!(why.contains("goal_force_mn to 9000") && why.contains("error 6"), "{why}");
-    assert!(why.contains("force_max_mn is 7000"), "{why}");
+    finger.refuses(&["press", "9"], &["goal_force_mn to 9000", "error 6", "force_max_mn is 7000"]);
     finger.command("remove");
     let press = finger.start(&["press", "1", "--within-s", "0.5", "--json"]).wait_with_output().expect("it ends");
     let (code, why) = served::ended(&press);
@@ -165,8 +162,7 @@ fn parameters_are_set_all_or_none_and_saved() {
         (&["tip_radius_um=9000", "modulus_pa=soft"], "`soft` is no whole number"),
         (&["tip_radius_um"], "NAME=VALUE is asked for"),
     ] {
-        let said = Served::not_understood(&[&["params", "set"], values].concat());
-        assert!(said.contains(why), "{said}");
+        Served::not_understood(&[&["params", "set"], values].concat(), why);
     }
     assert_eq!(get(&["tip_radius_um"]), serde_json::json!({ "tip_radius_um": 10_000 }));
     // `contact_on_mn=10` alone is refused; with a lower `contact_off_mn` in the same packet it is accepted.
@@ -238,7 +234,7 @@ fn a_backup_is_restored_whole() {
         let now = finger.json(&["params", "get", "modulus_pa", "fit_level"]);
         assert_eq!(now, serde_json::json!({ "modulus_pa": 300_000, "fit_level": 4 }));
     }
-    assert!(finger.refused(&["params", "restore", "/nowhere.toml"]).contains("/nowhere.toml"));
+    finger.refuses(&["params", "restore", "/nowhere.toml"], &["/nowhere.toml"]);
 }
 
 #[test]
@@ -252,7 +248,7 @@ fn answers_are_measured() {
 #[test]
 fn a_view_needs_a_terminal_and_shells_get_completions() {
     let finger = Served::begin("wall");
-    assert!(finger.refused(&["view"]).contains("`fingertip record`"));
+    finger.refuses(&["view"], &["`fingertip record`"]);
     let words = finger.done(&["completions", "bash"]);
     assert!(words.contains("complete -F _fingertip") && words.contains("backup"), "no completions");
 }

@@ -64,8 +64,8 @@ fn states_are_recorded_with_the_controllers_times() {
     assert_eq!(messages[0].channel.topic, "/finger0/scalars");
     assert_eq!(messages[0].channel.schema.as_ref().map(|schema| schema.name.as_str()), Some("fingertip.Scalars"));
     assert_eq!(messages[1].channel.schema.as_ref().map(|schema| schema.name.as_str()), Some("foxglove.RawImage"));
-    assert!(Served::not_understood(&["record", "force.txt"]).contains(".csv or .mcap"));
-    assert!(finger.refused(&["record", "/nowhere/force.csv"]).contains("cannot write /nowhere/force.csv"));
+    Served::not_understood(&["record", "force.txt"], ".csv or .mcap");
+    finger.refuses(&["record", "/nowhere/force.csv"], &["cannot write /nowhere/force.csv"]);
 }
 
 #[test]
@@ -251,7 +251,7 @@ fn a_press_from_a_tip_that_touches_is_told_and_ends() {
 #[test]
 fn what_cannot_be_captured_is_told() {
     let finger = Served::begin("wall");
-    assert!(Served::not_understood(&["capture", "--out", "press.csv"]).contains(".mcap"));
+    Served::not_understood(&["capture", "--out", "press.csv"], ".mcap");
     let file = finger.file("press.mcap");
     finger.done(&["params", "set", "direction_confirmed=0"]);
     finger.refuses(&["capture", "--press", "0.5", "--out", &file], &["`fingertip commission`"]);

@@ -9,7 +9,6 @@ use fingertip_cli::client::{Pong, packet};
 use fingertip_cli::{Client, Error};
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
-use std::ops::{Deref, DerefMut};
 use std::process::{Child, Output, Stdio};
 use std::time::Duration;
 
@@ -27,14 +26,15 @@ pub struct Shared {
 
 /// A client of a broker. What the broker took for lost it asks again: on a busy machine the answer came too late.
 pub struct Asker {
-    client: Client,
+    /// The client that asks once.
+    pub once: Client,
     again: bool,
 }
 
 impl Asker {
     fn ask<T>(&mut self, ask: impl Fn(&mut Client) -> Result<T, Error>) -> Result<T, Error> {
         loop {
-            match ask(&mut self.client) {
+            match ask(&mut self.once) {
                 Err(Error::Silent(_)) if self.again => {}
                 other => return other,
             }
@@ -58,20 +58,6 @@ impl Asker {
     }
 }
 
-impl Deref for Asker {
-    type Target = Client;
-
-    fn deref(&self) -> &Client {
-        &self.client
-    }
-}
-
-impl DerefMut for Asker {
-    fn deref_mut(&mut self) -> &mut Client {
-        &mut self.client
-    }
-}
-
 /// Starts a broker; it and its address, once it listens. The address is in a line of JSON.
 fn broker(finger: &Served, listen: &str, timeout: &str) -> (Child, String) {
     let mut broker = finger.start(&["share", "--listen", listen, "--timeout-ms", timeout, "--json"]);
@@ -82,9 +68,9 @@ fn broker(finger: &Served, listen: &str, timeout: &str) -> (Child, String) {
 }
 
 /// Writes `length` bytes of several devices: `values` has each ID and its bytes. No device answers.
-pub fn sync_write(client: &mut Client, register: u16, length: u8, values: &[u8]) {
+pub fn sync_write(client: &mut Asker, register: u16, length: u8, values: &[u8]) {
     let params = [&register.to_le_bytes()[..], &[length, 0], values].concat();
-    client.pass(&packet(BROADCAST, instruction::SYNC_WRITE, &params), None, 0).expect("it listens");
+    client.once.pass(&packet(BROADCAST, instruction::SYNC_WRITE, &params), None, 0).expect("it listens");
 }
 
 impl Shared {
@@ -104,11 +90,11 @@ impl Shared {
     }
 
     pub fn client(&self) -> Asker {
-        let mut client = client(&format!("tcp:{}", self.address));
+        let mut once = client(&format!("tcp:{}", self.address));
         if let Some(lost) = self.lost {
-            client.timeout = 2 * lost;
+            once.timeout = 2 * lost;
         }
-        Asker { client, again: self.lost.is_some() }
+        Asker { once, again: self.lost.is_some() }
     }
 
     fn start(&self, arguments: &[&str]) -> Child {
@@ -167,9 +153,9 @@ fn a_press_is_watched_and_no_answer_reaches_another_client() {
     let readers = words.map(|(register, length)| {
         let mut client = shared.client();
         std::thread::spawn(move || {
-            let first = client.read(register, length).expect("it answers");
+            let first = client.once.read(register, length).expect("it answers");
             for _ in 0..200 {
-                assert_eq!(client.read(register, length).expect("it answers"), first);
+                assert_eq!(client.once.read(register, length).expect("it answers"), first);
             }
         })
     });
@@ -218,7 +204,7 @@ fn a_press_that_measures_is_stopped_by_every_stop() {
     let [low, high] = address::TORQUE_ENABLE.to_le_bytes();
     let bulk = packet(BROADCAST, instruction::BULK_WRITE, &[1, low, high, 1, 0, 0, 9, low, high, 1, 0, 0]);
     first.set(address::BUS_WATCHDOG, 0).expect("it obeys");
-    second.pass(&bulk, None, 0).expect("anyone stops");
+    second.once.pass(&bulk, None, 0).expect("anyone stops");
     assert_eq!(second.number(address::TORQUE_ENABLE).expect("it answers"), 0);
     second.set(address::TORQUE_ENABLE, 1).expect("it commands now");
     second.set(address::MEASURE, 3).expect("it obeys");
@@ -237,7 +223,7 @@ fn clients_that_send_junk_or_read_nothing_block_nobody() {
     let shared = Shared::begin("wall");
     let connect = || TcpStream::connect(&shared.address).expect("it listens");
     let mut client = shared.client();
-    client.timeout = Duration::from_secs(60);
+    client.once.timeout = Duration::from_secs(60);
     client.set(address::TARE, 1).expect("it obeys");
     let mut random = fastrand::Rng::with_seed(7);
     let mut half = connect();
@@ -264,8 +250,8 @@ fn clients_that_send_junk_or_read_nothing_block_nobody() {
         assert_eq!(client.ping().expect("it answers").id, 1);
     }
     client.set(address::TARE, 1).expect("it obeys");
-    client.timeout = Duration::from_secs(5);
-    assert_eq!(client.ping_all().expect("it answers").len(), 1);
+    client.once.timeout = Duration::from_secs(5);
+    assert_eq!(client.once.ping_all().expect("it answers").len(), 1);
 }
 
 /// The stopped program turns torque off, too. It wrote by broadcast.
@@ -273,7 +259,7 @@ fn clients_that_send_junk_or_read_nothing_block_nobody() {
 fn a_stop_takes_the_command_except_to_clean_up_or_of_another_finger() {
     let mut shared = Shared::begin("wall");
     let (mut first, mut second) = (shared.client(), shared.client());
-    first.set_all(address::BUS_WATCHDOG, 25).expect("it listens");
+    first.once.set_all(address::BUS_WATCHDOG, 25).expect("it listens");
     first.set(address::BUS_WATCHDOG, 25).expect("it obeys");
     for _ in 0..2 {
         second.set(address::TORQUE_ENABLE, 0).expect("anyone stops");
@@ -290,7 +276,7 @@ fn a_stop_takes_the_command_except_to_clean_up_or_of_another_finger() {
     first.set(address::TORQUE_ENABLE, 0).expect("anyone stops");
     second.set(address::BUS_WATCHDOG, 0).expect_err("the first one did not only clean up");
     for client in [&mut first, &mut second] {
-        client.set_all(address::TORQUE_ENABLE, 0).expect("it listens");
+        client.once.set_all(address::TORQUE_ENABLE, 0).expect("it listens");
         client.ping().expect("it answers");
     }
     assert_eq!(shared.packets_at_its_end(), 0, "no finger is left to stop");
@@ -303,7 +289,7 @@ fn clients_that_ask_an_absent_id_do_not_starve_a_press() {
     assert!(shared.output(&["tare"]).status.success());
     let mut press = shared.client();
     // What is left of `TIMEOUT` is for its own answer: a USB port may delay it.
-    press.timeout = Duration::from_millis(5_500);
+    press.once.timeout = Duration::from_millis(5_500);
     for (register, value) in [(address::BUS_WATCHDOG, 25), (address::TORQUE_ENABLE, 1), (address::GOAL_FORCE_MN, 1_000)]
     {
         press.set(register, value).expect("it obeys");
@@ -311,8 +297,8 @@ fn clients_that_ask_an_absent_id_do_not_starve_a_press() {
     let begun = shared.finger.heard();
     let _pollers: Vec<Asker> = std::iter::repeat_with(|| {
         let mut client = shared.client();
-        client.id = 9;
-        client.timeout = Duration::from_millis(1);
+        client.once.id = 9;
+        client.once.timeout = Duration::from_millis(1);
         client.ping().expect_err("it is absent");
         client
     })
@@ -334,10 +320,10 @@ fn an_id_that_a_client_set_is_followed() {
     let mut client = shared.client();
     client.set(address::BUS_WATCHDOG, 25).expect("it obeys");
     // Not a second time: it has another ID then.
-    Client::set(&mut client, address::ID, 7).expect("it obeys");
-    client.id = 7;
+    client.once.set(address::ID, 7).expect("it obeys");
+    client.once.id = 7;
     let reset = packet(7, instruction::FACTORY_RESET, &[1]);
-    let refusal = client.pass(&reset, Some(7), 1).expect("it answers");
+    let refusal = client.once.pass(&reset, Some(7), 1).expect("it answers");
     assert_eq!(refusal[8], StatusError::Access as u8, "it would change the speed");
     let sent = shared.packets_at_its_end();
     assert!((2..8).contains(&sent), "{sent} packets");
@@ -374,8 +360,8 @@ fn a_lost_port_is_opened_again_once_it_is_back() {
     shared.broker.kill().expect("it runs");
     shared.broker.wait().expect("it ends");
     assert!(matches!(client.ping(), Err(fingertip_cli::Error::Port(..))));
-    assert!(client.reopen().is_err(), "it is not back");
+    assert!(client.once.reopen().is_err(), "it is not back");
     (shared.broker, _) = broker(&shared.finger, &shared.address, TIMEOUT);
-    client.reopen().expect("it is back");
+    client.once.reopen().expect("it is back");
     client.ping().expect("it answers");
 }

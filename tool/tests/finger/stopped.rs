@@ -1,7 +1,7 @@
 //! A signal, a kill or `fingertip stop` in the middle of each motion: the finger is at rest afterwards. And the state after
 //! KILL behind each packet of a command, or behind some of them where there are hundreds.
 
-use crate::served::{Served, ended};
+use crate::served::{Served, ended, fails, program};
 use fingertip::link::packet::instruction::REBOOT;
 use fingertip::measure::Ended;
 use fingertip::shipped::address;
@@ -9,7 +9,6 @@ use rustix::process::Signal;
 use std::fs;
 use std::io::{Read as _, Write as _};
 use std::net::{Shutdown, TcpListener};
-use std::process::Child;
 
 /// A force that a stopped finger may still show, N.
 pub const RESIDUAL_N: f64 = 0.05;
@@ -22,16 +21,18 @@ const MOTIONS: [(&[&str], &str); 4] = [
     (&["capture", "--press", "1", "--within-s", "3600", "--force", "--out"], "Force:"),
 ];
 
-/// Starts a command and holds up its packets in the middle of its motion: those of a press while it presses.
-fn caught(finger: &Served, arguments: &[&str], mode: &str) -> Child {
-    finger.done(&["tare"]);
+/// Starts a command, holds up its packets in a mode of its motion, those of a press while it presses, and sends it a signal.
+/// Its exit code, and its errors.
+fn signalled(finger: &Served, arguments: &[&str], mode: &str, signal: Signal) -> (Option<i32>, String) {
     finger.command(&format!("stall at {mode} {}", if mode == "Press:" { 0.5 } else { -1.0 }));
-    let mut child = finger.start(&with_file(arguments, &finger.file("caught.mcap")));
+    let mut child = finger.start(arguments);
     while finger.command("stalled") != "true" {
         assert!(child.try_wait().expect("it was started").is_none(), "{arguments:?} ended before {mode}");
         std::thread::sleep(Served::LOOK);
     }
-    child
+    Served::signal(&child, signal);
+    finger.command("go on");
+    ended(&child.wait_with_output().expect("it ends"))
 }
 
 pub fn is_at_rest(finger: &Served, what: &str) {
@@ -47,10 +48,8 @@ fn a_signal_leaves_every_motion_at_rest_and_clear_of_the_object() {
         for signal in [Signal::INT, Signal::TERM, Signal::HUP, Signal::KILL] {
             let what = format!("{arguments:?} {signal:?}");
             let parameters = finger.json(&["params", "get"]);
-            let child = caught(&finger, arguments, mode);
-            Served::signal(&child, signal);
-            finger.command("go on");
-            let (code, said) = ended(&child.wait_with_output().expect("it ends"));
+            finger.done(&["tare"]);
+            let (code, said) = signalled(&finger, &with_file(arguments, &finger.file("caught.mcap")), mode, signal);
             if signal == Signal::KILL {
                 // The controller releases the object by itself once its bus is silent.
                 finger.until_alone("BusSilent");
@@ -189,18 +188,6 @@ fn stop_stops_every_mode() {
     }
 }
 
-/// Sends a signal to a command while the line stalls in this mode: the command leaves the finger at rest.
-fn is_signalled_in(mode: &str, finger: &Served, arguments: &[&str], signal: Signal) {
-    finger.command(&format!("stall at {mode}: -1"));
-    let child = finger.start(arguments);
-    Served::wait_for(|| finger.command("stalled") == "true");
-    Served::signal(&child, signal);
-    finger.command("go on");
-    let (code, said) = ended(&child.wait_with_output().expect("it ends"));
-    assert_eq!(code, Some(130), "{signal:?}: {said}");
-    is_at_rest(finger, arguments[0]);
-}
-
 /// The release has begun, nobody feeds the watchdog, and torque is still on.
 #[test]
 fn a_signal_does_not_end_a_stop_before_torque_is_off() {
@@ -209,7 +196,9 @@ fn a_signal_does_not_end_a_stop_before_torque_is_off() {
         finger.done(&["tare"]);
         finger.set(&[(address::TORQUE_ENABLE, 1), (address::GOAL_FORCE_MN, 1_000)]);
         finger.until_alone("Force:");
-        is_signalled_in("Release", &finger, &["stop"], signal);
+        let (code, said) = signalled(&finger, &["stop"], "Release:", signal);
+        assert_eq!(code, Some(130), "{signal:?}: {said}");
+        is_at_rest(&finger, "stop");
     }
 }
 
@@ -220,7 +209,9 @@ fn a_signal_during_the_tare_of_a_capture_keeps_torque_off() {
     let file = finger.file("tare.mcap");
     finger.command(&format!("trap Release: {REBOOT}"));
     let capture = ["capture", "--press", "1", "--within-s", "3600", "--out", &file];
-    is_signalled_in("Tare", &finger, &capture, Signal::INT);
+    let (code, said) = signalled(&finger, &capture, "Tare:", Signal::INT);
+    assert_eq!(code, Some(130), "{said}");
+    is_at_rest(&finger, "capture");
 }
 
 #[test]
@@ -251,8 +242,7 @@ fn stop_says_that_a_port_is_busy() {
         client.shutdown(Shutdown::Write).expect("it listens");
         let _ = client.read_to_end(&mut Vec::new());
     });
-    let why = Served::nobody(&["--port", &port, "stop"]);
-    assert!(why.contains("busy: somebody is connected"), "{why}");
+    fails(&program(&["--port", &port, "stop"]).output().expect("it starts"), &["busy: somebody is connected"]);
 }
 
 #[test]

@@ -1,10 +1,7 @@
 //! `fingertip stream`, heard over its WebSocket.
-#![cfg(feature = "foxglove")]
 
-mod served;
-
+use crate::served::{Served, line_with};
 use serde_json::{Value, json};
-use served::{Served, line_with};
 use std::net::TcpStream;
 use std::process::Child;
 use tungstenite::client::IntoClientRequest as _;
@@ -87,7 +84,6 @@ fn a_port_that_is_taken_is_told() {
     let finger = Served::begin("wall");
     let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
     let port = taken.local_addr().expect("an address").port().to_string();
-    let told = finger.refused(&["stream", "--tcp", &port]);
-    assert!(told.contains(&format!("127.0.0.1:{port}")) && told.contains("in use"), "{told}");
+    finger.refuses(&["stream", "--tcp", &port], &[&format!("127.0.0.1:{port}"), "in use"]);
     finger.end();
 }

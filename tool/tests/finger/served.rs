@@ -1,5 +1,4 @@
 //! A finger that is served from a thread, and `fingertip` set on it.
-#![allow(dead_code, reason = "each test takes what it needs")]
 
 use fingertip::link::packet::BROADCAST;
 use fingertip::link::packet::instruction::REBOOT;
@@ -23,7 +22,6 @@ use std::time::{Duration, Instant};
 /// Patience on the slowest machine, where an answer is expected.
 const PATIENCE: &str = "600000";
 
-/// A command, and where its answer goes.
 type Asked = (String, Sender<Result<String, String>>);
 
 pub struct Served {
@@ -221,7 +219,6 @@ impl Served {
         values.iter().for_each(|(register, value)| client.set(*register, *value).expect("it obeys"));
     }
 
-    /// Has something done at its side.
     pub fn command(&self, text: &str) -> String {
         let (answer, answered) = channel();
         self.commands.send((text.into(), answer)).expect("it is served");
@@ -267,7 +264,6 @@ impl Served {
         self.fingertip(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts")
     }
 
-    /// The end of one that writes to another place.
     pub fn writing_to(&self, arguments: &[&str], place: impl Into<Stdio>) -> Output {
         let child = self.fingertip(arguments).stdout(place).stderr(Stdio::piped()).spawn().expect("it starts");
         child.wait_with_output().expect("it ends")
@@ -304,16 +300,12 @@ impl Served {
         fails(&self.fingertip(arguments).output().expect("it starts"), words);
     }
 
-    /// The same without a port.
-    pub fn nobody(arguments: &[&str]) -> String {
-        complained(&program(arguments).output().expect("it starts"))
-    }
-
-    pub fn not_understood(arguments: &[&str]) -> String {
+    /// Asserts that a command is not understood, and that its error has this word.
+    #[track_caller]
+    pub fn not_understood(arguments: &[&str], word: &str) {
         let output = program(arguments).env("FINGERTIP_PORT", "/nowhere").output();
         let (code, err) = ended(&output.expect("it starts"));
-        assert_eq!(code, Some(2), "{arguments:?}: {err}");
-        err
+        assert!(code == Some(2) && err.contains(word), "{arguments:?}: {err}");
     }
 
     /// Waits for what another program does, and leaves the core to it between two looks.
@@ -384,7 +376,6 @@ impl Drop for Served {
     }
 }
 
-/// `fingertip` without a port.
 pub fn program(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_fingertip"));
     command.env_remove("FINGERTIP_PORT").args(arguments);

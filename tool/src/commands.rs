@@ -185,11 +185,14 @@ fn wait_for(client: &mut Client, address: u16, within: Duration, wanted: impl Fn
     }
 }
 
-/// Fails in a fault, and while a measuring motion runs, which a tare would end.
-fn no_fault_nor_motion(client: &mut Client) -> Result<(), Error> {
+/// Fails in a fault, while a measuring motion runs, which a tare would end, and with torque on.
+fn at_rest(client: &mut Client) -> Result<(), Error> {
     no_fault(client)?;
     if client.number(address::MEASURE_STATE)? == MeasureState::Running as i64 {
         return Err("another motion that measures is under way: wait for its end, or `fingertip stop`".into());
+    }
+    if client.number(address::TORQUE_ENABLE)? != 0 {
+        return Err("torque is on: the tip may be pressing on something. Turn it off first: `fingertip stop`".into());
     }
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! `fingertip capture`, and `fingertip replay` of what it wrote.
 
 use super::stop::{Moving, no_tare};
-use super::{Interrupt, TOUCHED, answer, no_fault_nor_motion, press, report, say, say_json, stopped, wait_for};
+use super::{Interrupt, TOUCHED, answer, at_rest, press, report, say, say_json, stopped, wait_for};
 use crate::recordings::{self, About, ENDED, device};
 use crate::state::unix_ns;
 use crate::whole::Part;
@@ -69,10 +69,7 @@ impl Args {
 
 /// Arms a capture, tares and, where asked to, presses; reads what the board kept, and writes it as a file.
 pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
-    no_fault_nor_motion(client)?;
-    if client.number(address::TORQUE_ENABLE)? != 0 {
-        return Err("torque is on: a capture begins with a tare, for which the tip must be free".into());
-    }
+    at_rest(client)?;
     if client.number(address::CAPTURE_STATE)? == RECORDING {
         client.set(address::CAPTURE, 0)?;
     }

@@ -4,7 +4,7 @@
 pub(super) mod motion;
 
 use super::params::{self, Stored};
-use super::{Interrupt, aside, report, say};
+use super::{INTERRUPT_EVERY, Interrupt, aside, report, say};
 use crate::{Client, Error, numbers, table, whole};
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use fingertip::pressure::GAIN_ONE;
@@ -88,8 +88,6 @@ pub(super) struct Run<'a> {
     pub json: bool,
 }
 
-/// Time without a look at the signals, ns.
-const POLL_NS: i64 = 50_000_000;
 /// Wrong answers to one question after which the procedure ends.
 const TRIES: u32 = 3;
 
@@ -134,7 +132,7 @@ impl Run<'_> {
     }
 
     fn line(&self, option: &str, idle: &mut dyn FnMut() -> Result<(), Error>) -> Result<String, Error> {
-        let (input, wait) = (io::stdin(), Timespec { tv_sec: 0, tv_nsec: POLL_NS });
+        let (input, wait) = (io::stdin(), Timespec { tv_sec: 0, tv_nsec: INTERRUPT_EVERY.subsec_nanos().into() });
         // A read of one byte never waits for the rest of a line. Bytes behind the line stay for the next question.
         let (mut line, mut byte) = (Vec::new(), [0]);
         loop {

@@ -1,7 +1,7 @@
 //! Commands at whose end the finger is at rest: [`Moving`] guards those that move it; `fingertip stop`, `recover` and `tare`
 //! begin or end there.
 
-use super::{Interrupt, TOUCHED, answer, aside, no_fault, no_fault_nor_motion, say, say_json, wait_for};
+use super::{Interrupt, TOUCHED, answer, aside, at_rest, no_fault, say, say_json, wait_for};
 use crate::client::Reach;
 use crate::state::{Clock, State};
 use crate::{Client, Error, numbers, table};
@@ -288,10 +288,7 @@ pub struct Tare {
 }
 
 pub fn tare(args: &Tare, client: &mut Client, json: bool) -> Result<(), Error> {
-    no_fault_nor_motion(client)?;
-    if client.number(address::TORQUE_ENABLE)? != 0 {
-        return Err("torque is on: the tip may be pressing on something. Turn it off first: `fingertip stop`".into());
-    }
+    at_rest(client)?;
     let request = if args.force { TARE_FORCED } else { TARE };
     let Tared { touched, least, most } = measure_tare(request, Duration::from_secs_f64(args.within_s), client)?;
     let value = json!({ "id": client.id, "tared": true, "touched": touched, "least_codes": least, "most_codes": most });

@@ -2,7 +2,7 @@
 
 use super::{GainRows, Presses, Procedure, Run};
 use crate::commands::stop::{Moving, TARE, measure_tare};
-use crate::commands::{TOUCHED, capture, no_fault, no_fault_nor_motion, press, wait_for};
+use crate::commands::{TOUCHED, at_rest, capture, no_fault, press, wait_for};
 use crate::state::{RESTARTED, State};
 use crate::{Client, Error, numbers, table};
 use fingertip::capture::CaptureState;
@@ -48,16 +48,8 @@ pub fn press_name(number: u32) -> String {
 impl Procedure<'_> {
     /// Fails if a motion of the session cannot begin, with the reason.
     pub fn ready(&mut self) -> Result<(), Error> {
-        self.at_rest()?;
+        at_rest(self.client)?;
         self.unchanged()
-    }
-
-    fn at_rest(&mut self) -> Result<(), Error> {
-        no_fault_nor_motion(self.client)?;
-        if self.client.number(address::TORQUE_ENABLE)? != 0 {
-            return Err("torque is on: turn it off first, by `fingertip stop`".into());
-        }
-        Ok(())
     }
 
     /// Waits in the air with torque off, then tares.
@@ -82,7 +74,7 @@ impl Procedure<'_> {
 
     /// Tares under any settings.
     pub fn zeros(&mut self) -> Result<(), Error> {
-        self.at_rest()?;
+        at_rest(self.client)?;
         self.run.report("tare: nothing may touch the tip");
         if measure_tare(TARE, TARE_WITHIN, self.client)?.touched { Err(TOUCHED.into()) } else { Ok(()) }
     }

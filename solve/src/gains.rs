@@ -43,7 +43,6 @@ pub enum Condition {
     Odd,
 }
 
-/// Gain of a taxel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gain {
     /// Factor by which the taxel reads too much; see [`Gain::factor`].
@@ -72,7 +71,6 @@ impl Gain {
     }
 }
 
-/// Pose of a press, with what it rests on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Posed {
     pub pose: Pose,
@@ -84,7 +82,6 @@ pub struct Posed {
     pub verdict: Verdict,
 }
 
-/// Result for the whole array.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gains {
     pub columns: usize,
@@ -94,7 +91,6 @@ pub struct Gains {
     pub presses: Vec<Posed>,
     /// Presses that do not count, by their place, and why.
     pub left_out: Vec<(usize, NoGains)>,
-    /// Spread of the gains that were found.
     pub spread: f64,
     /// Standard uncertainty of the factor that all gains have in common, as a share.
     pub common: f64,
@@ -126,7 +122,6 @@ pub enum NoGains {
 pub(crate) struct Settled {
     /// Presses that count, creep taken out.
     pub presses: Vec<Press>,
-    /// Poses and gains. A pose for each press that counts.
     pub gains: Gains,
     /// Creep that was taken out, as a share for each decade of time.
     pub creep: f64,
@@ -234,7 +229,6 @@ pub struct Shift {
     pub sigma_mm: f64,
 }
 
-/// Verdict on a press, with the number behind it.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "their texts say it")]
 pub enum Verdict {

@@ -67,7 +67,6 @@ pub fn joint(presses: &[Press], yield_usual: f64) -> Result<Gains, NoGains> {
     fit.finish()
 }
 
-/// Unknowns of the joint fit.
 #[derive(Clone)]
 struct Unknowns {
     poses: Vec<Pose>,

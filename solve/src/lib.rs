@@ -37,7 +37,6 @@ use std::fmt;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Value {
     pub value: f64,
-    /// Standard uncertainty of the estimate.
     pub sigma: f64,
 }
 

@@ -22,7 +22,6 @@ const RINGS: usize = 16;
 /// Distance before the contact at which a press begins, mm.
 const AIR_MM: f64 = 0.2;
 
-/// Memory of the tip and the ink.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Memory {
     /// Width h of the hysteresis, as a share of the pressure.

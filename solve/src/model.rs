@@ -12,14 +12,12 @@
 
 use crate::press::Array;
 
-/// Number of unknowns of a pose.
 pub const UNKNOWNS: usize = 7;
 /// Parts along a side of a taxel.
 const SIDE: usize = 5;
 /// The shortest column of the tip that is computed, in radii.
 const SHORTEST: f64 = 0.2;
 
-/// Pose of a press against the plate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pose {
     /// Travel at which the tip's apex touches a plate that is not tilted, mm.
@@ -57,7 +55,6 @@ impl Pose {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Share {
     pub value: f64,
-    /// Derivatives of the pressure by the unknowns.
     pub slopes: [f64; UNKNOWNS],
 }
 
@@ -118,7 +115,6 @@ impl Square {
         (at.travel_mm / self.radius_mm - self.unknowns[6] * at.force_n, at.half_mm / self.radius_mm)
     }
 
-    /// The same as [`Square::share`] with its slopes.
     pub fn share_with_slopes(&self, at: &At) -> Share {
         let (travel, half) = self.travel(at);
         let [.., tilt_x, tilt_y, roundness, _] = self.unknowns;

@@ -30,30 +30,22 @@ const FORCE_PART: f64 = 0.003;
 const LARGEST_PART: f64 = 0.0007;
 const UNKNOWNS: usize = 5;
 
-/// Modulus of one press.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OfPress {
-    /// Young's modulus, kPa.
     pub kpa: f64,
     /// Standard uncertainty of the modulus from the residuals, kPa.
     pub sigma_kpa: f64,
     /// Travel at which the tip touches, mm.
     pub touch_mm: f64,
-    /// Memory of tip and ink.
     pub memory: Memory,
     pub creep_sigma: f64,
 }
 
-/// Modulus of the tip.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Modulus {
-    /// Young's modulus, kPa.
     pub kpa: f64,
-    /// Standard uncertainty, kPa.
     pub sigma_kpa: f64,
-    /// Parts of the uncertainty, as shares of the modulus.
     pub parts: Parts,
-    /// Each press by itself.
     pub presses: Vec<OfPress>,
     /// Poses and gains that it rests on.
     pub gains: Gains,
@@ -72,7 +64,6 @@ pub struct Parts {
     pub memory: f64,
 }
 
-/// Young's modulus of presses of one tip.
 pub fn modulus(presses: &[Press]) -> Result<Modulus, NoGains> {
     let Settled { presses, gains, creep } = settle(presses)?;
     let mut found = Vec::new();

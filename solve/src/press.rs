@@ -58,9 +58,7 @@ pub struct Step {
     /// Travel at the first and the last frame by the encoder, mm; it grows towards the plate.
     pub travel_mm: [f64; 2],
     pub frames: u32,
-    /// Forward or return stroke.
     pub branch: Branch,
-    /// Readings of all taxels, row by row.
     pub taxels: Vec<Reading>,
     /// Temperature of the microcontroller, degrees Celsius; None where it is unknown.
     pub chip_c: Option<f64>,
@@ -98,7 +96,6 @@ pub struct Press {
     /// Radius of the tip as configured, mm.
     pub radius_mm: f64,
     pub array: Array,
-    /// Steps in order of time.
     pub steps: Vec<Step>,
     /// Early end of the press. Only a press that filled the memory counts nevertheless.
     pub ended: Option<Ended>,

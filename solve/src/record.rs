@@ -38,10 +38,8 @@ const RESISTANCE_PART: f64 = 0.022;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Kind {
-    /// Steps of a press.
     #[error("a press")]
     Press = 1,
-    /// Samples of strokes in the air.
     #[error("strokes")]
     Strokes = 2,
 }
@@ -191,7 +189,6 @@ fn deviation(byte: u8) -> f64 {
     DEVIATION_CODES * (variance as f64).sqrt()
 }
 
-/// Content of the head.
 struct Head {
     shape: [usize; 2],
     ended: Option<Ended>,

@@ -34,7 +34,6 @@ pub fn spread(residuals: impl Iterator<Item = f64>) -> f64 {
     NORMAL * median(residuals.map(f64::abs).collect())
 }
 
-/// Result of a fit.
 #[derive(Clone, Debug)]
 pub struct Fit {
     pub unknowns: DVector<f64>,

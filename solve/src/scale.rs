@@ -22,10 +22,8 @@ use nalgebra::DVector;
 /// the force rises than while it falls; these goals bring the reading between the two.
 pub const SWINGS: [f64; 2] = [1.06, 0.98];
 
-/// A force that was held on a scale.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Held {
-    /// Force that the scale shows, N.
     pub shown_n: f64,
     /// Force that the array reads meanwhile by its sum, creep and temperature taken off, N.
     pub read_n: f64,
@@ -47,7 +45,6 @@ const SHOWN_N: f64 = 0.005;
 const HELD_PART: f64 = 0.01;
 const LEAST_N: f64 = 0.1;
 
-/// Scale by forces that were held.
 pub fn scale(held: &[Held]) -> Result<Value, NoScale> {
     let largest_n = held.iter().map(|held| held.read_n).fold(0.0, f64::max);
     if largest_n < LEAST_N || held.iter().all(|held| held.shown_n < LEAST_N) {
@@ -65,7 +62,6 @@ pub fn scale(held: &[Held]) -> Result<Value, NoScale> {
     Ok(factor)
 }
 
-/// Creep of an array.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Creep {
     /// Final growth of a held reading, as a share (`creep_permille`).
@@ -129,7 +125,6 @@ pub fn creep(readings: &[[f64; 2]]) -> Result<Creep, NoDrift> {
     })
 }
 
-/// Temperature coefficient of an array.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Temperature {
     /// Change of the gain for each K, as a share (`array_gain_ppm_per_k`).

@@ -66,7 +66,6 @@ const JUMP: f64 = 3.0;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sample {
-    /// The encoder's count.
     pub count: i32,
     /// Mean of duty times supply since the sample before, V; positive presses.
     pub voltage_v: f64,
@@ -100,7 +99,6 @@ impl Stroke {
     }
 }
 
-/// Record that the controller delivers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Record {
     /// Time between samples, s.
@@ -114,7 +112,6 @@ pub struct Record {
     /// Resistance of the whole circuit, Ohm.
     pub resistance: Value,
     pub strokes: Vec<Stroke>,
-    /// Early end of the motions.
     pub ended: Option<Ended>,
 }
 
@@ -142,7 +139,6 @@ pub enum NoDrive {
     Unsolved(usize),
 }
 
-/// A drive as measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeasuredDrive {
     /// k, N m/A: the back-EMF constant in V s/rad.
@@ -157,7 +153,6 @@ pub struct MeasuredDrive {
     pub force_n: Value,
 }
 
-/// Drive that a record shows.
 pub fn solve(record: &Record) -> Result<MeasuredDrive, NoDrive> {
     match record.ended {
         // The motions continued after the memory was full: all strokes in it are used except the last, which was cut.

@@ -50,14 +50,12 @@ fn id(text: &str) -> Result<u8, String> {
     id.ok_or_else(|| format!("an ID is 0 to {ID_MAX}, or all"))
 }
 
-/// A controller on the bus.
 #[derive(Debug)]
 pub struct Client {
     line: Line,
     pub port: String,
     pub baud: u32,
     pub id: u8,
-    /// Longest wait for an answer.
     pub timeout: Duration,
     /// True if it sends keep-alive packets.
     pub feeds: bool,
@@ -126,7 +124,6 @@ impl Client {
         Ok(())
     }
 
-    /// Goes on at another speed.
     pub fn set_baud(&mut self, baud: u32) -> Result<(), Error> {
         self.line.set_baud(baud).map_err(|why| Error::Open(format!("{} at {baud} baud", self.port), why))?;
         self.baud = baud;
@@ -188,7 +185,6 @@ impl Client {
         Ok(table::Block { first, bytes: self.read(first, end - first)? })
     }
 
-    /// Reads a register of one number.
     pub fn number(&mut self, address: u16) -> Result<i64, Error> {
         Ok(self.block(address, address)?.number(address))
     }
@@ -361,7 +357,6 @@ fn assignment(address: u16, value: i64) -> Result<Vec<u8>, Error> {
     Ok([&address.to_le_bytes()[..], &table::encode(register, value)].concat())
 }
 
-/// The bytes of an instruction.
 pub fn packet(id: u8, instruction: u8, params: &[u8]) -> Reply {
     let mut packet = Reply::new();
     let mut sender = Sender::new(&mut packet, id, instruction);
@@ -382,7 +377,6 @@ const BUSY: &[u8] = b"busy: ";
 
 #[derive(Debug)]
 pub enum Line {
-    /// A serial port or a pseudo-terminal.
     Serial(SerialPort),
     /// A served finger's port.
     Tcp(TcpStream),

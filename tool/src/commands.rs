@@ -24,7 +24,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Result of a command.
 type Done = Result<(), Error>;
 /// True once output was lost against the user's will.
 static LOST: AtomicBool = AtomicBool::new(false);
@@ -70,7 +69,6 @@ fn answers() -> MutexGuard<'static, Option<Vec<Value>>> {
     ANSWERS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Says an answer for scripts.
 fn say_json(value: &Value) {
     match &mut *answers() {
         Some(answers) => answers.push(value.clone()),

@@ -19,24 +19,18 @@ pub use client::Client;
 /// A controller's number for an instruction that came damaged.
 const DAMAGED: u8 = 3;
 
-/// A command could not be carried out.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The port cannot be opened, for the system's reason.
     #[error("cannot open {0}: {1}{ports}", ports = ports_there())]
     Open(String, std::io::Error),
     #[error("no port: name one with --port, or in FINGERTIP_PORT{}", ports_there())]
     NoPort,
-    /// The port was lost, for the system's reason.
     #[error("{0}: {1}; is it still connected?")]
     Port(String, std::io::Error),
-    /// The controller did not answer.
     #[error("{0}")]
     Silent(String),
-    /// The answer was no good.
     #[error("{0}")]
     Damaged(String),
-    /// The controller refused with the number of an error.
     #[error("{0}")]
     Refused(String, u8),
     /// The command line asks for something that does not exist; nothing was sent.
@@ -64,7 +58,6 @@ impl Error {
         }
     }
 
-    /// True if the controller refused with this number.
     pub fn refused_with(&self, wanted: u8) -> bool {
         matches!(self, Self::Refused(_, number) if *number == wanted)
     }
@@ -74,7 +67,6 @@ impl Error {
         matches!(self, Self::Silent(_) | Self::Damaged(_)) || self.refused_with(DAMAGED)
     }
 
-    /// A file that cannot be read or written.
     pub fn file(doing: &str, path: &std::path::Path, why: impl std::fmt::Display) -> Self {
         Self::Other(format!("cannot {doing} {}: {why}", path.display()))
     }

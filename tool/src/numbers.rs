@@ -36,7 +36,6 @@ pub fn shown_n(text: &str) -> Result<f64, String> {
     within(text, &(0.0..=150.0)).map(|newtons| (newtons * 1e3).round() * 1e-3)
 }
 
-/// Resistance of motor and bridge, Ohm.
 pub fn ohm(text: &str) -> Result<f64, String> {
     within(text, &(0.05..=200.0))
 }

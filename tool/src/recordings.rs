@@ -45,7 +45,6 @@ pub fn through_the_core(bytes: &[u8], each: impl FnMut(&Frame, &Status)) -> Fed 
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Kept {
-    /// The capture, as the board kept it.
     pub bytes: Vec<u8>,
     pub about: About,
 }
@@ -55,7 +54,6 @@ pub fn open(path: &Path) -> Result<Kept, String> {
     of_bytes(&fs::read(path).map_err(|why| format!("cannot be read: {why}"))?)
 }
 
-/// The same of a file's bytes.
 pub fn of_bytes(mut rest: &[u8]) -> Result<Kept, String> {
     if !rest.starts_with(mcap::MAGIC) {
         return Err("this is no MCAP file: it does not begin as one".into());
@@ -130,7 +128,6 @@ pub fn in_words(why: McapError) -> io::Error {
     }
 }
 
-/// How this program writes MCAP.
 pub fn write_options() -> WriteOptions {
     WriteOptions::new().profile("").library(concat!("fingertip/", env!("CARGO_PKG_VERSION")))
 }

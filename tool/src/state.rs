@@ -44,7 +44,6 @@ pub struct State {
 }
 
 impl State {
-    /// Reads it, in one packet.
     pub fn read(client: &mut Client) -> Result<Self, Error> {
         Ok(Self::of(&client.block(FIRST, LAST)?, false))
     }

@@ -18,7 +18,6 @@ impl Block {
         register.and_then(|register| decode(register.kind, self.bytes.get(offset..)?)).unwrap_or(0)
     }
 
-    /// Numbers of a tactile image.
     pub fn numbers(&self, address: u16) -> Vec<i64> {
         let Some(register) = register_at(address) else { return Vec::new() };
         let width = register.kind.width();
@@ -34,12 +33,10 @@ pub fn name(register: &Register) -> String {
     register.name.to_lowercase()
 }
 
-/// The register that begins at an address.
 pub fn register_at(address: u16) -> Option<&'static Register> {
     REGISTERS.iter().find(|register| register.address == address)
 }
 
-/// The first address behind a register.
 pub fn end(register: &Register) -> u16 {
     register.address + register.kind.width() * register.count
 }
@@ -80,7 +77,6 @@ pub fn stored() -> impl Iterator<Item = &'static Register> {
     REGISTERS.iter().filter(|register| is_stored(register))
 }
 
-/// A number as it goes over the bus.
 pub fn encode(register: &Register, value: i64) -> Vec<u8> {
     value.to_le_bytes()[..usize::from(register.kind.width())].to_vec()
 }

@@ -74,7 +74,6 @@ impl Drop for Part {
     }
 }
 
-/// Writes a whole file at once.
 pub fn write(place: &Path, force: bool, bytes: &[u8]) -> Result<(), Error> {
     let mut part = Part::begin(place, force)?;
     part.file.write_all(bytes).map_err(|why| Error::file("write", place, why))?;

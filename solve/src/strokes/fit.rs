@@ -5,7 +5,6 @@ use super::{NoDrive, Record};
 use crate::robust::{huber, huber_cost};
 use nalgebra::{Cholesky, Matrix3, SMatrix, SVector, Vector3};
 
-/// A vector over all parameters.
 pub type Vector = SVector<f64, ALL>;
 type Matrix = SMatrix<f64, ALL, ALL>;
 
@@ -68,7 +67,6 @@ struct Block {
 /// Normal equations of the parameters, the paths' own unknowns eliminated.
 struct Normal {
     matrix: Matrix,
-    /// Gradient of each stroke.
     gradients: Vec<Vector>,
     /// Derivatives of the unknowns of each path by the parameters.
     follow: Vec<(Own, SMatrix<f64, 3, ALL>)>,
@@ -85,7 +83,6 @@ struct Problem<'a> {
     uneven_v: f64,
 }
 
-/// Parameters and the paths' own unknowns.
 #[derive(Clone)]
 struct Point {
     p: Parameters,
@@ -170,7 +167,6 @@ impl Problem<'_> {
         }
     }
 
-    /// Uncertainties of a solution.
     fn judged(&self, at: &Point) -> Fit {
         let Self { paths, law, least, .. } = *self;
         let residuals = residuals(paths, &at.p, law, &at.own);

@@ -46,10 +46,8 @@ pub mod index {
     pub const SPRING: usize = 9;
 }
 
-/// Number of parameters that are fitted.
 pub const FITTED: usize = 7;
 pub const ALL: usize = 10;
-/// All parameters, see [`index`].
 pub type Parameters = [f64; ALL];
 
 /// Added to the share of friction that is left at the speed of the slowest stroke.

@@ -87,7 +87,6 @@ impl Draw {
     }
 }
 
-/// Travel at which the tip meets the plate.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Place {
     pub centre_mm: [f64; 2],

@@ -172,7 +172,6 @@ const ROWS: usize = (40 * 1024 - HEAD) / 4;
 /// PWM steps of the full duty.
 const PWM: f64 = 8400.0;
 
-/// The parameters by the drive's sheet.
 fn params(rig: &Rig) -> Params {
     let d = &rig.drive;
     Params {
@@ -244,7 +243,6 @@ struct SimulatedDrive {
     pub stribeck: f64,
     pub falls: fn(f64) -> f64,
     pub counts_per_turn: f64,
-    /// Motor angle for a travel of the tip.
     pub rad_per_mm: f64,
     pub source_v: f64,
     pub source_ohm: f64,
@@ -255,7 +253,6 @@ struct SimulatedDrive {
     pub unrest: f64,
     /// Count direction of the encoder: 1, -1 against the motor, 0 not at all.
     pub counts: i32,
-    /// Values of the parameters.
     pub sheet_k: f64,
     pub sheet_inertia: f64,
     /// The resistance that an ohmmeter shows, with the bridge's by its sheet.

@@ -22,7 +22,6 @@ use std::cmp::Ordering;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Replayed<const ROWS: usize, const COLUMNS: usize> {
     pub head: Head<ROWS, COLUMNS>,
-    /// First difference of the core's answers.
     pub difference: Option<Difference>,
 }
 
@@ -120,7 +119,6 @@ pub struct CapturedFrame<const ROWS: usize, const COLUMNS: usize> {
     /// Sensed values other than the frame.
     pub sense: Sense,
     pub command: Command,
-    /// The duty that the step answered.
     pub duty: Duty,
     /// The mode after it, by its number.
     pub mode: u8,
@@ -129,7 +127,6 @@ pub struct CapturedFrame<const ROWS: usize, const COLUMNS: usize> {
     pub digest: u16,
 }
 
-/// The frames of a capture, in order.
 #[derive(Clone, Debug)]
 pub struct Frames<'a, const ROWS: usize, const COLUMNS: usize> {
     bits: Reader<'a>,
@@ -307,7 +304,6 @@ impl Reader<'_> {
         if ones == ESCAPE { self.get(all) } else { Some(ones << width | self.get(width)?) }
     }
 
-    /// A difference of 32 bits.
     fn signed(&mut self, width: u32) -> Option<i32> {
         self.folded(width, 32).map(unfold)
     }

@@ -227,7 +227,6 @@ pub struct Identify {
     options: Options,
 }
 
-/// Measures Young's modulus of the tip by presses onto a hard plate.
 pub fn identify(args: &Identify, client: &mut Client, json: bool) -> Result<(), Error> {
     args.how.check(json)?;
     direction_confirmed(client)?;
@@ -242,7 +241,6 @@ pub fn identify(args: &Identify, client: &mut Client, json: bool) -> Result<(), 
 
 /// Relative standard uncertainty of a resistance that an ohmmeter shows.
 const OHMMETER: f64 = 0.01;
-/// Steps of the session.
 const JOG: &str = "jog";
 const STROKES: &str = "strokes";
 

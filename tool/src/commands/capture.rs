@@ -15,9 +15,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Interval of the checks.
 const LOOK: Duration = Duration::from_millis(5);
-/// `CAPTURE_STATE`.
 const ARMED: i64 = CaptureState::Armed as i64;
 const RECORDING: i64 = CaptureState::Recording as i64;
 const DONE: i64 = CaptureState::Done as i64;

@@ -18,7 +18,6 @@ pub struct Scan {
     speeds: Vec<u32>,
 }
 
-/// Lists the devices that answer.
 pub fn scan(args: &Scan, reach: &Reach, json: bool) -> Result<(), Error> {
     let ports = reach.port.clone().map_or_else(client::ports, |port| vec![port]);
     if ports.is_empty() {
@@ -85,7 +84,6 @@ fn scaled_name(register: &Register) -> String {
     }
 }
 
-/// Shows identity and status of the controller.
 pub fn info(client: &mut Client, json: bool) -> Result<(), Error> {
     let pong = client.ping()?;
     let state = State::read(client)?;

@@ -446,7 +446,6 @@ impl Procedure<'_> {
         }
     }
 
-    /// One object in one line, for programs.
     fn as_json(&self) -> Value {
         let (found, settings) = (&self.found, &self.session.before);
         let [mut before, mut after, mut sigma] = [(); 3].map(|()| Map::new());

@@ -17,7 +17,6 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use toml_edit::Document;
 
-/// Values of `SAVED_STATE`.
 const SAME: i64 = Saved::Same as i64;
 const CHANGED: i64 = Saved::Changed as i64;
 /// A save makes the core wait for the flash.
@@ -122,7 +121,6 @@ fn get(wanted: &[&'static Register], client: &mut Client, json: bool) -> Result<
     Ok(())
 }
 
-/// Every stored register.
 fn read_all(client: &mut Client) -> Result<Vec<Value>, Error> {
     let params = client.read(address::PARAMS, 4 * Params::COUNT as u16)?;
     let block = table::Block { first: address::PARAMS, bytes: params };
@@ -220,7 +218,6 @@ fn diff(file: Option<&Path>, client: &mut Client, json: bool) -> Result<(), Erro
     Ok(())
 }
 
-/// `NAME=VALUE`.
 fn assignment(text: &str) -> Result<Value, String> {
     let (wanted, value) = text.split_once('=').ok_or_else(|| format!("`{text}`: NAME=VALUE is asked for"))?;
     let register = table::find(wanted.trim())?;
@@ -289,7 +286,6 @@ impl Stored {
         self.values.iter().find_map(|(register, value)| (name(register) == wanted).then_some(*value))
     }
 
-    /// Fails if the controller has something else.
     pub fn check(&self, client: &mut Client) -> Result<(), Error> {
         let unsure = "Whether all is set is not known: `fingertip params get` shows it";
         let now = client.again(Self::read).map_err(|why| Error::Other(format!("{why}. {unsure}")))?;
@@ -315,7 +311,6 @@ impl Stored {
     }
 }
 
-/// What was stored, and what is now.
 pub(super) struct Set {
     before: Stored,
     pub meant: Stored,
@@ -427,7 +422,6 @@ fn set_one((register, value): Value, client: &mut Client) -> Result<(), Error> {
     Ok(())
 }
 
-/// Returns what is wrong with a single value.
 fn wrong((register, value): &Value) -> Option<String> {
     let (min, max) = (register.min, register.max);
     if !table::is_stored(register) {
@@ -436,7 +430,6 @@ fn wrong((register, value): &Value) -> Option<String> {
     (!(min..=max).contains(value)).then(|| format!("{} of {value}: {min} to {max} are allowed", name(register)))
 }
 
-/// Parameters by their names.
 pub fn named(params: &Params) -> Map<String, serde_json::Value> {
     let names = Params::RANGES.iter().map(|(name, ..)| (*name).to_owned());
     names.zip(params.to_array().map(serde_json::Value::from)).collect()
@@ -464,7 +457,6 @@ const ENTRIES: &str = "entries";
 const CHIP: &str = "chip_id";
 
 struct Backup {
-    /// Values of registers with a name.
     values: Vec<Value>,
     /// The taxels' gains, in rows; `None` if the file has none.
     gains: Option<Vec<Vec<u16>>>,
@@ -553,7 +545,6 @@ fn read_backup(path: &Path, chip: Option<i64>) -> Result<Backup, Error> {
 
 // The taxels' gains, which outlive a reset beside the parameters.
 
-/// All of them, in rows.
 fn read_gains(client: &mut Client) -> Result<Vec<Vec<u16>>, Error> {
     let columns = (client.number(address::MODEL_INFORMATION)? >> 8 & 0xFF).max(1) as usize;
     let gains = client.block(address::GAINS, address::GAINS)?.numbers(address::GAINS);

@@ -119,7 +119,6 @@ pub(super) fn direction_confirmed(client: &mut Client) -> Result<(), Error> {
     Err("nobody confirmed yet which way the motor goes: `fingertip commission`, and watch the tip".into())
 }
 
-/// Turns torque on and sets the goal.
 pub(super) fn begin(goal_mn: i64, client: &mut Client) -> Result<(), Error> {
     let why = match client.set(address::TORQUE_ENABLE, 1).and_then(|()| client.set(address::GOAL_FORCE_MN, goal_mn)) {
         Err(why) => why,

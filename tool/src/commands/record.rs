@@ -63,9 +63,7 @@ impl Args {
     }
 }
 
-/// Takes states in turn.
 trait Sink {
-    /// One more, with its times.
     fn put(&mut self, stamp: &Stamp, state: &State) -> io::Result<()>;
     /// Writes out all samples so far, so that the file is readable.
     fn flush(&mut self) -> io::Result<()>;
@@ -121,7 +119,6 @@ struct Counts {
     last_s: f64,
 }
 
-/// Counts of a recording, and the error that ended it, if any.
 type Taken = (Counts, Option<Error>);
 
 /// Records states until the time is over, a signal comes, or the controller is lost.

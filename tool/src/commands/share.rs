@@ -20,7 +20,6 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::ThreadId;
 use std::time::{Duration, Instant};
 
-/// Instructions that change nothing.
 const READS: [u8; 6] = [
     instruction::PING,
     instruction::READ,
@@ -67,12 +66,10 @@ pub struct Args {
 struct Bus {
     client: Client,
     connections: BTreeMap<SocketAddr, Connection>,
-    /// IDs that answered a client.
     answered: BTreeSet<u8>,
     /// Fingers that got goal 0 and are neither seen idle yet nor commanded again: why, and when the next try is due, if not
     /// at once.
     ending: BTreeMap<u8, (&'static str, Option<Instant>)>,
-    /// True if the last packet was urgent.
     urgent: bool,
 }
 
@@ -80,7 +77,6 @@ struct Bus {
 struct Connection {
     /// IDs that it wrote to: they are stopped once it leaves or is silent, except those of the next commander.
     ids: BTreeSet<u8>,
-    /// Instant of its last packet.
     heard: Option<Instant>,
     /// Instant at which its silence is judged again; none before the first time.
     judged: Option<Instant>,
@@ -420,7 +416,6 @@ fn is_stop(packet: &Packet<'_>, parts: &[Part<'_>]) -> bool {
 
 /// Part of a packet for one device, or for all.
 struct Part<'a> {
-    /// IDs that it reaches.
     ids: RangeInclusive<u8>,
     /// Address of the first register written, and the data. A packet that writes nothing has no data.
     address: u16,
@@ -428,7 +423,6 @@ struct Part<'a> {
 }
 
 impl Part<'_> {
-    /// The byte that it writes at this address.
     fn byte(&self, address: u16) -> Option<u8> {
         self.data.get(usize::from(address.checked_sub(self.address)?)).copied()
     }

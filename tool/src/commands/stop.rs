@@ -23,7 +23,6 @@ const WATCHDOG: i64 = WATCHDOG_MS / WATCHDOG_UNIT_MS;
 const RELEASE_S: f64 = 10.0;
 /// Longest wait for the controller, for example if no frames come and its clock does not advance.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// Time between two reads of the state.
 const LOOK: Duration = Duration::from_millis(10);
 /// A released tip below this speed and this force is clear of the object.
 pub(super) const REST_UM_PER_S: i64 = 1_000;
@@ -304,7 +303,6 @@ pub fn tare(args: &Tare, client: &mut Client, json: bool) -> Result<(), Error> {
 }
 
 pub(super) struct Tared {
-    /// Something seemed to touch the tip meanwhile.
     pub touched: bool,
     /// Lowest and highest zero, codes.
     least: i64,
@@ -325,7 +323,6 @@ pub(super) fn no_tare(state: i64, client: &mut Client) -> Error {
     format!("the tare came to nothing: {why}").into()
 }
 
-/// Measures the zeros, with torque off.
 pub(super) fn measure_tare(request: i64, within: Duration, client: &mut Client) -> Result<Tared, Error> {
     client.set(address::TARE, request)?;
     let state = wait_for(client, address::TARE_STATE, within, |state| state != TARE_RUNNING)?;

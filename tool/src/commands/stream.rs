@@ -24,7 +24,6 @@ pub fn run(_: &Args, _: &mut crate::Client) -> Result<(), crate::Error> {
     Err("this build does not stream: `cargo install --path tool --features foxglove` makes one that does".into())
 }
 
-/// The WebSocket that Foxglove opens, by its own SDK.
 #[cfg(feature = "foxglove")]
 mod server {
     use super::Args;
@@ -36,7 +35,6 @@ mod server {
     use std::thread::sleep;
     use std::time::{Duration, Instant};
 
-    /// Interval of the checks for clients of the stream.
     const LOOK: Duration = Duration::from_millis(50);
     const TOPICS: [Topic; 2] = [Topic::Scalars, Topic::Image];
 

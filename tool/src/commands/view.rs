@@ -38,13 +38,11 @@ pub struct Seen {
     pub past: VecDeque<(f64, i64, i64)>,
     /// Updates a second, as they come.
     pub rate_hz: f64,
-    /// Why there is nothing new.
     pub lost: Option<String>,
     pub clock: Clock,
 }
 
 impl Seen {
-    /// Takes the next state, or the reason for its absence.
     pub fn take(&mut self, read: Result<State, Error>) {
         match read {
             Ok(state) if self.state.as_ref().is_some_and(|last| last.time_us == state.time_us) => {

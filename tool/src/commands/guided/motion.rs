@@ -18,7 +18,6 @@ use solve::record::{self, Reason};
 use solve::scale::{Held, SWINGS};
 use std::time::{Duration, Instant};
 
-/// Time between two looks at the motion.
 const LOOK: Duration = Duration::from_millis(10);
 const REPORT: Duration = Duration::from_secs(1);
 const TARE_WITHIN: Duration = Duration::from_secs(5);
@@ -72,7 +71,6 @@ impl Procedure<'_> {
         Ok(!limits.has(Limits::NOT_TARED) && !limits.has(Limits::TARED_TOUCHING))
     }
 
-    /// Tares under any settings.
     pub fn zeros(&mut self) -> Result<(), Error> {
         at_rest(self.client)?;
         self.run.report("tare: nothing may touch the tip");
@@ -255,7 +253,6 @@ fn carry_out(task: Task, run: &Run<'_>, client: &mut Client) -> Result<(), Error
     }
 }
 
-/// Longest time for a force to be reached.
 const REACHED_S: f64 = 30.0;
 /// Time within its tolerance after which a force counts as reached.
 const SETTLED: Duration = Duration::from_secs(1);
@@ -265,7 +262,6 @@ const AVERAGED: Duration = Duration::from_millis(500);
 /// Largest difference between goal and settled force: this share, at least this.
 const NEAR: f64 = 0.05;
 const NEAR_MN: f64 = 20.0;
-/// Steps of the session.
 pub const HOLDS: &str = "holds";
 pub const WEIGHT: &str = "weight";
 /// A weight on the tip: least force, and time to lay it there.

@@ -4,6 +4,7 @@
 use sim::effects::Parts;
 use sim::effects::sensor::{self, Readout};
 use sim::mechanics::contact::Contact;
+use sim::native::calibrated::Place;
 use sim::scene::{Scene, read};
 use sim::setup::Setup;
 use solve::press::{Array, Branch, Press, Reading, Step};
@@ -87,19 +88,12 @@ impl Draw {
     }
 }
 
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Place {
-    pub centre_mm: [f64; 2],
-    pub tilt_deg: [f64; 2],
-}
-
-impl Place {
-    pub fn any(rng: &mut fastrand::Rng, off_mm: f64, tilt_deg: f64) -> Self {
-        let mut within = |most: f64| most * (2.0 * rng.f64() - 1.0);
-        let centre_mm = [within(off_mm), within(off_mm)];
-        let (angle, tilt) = (within(std::f64::consts::PI), within(tilt_deg).abs());
-        Self { centre_mm, tilt_deg: [tilt * angle.cos(), tilt * angle.sin()] }
-    }
+/// A place within these bounds.
+pub fn any_place(rng: &mut fastrand::Rng, off_mm: f64, tilt_deg: f64) -> Place {
+    let mut within = |most: f64| most * (2.0 * rng.f64() - 1.0);
+    let centre_mm = [within(off_mm), within(off_mm)];
+    let (angle, tilt) = (within(std::f64::consts::PI), within(tilt_deg).abs());
+    Place { centre_mm, tilt_deg: [tilt * angle.cos(), tilt * angle.sin()] }
 }
 
 /// A part of the plan: to a travel from the contact at a speed, in a number of steps; or a hold with steps at these times.
@@ -309,7 +303,7 @@ pub fn presses(draw: &Draw, count: usize, plan: &[Part]) -> Vec<Press> {
     let mut finger = Finger::new(draw);
     let mut rng = fastrand::Rng::with_seed(draw.seed ^ 0x5eed);
     let mut press = |_| {
-        finger.go(&Place::any(&mut rng, 1.5, 2.0));
+        finger.go(&any_place(&mut rng, 1.5, 2.0));
         finger.pause(PAUSE_S);
         finger.tare();
         finger.press(plan, 8.0)

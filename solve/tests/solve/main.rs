@@ -5,9 +5,10 @@ mod modulus;
 mod record;
 mod strokes;
 
-use crate::finger::{Draw, Finger, Part, Place, cycle, plan, presses};
+use crate::finger::{Draw, Finger, Part, cycle, plan, presses};
 use fingertip::measure::series::{HEAD, Head, check, step_bytes};
 use fingertip::params::Params;
+use sim::native::calibrated::Place;
 use solve::gains::{Condition, NoGains, Verdict};
 use solve::press::{Branch, Press};
 use solve::record::{Ended, Reason};

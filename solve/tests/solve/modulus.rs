@@ -1,5 +1,6 @@
 //! Young's modulus of drawn tips.
 
+use crate::finger::any_place;
 use crate::*;
 use solve::modulus;
 use solve::modulus::Modulus;
@@ -113,7 +114,7 @@ fn drawn(seed: u64, yields_mm_per_n: f64) -> Draw {
 
 fn press(draw: &Draw, moves_mm_per_s: f64, plan: &[Part]) -> Press {
     let mut finger = Finger::new(draw);
-    finger.go(&Place::any(&mut fastrand::Rng::with_seed(draw.seed), 1.5, 2.0));
+    finger.go(&any_place(&mut fastrand::Rng::with_seed(draw.seed), 1.5, 2.0));
     finger.tare();
     finger.carry(moves_mm_per_s);
     finger.press(plan, 8.0)

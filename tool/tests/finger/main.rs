@@ -56,7 +56,7 @@ fn several_ids_are_asked_one_after_the_other() {
     let finger = Served::begin("grasp");
     Served::not_understood(&["--id", "1,2", "press", "1"], "takes one --id");
     let infos = || finger.json(&["--id", "all", "--timeout-ms", "1000", "info"]).as_array().expect("a list").clone();
-    let why = finger.refused(&["--id", "9,2", "--timeout-ms", "1000", "tare"]);
+    let why = finger.refuses(&["--id", "9,2", "--timeout-ms", "1000", "tare"], &[]);
     assert!(why.contains("ID 9: ping: no answer") && !why.contains("ID 2"), "{why}");
     let [first, second]: [serde_json::Value; 2] = Vec::try_into(infos()).expect("two fingers");
     assert_eq!((&first["id"], &second["id"]), (&1.into(), &2.into()));

@@ -290,14 +290,10 @@ impl Served {
         serde_json::from_str(&text).unwrap_or_else(|why| panic!("{why}: {text}"))
     }
 
-    pub fn refused(&self, arguments: &[&str]) -> String {
-        complained(&self.fingertip(arguments).output().expect("it starts"))
-    }
-
-    /// Asserts that a command fails, and that its error has these words.
+    /// Asserts that a command fails, and that its error has these words. Returns the error.
     #[track_caller]
-    pub fn refuses(&self, arguments: &[&str], words: &[&str]) {
-        fails(&self.fingertip(arguments).output().expect("it starts"), words);
+    pub fn refuses(&self, arguments: &[&str], words: &[&str]) -> String {
+        fails(&self.fingertip(arguments).output().expect("it starts"), words)
     }
 
     /// Asserts that a command is not understood, and that its error has this word.
@@ -409,16 +405,10 @@ pub fn ended(output: &Output) -> (Option<i32>, String) {
     (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
 }
 
-/// Asserts that a command failed, and that its error has these words.
+/// Asserts that a command failed, and that its error has these words. Returns the error.
 #[track_caller]
-pub fn fails(output: &Output, words: &[&str]) {
-    let said = complained(output);
-    assert!(words.iter().all(|word| said.contains(word)), "{said}");
-}
-
-#[track_caller]
-fn complained(output: &Output) -> String {
-    let (code, err) = ended(output);
-    assert_eq!(code, Some(1), "{output:?}");
-    err
+pub fn fails(output: &Output, words: &[&str]) -> String {
+    let (code, said) = ended(output);
+    assert!(code == Some(1) && words.iter().all(|word| said.contains(word)), "{output:?}");
+    said
 }

@@ -263,7 +263,7 @@ fn one_packet_stops_all_fingers() {
     // The first packet is enough. What comes in with it is heard as well, nothing after that.
     press();
     finger.command(&format!("deaf after 1 for {}", u64::MAX));
-    let why = finger.refused(&["--timeout-ms", "50", "stop", "--all"]);
+    let why = finger.refuses(&["--timeout-ms", "50", "stop", "--all"], &[]);
     assert!(both("Off:"), "{why} {}", finger.command("state"));
     // So it is for listed ones: an absent ID before them does not keep them pressing.
     finger.command("deaf no more");
@@ -274,7 +274,7 @@ fn one_packet_stops_all_fingers() {
     [1, 2].into_iter().for_each(hold);
     while !both("Force:") {}
     finger.command(&format!("deaf after 1 for {}", u64::MAX));
-    let why = finger.refused(&["--id", "9,1,2", "--timeout-ms", "50", "stop"]);
+    let why = finger.refuses(&["--id", "9,1,2", "--timeout-ms", "50", "stop"], &[]);
     assert!(both("Release:"), "{why} {}", finger.command("state"));
 }
 

@@ -98,7 +98,6 @@ pub struct Gains {
 
 /// Reason why a press, or all of them, do not count, with the number behind it.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "their texts say it")]
 pub enum NoGains {
     #[error("no press was given")]
     NoPress,
@@ -202,9 +201,6 @@ impl fmt::Display for Gains {
                 Condition::Sound | Condition::Unreached => {}
             }
         }
-        for (press, why) in &self.left_out {
-            write!(f, " Press {} does not count: {why}.", press + 1)?;
-        }
         for posed in &self.presses {
             if let Verdict::Soft(_) = posed.verdict {
                 write!(f, " In one press {}.", posed.verdict)?;
@@ -230,7 +226,6 @@ pub struct Shift {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "their texts say it")]
 pub enum Verdict {
     #[error("the press counts")]
     Good,

@@ -57,7 +57,6 @@ impl std::error::Error for Ended {}
 
 /// Reason why bytes are not a series, with the number behind it.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "their texts say it")]
 pub enum NoRecord {
     #[error("the series has {0} bytes; its head alone has {HEAD}")]
     Short(usize),

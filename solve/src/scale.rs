@@ -31,7 +31,6 @@ pub struct Held {
 
 /// Reason why there is no scale, with the number behind it.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "their texts say it")]
 pub enum NoScale {
     #[error("the largest force is {0:.3} N; 0.1 N is needed")]
     TooLittle(f64),
@@ -74,7 +73,6 @@ pub struct Creep {
 
 /// Reason why there is no creep or temperature coefficient, with the number behind it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "their texts say it")]
 pub enum NoDrift {
     #[error("the hold has {0} readings; 10 are needed")]
     Readings(usize),

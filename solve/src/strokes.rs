@@ -37,7 +37,7 @@ mod model;
 use crate::Value;
 use crate::record::{Ended, Reason};
 use fit::Fit;
-use model::{Path, SPAN, index};
+use model::{FITTED, Path, SPAN, index};
 
 /// Relative standard uncertainty of a voltage: the supply's divider and reference.
 pub const VOLTAGE: f64 = 0.008;
@@ -117,7 +117,6 @@ pub struct Record {
 
 /// Reason why there is no drive, with the number behind it.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "their texts say it")]
 pub enum NoDrive {
     #[error("the strokes were ended early: {0}")]
     Ended(#[from] Ended),
@@ -206,7 +205,7 @@ pub fn solve(record: &Record) -> Result<MeasuredDrive, NoDrive> {
     }
     let newtons = best.p[index::K].exp() / resistance.value * record.rad_per_mm * 1e3;
     let pushes = [index::FRONT, index::SPRING].map(|force| {
-        let (value, sigma) = best.probed(force);
+        let (value, sigma, _) = best.probes[force - FITTED];
         Value { value: newtons * value.abs(), sigma: newtons * sigma }
     });
     let force_n = if pushes[0].value > pushes[1].value { pushes[0] } else { pushes[1] };

@@ -48,7 +48,7 @@ pub struct Fit {
     common: f64,
     scatter: Matrix,
     /// Parameters that are not fitted: the value of each if it were, its uncertainty, and the change of the others.
-    probes: Vec<(f64, f64, Vector)>,
+    pub probes: Vec<(f64, f64, Vector)>,
 }
 
 /// A path's own unknowns: angle and speed at its first sample, and the voltage of its friction beside the law.
@@ -258,12 +258,6 @@ impl Fit {
         let uneven_v = if even { EVEN_V } else { UNEVEN * coulomb };
         let problem = Problem { paths, law, least, prior, uneven_v };
         Ok(problem.judged(&problem.minimum(point)?))
-    }
-
-    /// Value of a parameter that is not fitted, with its standard uncertainty.
-    pub fn probed(&self, index: usize) -> (f64, f64) {
-        let (value, sigma, _) = self.probes[index - FITTED];
-        (value, sigma)
     }
 
     /// Weights of fits with other forms of friction by how well they fit, this one's being the largest.

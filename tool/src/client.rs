@@ -3,6 +3,7 @@
 use crate::{Error, table};
 use fingertip::link::Reply;
 use fingertip::link::packet::{BROADCAST, Event, Packet, REPLY_MAX, Receiver, Sender, instruction};
+use fingertip::shipped::address;
 use rustix::fs::{FlockOperation, flock};
 use serial2::SerialPort;
 use std::io::{self, ErrorKind, Read as _, Write as _};
@@ -74,7 +75,7 @@ pub struct Pong {
 
 impl Pong {
     pub fn is_fingertip(&self) -> bool {
-        i64::from(self.model) == table::model()
+        table::register_at(address::MODEL_NUMBER).is_some_and(|model| model.min == i64::from(self.model))
     }
 }
 

@@ -24,7 +24,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-type Done = Result<(), Error>;
 /// True once output was lost against the user's will.
 static LOST: AtomicBool = AtomicBool::new(false);
 
@@ -88,8 +87,8 @@ pub fn each(
     ids: &[u8],
     titled: bool,
     first: &[(u16, i64)],
-    command: impl Fn(&mut Client) -> Done,
-) -> Done {
+    command: impl Fn(&mut Client) -> Result<(), Error>,
+) -> Result<(), Error> {
     let (all, mut ids) = (ids.contains(&BROADCAST), ids.to_vec());
     if all {
         let (fingers, others): (Vec<_>, Vec<_>) = client.ping_all()?.into_iter().partition(Pong::is_fingertip);

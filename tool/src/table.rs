@@ -1,7 +1,7 @@
 //! Registers by name, and what their numbers mean: all out of the core's own table.
 
 use fingertip::link::table::{Access, Kind, Register};
-use fingertip::shipped::{REGISTERS, address};
+use fingertip::shipped::REGISTERS;
 
 /// Registers side by side, as they were read.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -90,10 +90,6 @@ fn decode(kind: Kind, bytes: &[u8]) -> Option<i64> {
         Kind::U32 => i64::from(u32::from_le_bytes(*bytes.first_chunk()?)),
         Kind::I32 => i64::from(i32::from_le_bytes(*bytes.first_chunk()?)),
     })
-}
-
-pub fn model() -> i64 {
-    register_at(address::MODEL_NUMBER).map_or(0, |register| register.min)
 }
 
 /// Meaning of a register's number, from the register's own documentation: `2 approach` there is "approach" here.

@@ -95,7 +95,7 @@ pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Err
             Ok(())
         }
         Command::Restore { file, save } => {
-            let Backup { mut values, gains } = read_backup(file, Some(client.number(address::CHIP_ID)?))?;
+            let (mut values, gains) = read_backup(file, Some(client.number(address::CHIP_ID)?))?;
             // Who moves a device to another address or speed means it, and says so by `set`.
             values.retain(|(register, _)| !is_bus(register));
             conclude(&set(&values, gains, client)?, *save, client, json)
@@ -183,7 +183,7 @@ fn diff(file: Option<&Path>, client: &mut Client, json: bool) -> Result<(), Erro
     let Stored { values: now, gains: gains_now } = Stored::read(client)?;
     let (other, other_gains, what) = match file {
         Some(path) => {
-            let Backup { values, gains } = read_backup(path, None)?;
+            let (values, gains) = read_backup(path, None)?;
             (values, gains, path.display().to_string())
         }
         None => {
@@ -261,7 +261,12 @@ pub(super) struct Stored {
 
 impl Stored {
     pub fn read(client: &mut Client) -> Result<Self, Error> {
-        Ok(Self { values: read_all(client)?, gains: read_gains(client)? })
+        let values = read_all(client)?;
+        let columns = (client.number(address::MODEL_INFORMATION)? >> 8 & 0xFF).max(1) as usize;
+        let gains = client.block(address::GAINS, address::GAINS)?.numbers(address::GAINS);
+        // The registers have 16 bits.
+        let gains = gains.chunks(columns).map(|row| row.iter().map(|gain| *gain as u16).collect()).collect();
+        Ok(Self { values, gains })
     }
 
     /// Parameters and gains alone: registers beside the parameters have nothing to do with what is measured.
@@ -385,8 +390,8 @@ pub(super) fn set(values: &[Value], gains: Option<Vec<Vec<u16>>>, client: &mut C
     let params = (!params.is_empty()).then_some(Packet::Params);
     let others = others.into_iter().map(|(at, _)| Packet::One(at));
     let packets: Vec<Packet> = gains.into_iter().chain(params).chain(others).collect();
-    if !packets.is_empty() {
-        torque_is_off(client)?;
+    if !packets.is_empty() && client.number(address::TORQUE_ENABLE)? != 0 {
+        return Err("torque is on: parameters are set with torque off. Nothing was changed".into());
     }
     let interrupt = Interrupt::catch()?;
     for (at, packet) in packets.iter().enumerate() {
@@ -400,13 +405,6 @@ pub(super) fn set(values: &[Value], gains: Option<Vec<Vec<u16>>>, client: &mut C
         meant.check(client)?;
     }
     Ok(Set { before, meant, interrupt })
-}
-
-fn torque_is_off(client: &mut Client) -> Result<(), Error> {
-    if client.number(address::TORQUE_ENABLE)? == 0 {
-        return Ok(());
-    }
-    Err("torque is on: parameters are set with torque off. Nothing was changed".into())
 }
 
 fn set_one((register, value): Value, client: &mut Client) -> Result<(), Error> {
@@ -456,11 +454,8 @@ const ENTRIES: &str = "entries";
 /// Key of the `chip_id` of the controller that the backup was read from.
 const CHIP: &str = "chip_id";
 
-struct Backup {
-    values: Vec<Value>,
-    /// The taxels' gains, in rows; `None` if the file has none.
-    gains: Option<Vec<Vec<u16>>>,
-}
+/// Values of registers, and the taxels' gains in rows; `None` if the file has none.
+type Backup = (Vec<Value>, Option<Vec<Vec<u16>>>);
 
 /// Writes it, whole or not at all.
 fn write_backup(path: &Path, force: bool, client: &mut Client, stored: &Stored) -> Result<(), Error> {
@@ -540,14 +535,5 @@ fn read_backup(path: &Path, chip: Option<i64>) -> Result<Backup, Error> {
         }
         gains
     });
-    if wrong.is_empty() { Ok(Backup { values, gains }) } else { Err(Error::file("read", path, wrong.join("; "))) }
-}
-
-// The taxels' gains, which outlive a reset beside the parameters.
-
-fn read_gains(client: &mut Client) -> Result<Vec<Vec<u16>>, Error> {
-    let columns = (client.number(address::MODEL_INFORMATION)? >> 8 & 0xFF).max(1) as usize;
-    let gains = client.block(address::GAINS, address::GAINS)?.numbers(address::GAINS);
-    // The registers have 16 bits.
-    Ok(gains.chunks(columns).map(|row| row.iter().map(|gain| *gain as u16).collect()).collect())
+    if wrong.is_empty() { Ok((values, gains)) } else { Err(Error::file("read", path, wrong.join("; "))) }
 }

@@ -137,21 +137,11 @@ pub struct Stop {
     all: bool,
 }
 
-/// Stops the requested fingers, also after a signal: a finger that was released still has torque on, and perhaps no bus
-/// watchdog.
+/// Turns torque off, which aborts measurements, sets the bus watchdog to 0, and reports what was found and changed. All
+/// fingers release at once, then each is stopped, also after a signal: a finger that was released still has torque on, and
+/// perhaps no bus watchdog.
 pub fn run(args: &Stop, reach: &Reach, json: bool) -> Result<(), Error> {
     let interrupt = Interrupt::catch()?;
-    stop_all(args, reach, json)?;
-    interrupt.check()
-}
-
-/// Status return level at which all instructions are answered. A host may have left another one, at which torque off seems
-/// lost.
-pub const ALL_ANSWERED: i64 = 2;
-
-/// Turns torque off, which aborts measurements, sets the bus watchdog to 0, and reports what was found and changed. All
-/// fingers release at once, then each is stopped.
-fn stop_all(args: &Stop, reach: &Reach, json: bool) -> Result<(), Error> {
     let mut client = Client::open(reach)?;
     let answered = (address::STATUS_RETURN_LEVEL, ALL_ANSWERED);
     let (ids, first): (&[u8], &[(u16, i64)]) = if args.all {
@@ -167,8 +157,13 @@ fn stop_all(args: &Stop, reach: &Reach, json: bool) -> Result<(), Error> {
             say_json(&stopped);
         }
         Ok(())
-    })
+    })?;
+    interrupt.check()
 }
+
+/// Status return level at which all instructions are answered. A host may have left another one, at which torque off seems
+/// lost.
+pub const ALL_ANSWERED: i64 = 2;
 
 /// Sets the bus watchdog of a finger with torque off. Where another client of `fingertip share` commands, it is that
 /// client's, and stays. Returns whether it was set.

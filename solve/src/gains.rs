@@ -117,26 +117,19 @@ pub enum NoGains {
     Fit(usize),
 }
 
-/// Poses and gains, and the presses that they rest on, without creep.
-pub(crate) struct Settled {
-    /// Presses that count, creep taken out.
-    pub presses: Vec<Press>,
-    pub gains: Gains,
-    /// Creep that was taken out, as a share for each decade of time.
-    pub creep: f64,
-}
-
 /// Poses and gains of presses on the same array, with a judgement of each press.
 ///
 /// Presses that are judged other than good or soft are left out ([`Gains::left_out`]).
 pub fn gains(presses: &[Press]) -> Result<Gains, NoGains> {
-    settle(presses).map(|settled| settled.gains)
+    settle(presses).map(|(_, gains, _)| gains)
 }
 
 /// Rounds of the joint fit: each press by itself on the readings, for the creep; each by itself without creep, for the
 /// judgement, so that none spoils another; then all that count together. A plate is rigid unless its press shows otherwise:
 /// a yield that is always free would double the uncertainty of every press.
-pub(crate) fn settle(presses: &[Press]) -> Result<Settled, NoGains> {
+///
+/// Returns the presses that count, without creep, their poses and gains, and the creep, as a share for each decade of time.
+pub(crate) fn settle(presses: &[Press]) -> Result<(Vec<Press>, Gains, f64), NoGains> {
     let (mut sum, mut weights) = (0.0, 1e-9);
     let shape = |press: &Press| [press.array.rows, press.array.columns];
     let first = shape(presses.first().ok_or(NoGains::NoPress)?);
@@ -176,7 +169,7 @@ pub(crate) fn settle(presses: &[Press]) -> Result<Settled, NoGains> {
     }
     let mut gains = joint(&kept, if soft { YIELD_USUAL } else { 0.0 })?;
     gains.left_out = left_out;
-    Ok(Settled { presses: kept, gains, creep })
+    Ok((kept, gains, creep))
 }
 
 impl fmt::Display for Gains {

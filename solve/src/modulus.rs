@@ -6,7 +6,7 @@
 //! hysteresis, creep, relaxation and its time constant.
 
 use crate::Value;
-use crate::gains::{Gains, NoGains, Settled, settle};
+use crate::gains::{Gains, NoGains, settle};
 use crate::memory::{Memory, Motion};
 use crate::model::Pose;
 use crate::press::Press;
@@ -65,7 +65,7 @@ pub struct Parts {
 }
 
 pub fn modulus(presses: &[Press]) -> Result<Modulus, NoGains> {
-    let Settled { presses, gains, creep } = settle(presses)?;
+    let (presses, gains, creep) = settle(presses)?;
     let mut found = Vec::new();
     for (index, mut one) in
         each(&presses, &gains).into_iter().enumerate().filter_map(|(index, one)| Some((index, one?)))

@@ -137,16 +137,17 @@ impl Grip {
         let back = distance < Millimetres::ZERO;
         let deep = contact.indentation.0.saturating_mul_int(if back { DEEPER_BACK } else { DEEPER });
         // The array confirms how far the tip went into the object.
-        let borne_out = touch.placed()
-            && contact.force >= config.contact_off
-            && touch.deep(motion.observer.travel).0 <= deep.saturating_add(YIELDING.0);
-        // If more of the contact may be hidden, the fit needs the time of an approach to find how much.
-        let quick = touch.held() && borne_out && (back || contact.doubt <= SURE);
+        let beyond = touch.deep(motion.observer.travel);
+        let borne_out =
+            touch.placed() && contact.force >= config.contact_off && beyond.0 <= deep.saturating_add(YIELDING.0);
+        // Behind the surface the array may read a residue. If more of the contact may be hidden, the fit needs the time of an
+        // approach to find how much.
+        let quick = touch.held() && borne_out && (back || beyond >= Millimetres::ZERO && contact.doubt <= SURE);
         let limit = match (quick, back) {
             (false, _) => config.approach,
             // Behind the surface an object may follow, and no faster than a hand moves it. Nor does the tip fly from
             // a force of which the array shows hardly any.
-            (true, true) if touch.deep(motion.observer.travel) < Millimetres::ZERO || contact.doubt > u8::MAX / 2 => {
+            (true, true) if beyond < Millimetres::ZERO || contact.doubt > u8::MAX / 2 => {
                 MillimetresPerSecond(config.approach.0 + config.approach.0 / 4)
             }
             (true, true) => config.speed_max,
@@ -175,13 +176,13 @@ impl Release {
     #[inline(always)]
     fn follow(&mut self, contact: &Contact, touch: &mut Touch, travel: Millimetres, config: &Config) -> bool {
         let ((from, force), shown) = (self.from, touch.shown());
-        let behind =
-            touch.surface().map_or(self.rest, |surface| Millimetres(surface.0.saturating_sub(config.clearance.0)));
+        let surface = touch.surface().filter(|_| !touch.fleeting(config));
+        let behind = surface.map_or(self.rest, |surface| Millimetres(surface.0.saturating_sub(config.clearance.0)));
         self.rest = self.rest.min(behind);
         let rests = travel.0 < self.rest.0.saturating_add(config.clearance.0 / 2);
         if !touch.held() {
             self.from = (travel, force.min(shown));
-        } else if touch.lasts(config) && shown.0 > force.0.saturating_add(config.contact_on.0) {
+        } else if (touch.lasts(config) || touch.returns()) && shown.0 > force.0.saturating_add(config.contact_on.0) {
             // The object pushes.
             (self.falls, self.from) = (true, (travel, shown));
             if rests {

@@ -134,7 +134,7 @@ params! {
     /// Largest travel from where the motor was first driven.
     travel_max_um = 20_000 in 100..=100_000;
     /// Distance behind the surface to which a release goes.
-    clearance_um = 1_000 in 0..=20_000;
+    clearance_um = 1_000 in 500..=20_000;
     /// Over-force: above this the motor stops. Above force_max_mn.
     force_fault_mn = 9_000 in 100..=200_000;
     /// Largest goal; higher ones are refused. Above contact_on_mn, below force_fault_mn.

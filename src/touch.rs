@@ -5,10 +5,10 @@
 //! | stage | meaning | ends when |
 //! | --- | --- | --- |
 //! | none | the array shows no contact | the force reaches `contact_on_mn`: held |
-//! | held | something is pressed | the force falls below `contact_off_mn`: lost, or doubtful |
+//! | held | something is pressed | the force falls below `contact_off_mn`: lost, or doubtful; within 3 ms: none |
 //! | lost | the force fell away; the surface stays known | a force returns: held; no object can be that deep: none |
 //! | doubtful | the force vanished in a frame: the object is gone, or the array's signal | a force returns: held; a release has backed off: clear |
-//! | clear | a release has backed off; what the array still reads is a residue of the contact | a larger reading: held; the next approach: none |
+//! | clear | a release has backed off; what the array still reads is a residue of the contact | a larger reading for 3 ms: held; the next approach: none |
 //!
 //! A force cannot fall by a quarter within a frame: the object would have to leave at metres in a second. Such a step
 //! is withheld: the loop continues with the force before it, and does not press harder. A step that takes back a step
@@ -27,6 +27,8 @@ const ROSE_NS: u32 = 10_000_000;
 pub const FRAME_NS_MAX: u32 = 500_000;
 /// Time for which a force stays away before the touch is doubtful, or stays before it pushes a tip at rest, ns.
 const DOUBTFUL_NS: u32 = 3_000_000;
+/// Time for which a new force stays before it has a place, longer than a peak of noise on a residue, ns.
+const PEAK_NS: u32 = 300_000;
 /// Time after which a doubtful touch is given up, whether the tip could back off or not, ns.
 const GIVEN_UP_NS: u32 = 500_000_000;
 /// Largest uncertainty (`doubt`) at which the force of the fit is used: 1/8. Above it the plain sum is used as well.
@@ -96,7 +98,8 @@ pub struct Touch {
     shown: Newtons,
     /// Number of frames since the force began, or since the tip is clear.
     frames: u32,
-    /// Frames for which the force has been above its least by `contact_on_mn`, where the touch has no place yet.
+    /// Frames for which the force has been above its least by `contact_on_mn`, where the touch has no place yet or the tip
+    /// is clear.
     risen: u32,
     /// Time without a force, ns.
     away_ns: u32,
@@ -140,7 +143,11 @@ impl Touch {
                 self.away_ns = self.away_ns.saturating_add(config.timing.frame_ns);
                 self.least = self.least.min(shown);
                 self.frames = (self.frames + 1).min(FRAMES_MAX);
-                if shown.0 > self.least.0.saturating_add(config.contact_on.0) {
+                let above = shown.0 > self.least.0.saturating_add(config.contact_on.0);
+                self.risen = if above { (self.risen + 1).min(FRAMES_MAX) } else { 0 };
+                // Peaks of noise on a residue are shorter.
+                let long_ns = if self.stage == Stage::Clear { DOUBTFUL_NS } else { 0 };
+                if self.risen.saturating_mul(config.timing.frame_ns) > long_ns {
                     self.begin(inputs, by_motor());
                 }
             }
@@ -184,12 +191,14 @@ impl Touch {
         let residue = self.withheld > Newtons::ZERO && force.0 <= self.peak.0 >> RESIDUE_BITS;
         if force >= config.contact_off && !residue {
             self.away_ns = 0;
+        } else if self.fleeting(config) {
+            *self = Self { shown: self.shown, ..Self::default() };
         } else if self.withheld == Newtons::ZERO {
             self.stage = Stage::Lost;
         } else {
             self.away_ns = self.away_ns.saturating_add(config.timing.frame_ns);
             if self.away_ns > DOUBTFUL_NS {
-                (self.stage, self.least) = (Stage::Doubtful, force);
+                (self.stage, self.least, self.risen) = (Stage::Doubtful, force, 0);
             }
         }
     }
@@ -223,12 +232,9 @@ impl Touch {
     fn find(&mut self, inputs: &TouchInputs, config: &Config) {
         let above = self.shown.0 > self.least.0.saturating_add(config.contact_on.0);
         self.risen = if above { (self.risen + 1).min(FRAMES_MAX) } else { 0 };
-        let lasts = self.risen.saturating_mul(config.timing.frame_ns) > DOUBTFUL_NS;
-        let rises = match self.place {
-            Place::Here => above,
-            Place::Before => lasts && inputs.presses,
-            Place::Inherited | Place::Known => lasts,
-        };
+        let long_ns = if self.place == Place::Here { PEAK_NS } else { DOUBTFUL_NS };
+        let lasts = self.risen.saturating_mul(config.timing.frame_ns) > long_ns;
+        let rises = lasts && (inputs.presses || self.place != Place::Before);
         let here = place(inputs, self.by_motor);
         let sure = inputs.contact.doubt == 0;
         match self.place {
@@ -269,6 +275,11 @@ impl Touch {
     /// True if the contact lasts longer than a peak of noise: 3 ms.
     pub fn lasts(&self, config: &Config) -> bool {
         self.held() && self.frames.saturating_mul(config.timing.frame_ns) > DOUBTFUL_NS
+    }
+
+    /// True if a new contact is so far no longer than a peak of noise: nothing follows from its place.
+    pub fn fleeting(&self, config: &Config) -> bool {
+        self.held() && self.place == Place::Here && !self.lasts(config)
     }
 
     /// True if the force returned and has not risen since: the surface is still that of the contact before.
@@ -313,7 +324,8 @@ impl Touch {
     /// Takes note that a release has backed off: from here on the array reads a residue.
     pub fn clear(&mut self, force: Newtons) {
         if !matches!(self.stage, Stage::None | Stage::Clear) {
-            (self.stage, self.least, self.frames, self.withheld) = (Stage::Clear, force, 0, Newtons::ZERO);
+            (self.stage, self.least, self.withheld) = (Stage::Clear, force, Newtons::ZERO);
+            (self.frames, self.risen) = (0, 0);
         }
     }
 

@@ -11,7 +11,7 @@ fn config(rng: &mut Rng) -> Config {
     let params = Params {
         approach_um_per_s: rng.i32(5_000..100_000),
         travel_max_um: rng.i32(5_000..60_000),
-        clearance_um: rng.i32(0..3_000),
+        clearance_um: rng.i32(500..3_000),
         encoder_counts_per_turn: 1 << rng.u32(6..13),
         settle_ns: [500, 2_400, 20_000][rng.usize(0..3)],
         inertia_ug_m2: rng.i32(40..120),

@@ -176,7 +176,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         if let Activity::Press(press) = &self.activity
             && !press.running()
         {
-            self.activity = Activity::Grip(Grip::default());
+            self.end_press();
         }
         self.status.taken = AcknowledgedRequests { tare: command.tare_request, clear: command.clear_request, ..before };
         if command.clear_request != before.clear && !command.torque && matches!(self.activity, Activity::Fault(_)) {
@@ -297,8 +297,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             (Task::Stop, Activity::Strokes(run), _) => return run.halt(encoder),
             (Task::Stop, Activity::Press(_), _) => {
                 self.leave(Halt::BRAKES);
-                self.activity = Activity::Grip(Grip::default());
-                return;
+                return self.end_press();
             }
             // A motion waited, and never began.
             (Task::Stop, ..) if skipped => Ended::Interrupted,
@@ -331,6 +330,12 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             _ => Ended::NotReady,
         };
         self.status.measure = MeasureStatus::over(task, refusal, 0);
+    }
+
+    /// Goes from a press to a grip: what the array still reads may be a residue.
+    fn end_press(&mut self) {
+        self.touch.doubt_place();
+        self.activity = Activity::Grip(Grip::default());
     }
 
     /// Ends the activity, because something else begins: the new one is off, unless there is a fault.

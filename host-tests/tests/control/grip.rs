@@ -90,8 +90,8 @@ impl Hand {
         assert!(hand.touch.held() && !hand.touch.placed());
         let held = contact(force_mn);
         let travel = plus(mm(5.0), held.indentation);
-        // Two frames: one alone is no reference for a step.
-        for _ in 0..2 {
+        // Longer than a peak of noise.
+        for _ in 0..=300_000 / CONFIG.timing.frame_ns {
             hand.frame(force_mn, &held, at(travel));
         }
         assert!(hand.touch.placed());

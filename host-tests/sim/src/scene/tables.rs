@@ -38,7 +38,7 @@ pub const ROOT: Table = Table {
     about: "Keys before the first table.",
     keys: &[
         Key::new("about", "Description of the scene in one line.", Kind::Text),
-        Key::required("duration_s", "Virtual time from the end of the tare, when torque is enabled.", 1e-3, 1e6),
+        Key::required("duration_s", "Virtual time from the end of the tare, when torque is enabled.", 0.0, 1e6),
         Key::whole("seed", "Seed of all random numbers.", 0, i64::MAX, 1),
     ],
 };

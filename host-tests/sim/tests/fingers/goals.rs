@@ -103,6 +103,26 @@ fn goal_zero_releases_an_object_that_moved_while_it_was_held() {
     judge("objects that moved", "N", &cases);
 }
 
+/// What hysteresis and creep leave of a larger force is no new touch: the tip seeks the object as from the air.
+#[test]
+fn an_object_that_vanishes_after_a_lowered_goal_is_followed_slowly() {
+    let array = "[effects.noise]\nrms_codes = 3\n[effects.hysteresis]\nwidth_percent = 10\n\
+        [effects.creep]\nrate_percent_per_decade = 4\n";
+    let mut tasks = Vec::new();
+    for before_n in [2.0, 3.0, 5.0, 7.0] {
+        tasks.extend([0.2, 0.3, 0.4, 0.6, 1.0].map(|goal_n| (before_n, goal_n)));
+    }
+    let cases = cores::map(tasks, |(before_n, goal_n)| {
+        let mut finger = finger(&(object(6.0, 0.0) + array + LOSSES));
+        press(&mut finger, before_n, 1.0);
+        press(&mut finger, goal_n, 0.4);
+        finger.place_object(1e3);
+        let fastest = fastest_in_the_air(&mut finger, (0.0, goal_n), 0.3);
+        Case::new(format!("{before_n} N, then {goal_n} N"), fastest, 1.5 * APPROACH_MM_PER_S)
+    });
+    judge("an object that vanishes after a lowered goal", "mm/s", &cases);
+}
+
 #[test]
 fn torque_off_just_after_the_touch_does_not_let_the_tip_run_into_the_object() {
     let goals = ["", LOSSES].map(|losses| [0.5, 1.0, 3.0, 7.0].map(|goal_n| (losses, goal_n)));

@@ -7,6 +7,7 @@
 mod goals;
 mod measure;
 mod ordinary;
+mod residues;
 mod sequences;
 mod served;
 mod signal;

@@ -268,15 +268,12 @@ fn long_calibration_leaves_a_few_percent_of_the_force() {
 }
 
 /// Ordinary fingers, uncalibrated and calibrated: error of a hold, relative to 3 % plus 20 mN, and to 8 % plus 50 mN.
-/// More with `FINGERS=20 cargo test -p sim --test fingers closer -- --ignored --nocapture`.
 #[test]
 #[ignore = "long: cargo xtask test --long"]
 fn long_ordinary_fingers_hold_closer_once_they_are_calibrated() {
-    let count = number("FINGERS", 4) as usize;
     let ordinary = population::load("ordinary").unwrap_or_else(|error| panic!("{error}"));
     let shares = |board: Run<'_>| {
-        let scenes =
-            (0..count).map(|number| ordinary.finger(7, number).unwrap_or_else(|errors| panic!("{errors}")).scene);
+        let scenes = (0..4).map(|number| ordinary.finger(7, number).unwrap_or_else(|errors| panic!("{errors}")).scene);
         let outcomes = scenes.map(|scene| run(&scene, board, &mut []).expect("it runs"));
         let held = outcomes.flat_map(|outcome| outcome.holds).filter(|hold| !hold.missed && !hold.faulty);
         let off: Vec<[f64; 2]> = held.map(|hold| [(hold.mean_n - hold.goal_n).abs(), hold.goal_n]).collect();

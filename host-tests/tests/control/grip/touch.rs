@@ -255,10 +255,12 @@ fn a_touch_from_before_torque_has_no_place_until_its_force_rises() {
         let mut released = hand;
         assert!(!is_fast(released.frame(0, &more, at(mm(3.0))).0));
         // Above it by the force of a contact the surface stays, however much deeper this force presses.
-        let surface = hand.touch.surface();
-        for travel_mm in [3.0, 3.1] {
+        // A peak of noise is shorter.
+        let (surface, frames) = (hand.touch.surface(), 300_000 / CONFIG.timing.frame_ns);
+        for frame in 0..frames + 10 {
+            let travel_mm = if frame <= frames { 3.0 } else { 3.1 };
             hand.frame(7_000, &contact(force_mn + 41), at(mm(travel_mm)));
-            assert!(hand.touch.placed(), "{force_mn} mN");
+            assert_eq!(hand.touch.placed(), frame >= frames, "{force_mn} mN, frame {frame}");
             assert_eq!(hand.touch.surface(), surface, "{force_mn} mN at {travel_mm} mm");
         }
     }
@@ -349,9 +351,12 @@ fn only_behind_the_surface_the_baseline_learns_a_residue() {
     assert_eq!(hand.touch.stage(), Stage::Clear);
     // Up to a quarter of the held force.
     assert!(learns(&hand, 30) && learns(&hand, 250) && !learns(&hand, 251));
-    // 40 mN more than that are another touch.
+    // 40 mN more than that are another touch, if they last longer than a peak of noise.
     hand.frame(0, &contact(69), at(mm(4.4)));
-    assert!(learns(&hand, 30));
-    hand.frame(0, &contact(71), at(mm(4.4)));
+    let frames = 3_000_000 / CONFIG.timing.frame_ns;
+    for frame in 0..=frames {
+        assert!(!hand.touch.held() && learns(&hand, 30), "frame {frame}");
+        hand.frame(0, &contact(71), at(mm(4.4)));
+    }
     assert!(hand.touch.held() && !learns(&hand, 30));
 }

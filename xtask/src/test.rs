@@ -140,7 +140,7 @@ fn clippy(command: &mut Command) -> &mut Command {
     command.args(["--ignore-rust-version", "--", "-D", "warnings"])
 }
 
-/// A sequence of checks, each a line with its time.
+/// A sequence of checks, each a line with its time and its CPU time: of compiling and installing, and of running.
 #[derive(Default)]
 pub struct Stages {
     lines: Vec<String>,
@@ -153,21 +153,25 @@ impl Stages {
     /// Stages do not depend on each other's order: a stage that lacks what an earlier one failed to make fails too.
     pub fn stage<T>(&mut self, name: &str, work: impl FnOnce() -> Result<T>) -> Option<T> {
         println!("{name} ...");
-        let start = Instant::now();
+        let (start, before_s) = (Instant::now(), console::cpu_s());
         let result = work();
-        let clock_s = start.elapsed().as_secs_f64();
+        let (clock_s, after_s) = (start.elapsed().as_secs_f64(), console::cpu_s());
         if let Err(error) = &result {
             println!("{error:#}");
             self.failed.push(name.into());
         }
-        let line = format!("{} {clock_s:7.1} s  {name}", if result.is_ok() { "ok    " } else { "FAILED" });
+        let [compiling_s, running_s] = [0, 1].map(|kind| after_s[kind] - before_s[kind]);
+        let ended = if result.is_ok() { "ok    " } else { "FAILED" };
+        let line = format!("{ended} {clock_s:7.1} s  CPU {compiling_s:5.0} + {running_s:5.0} s  {name}");
         println!("{line}");
         self.lines.push(line);
         result.ok()
     }
 
     pub fn finish(self, what: &str) -> Result<()> {
+        let [compiling_s, running_s] = console::cpu_s();
         println!("\n{}", self.lines.join("\n"));
+        println!("CPU time: {compiling_s:.0} s of compiling and installing, {running_s:.0} s of running");
         if !self.failed.is_empty() {
             bail!("{} failed: {}", what, self.failed.join("; "));
         }

@@ -8,7 +8,7 @@
 //! | held | something is pressed | the force falls below `contact_off_mn`: lost, or doubtful; within 3 ms: none |
 //! | lost | the force fell away; the surface stays known | a force returns: held; no object can be that deep: none |
 //! | doubtful | the force vanished in a frame: the object is gone, or the array's signal | a force returns: held; a release has backed off: clear |
-//! | clear | a release has backed off; what the array still reads is a residue of the contact | a larger reading for 3 ms: held; the next approach: none |
+//! | clear | a release has backed off; what the array still reads is a residue of the contact | a larger reading for 1 ms: held; the next approach: none |
 //!
 //! A force cannot fall by a quarter within a frame: the object would have to leave at metres in a second. Such a step
 //! is withheld: the loop continues with the force before it, and does not press harder. A step that takes back a step
@@ -29,6 +29,8 @@ pub const FRAME_NS_MAX: u32 = 500_000;
 const DOUBTFUL_NS: u32 = 3_000_000;
 /// Time for which a new force stays before it has a place, longer than a peak of noise on a residue, ns.
 const PEAK_NS: u32 = 300_000;
+/// Time for which a reading stays above a residue before something pushes the released tip, ns.
+const PUSH_NS: u32 = 1_000_000;
 /// Time after which a doubtful touch is given up, whether the tip could back off or not, ns.
 const GIVEN_UP_NS: u32 = 500_000_000;
 /// Largest uncertainty (`doubt`) at which the force of the fit is used: 1/8. Above it the plain sum is used as well.
@@ -146,7 +148,7 @@ impl Touch {
                 let above = shown.0 > self.least.0.saturating_add(config.contact_on.0);
                 self.risen = if above { (self.risen + 1).min(FRAMES_MAX) } else { 0 };
                 // Peaks of noise on a residue are shorter.
-                let long_ns = if self.stage == Stage::Clear { DOUBTFUL_NS } else { 0 };
+                let long_ns = if self.stage == Stage::Clear { PUSH_NS } else { 0 };
                 if self.risen.saturating_mul(config.timing.frame_ns) > long_ns {
                     self.begin(inputs, by_motor());
                 }

@@ -353,7 +353,7 @@ fn only_behind_the_surface_the_baseline_learns_a_residue() {
     assert!(learns(&hand, 30) && learns(&hand, 250) && !learns(&hand, 251));
     // 40 mN more than that are another touch, if they last longer than a peak of noise.
     hand.frame(0, &contact(69), at(mm(4.4)));
-    let frames = 3_000_000 / CONFIG.timing.frame_ns;
+    let frames = 1_000_000 / CONFIG.timing.frame_ns;
     for frame in 0..=frames {
         assert!(!hand.touch.held() && learns(&hand, 30), "frame {frame}");
         hand.frame(0, &contact(71), at(mm(4.4)));

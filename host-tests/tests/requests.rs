@@ -215,7 +215,7 @@ fn measuring() -> Bench {
     board
 }
 
-/// Like every later frame: not driven at all where it shows a fault. Without torque a wrong supply is none.
+/// Like every later frame: not driven at all where it shows a fault. Without torque a wrong supply is no fault.
 #[test]
 fn the_first_frame_with_torque_is_judged_before_it_drives() {
     let supplies: [(Spoil, Fault); 2] = [

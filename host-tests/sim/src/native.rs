@@ -325,7 +325,7 @@ impl Board {
     }
 }
 
-/// Row that is driven in a slot of the scan; [`ROWS`], that is none, in the first one.
+/// Row that is driven in a slot of the scan; [`ROWS`] in the first one, which drives none.
 fn row_of(slot: usize) -> usize {
     slot.checked_sub(1).unwrap_or(ROWS)
 }

@@ -55,7 +55,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Staged<'_, ROWS, COLUMNS> {
         Ok(())
     }
 
-    /// Requests the end of a motion that measures, unless there is none or that was the last request anyway.
+    /// Requests the end of a motion that measures, unless none runs or that was the last request anyway.
     fn stop_measure(&mut self) {
         self.stops = true;
         let measures = self.measures();

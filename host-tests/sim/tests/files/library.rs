@@ -54,7 +54,7 @@ const BREAKERS: &[Breakers] = &[
     ("raspberry", &[LOW, MORE, LESS, "effects.breakable_object.force_n=0.9", "controller.encoder_counts_per_turn=800"]),
     ("slip_and_recovery", &[LOW, "effects.tangential.still=5", "host.read_ms=20", "effects.tangential.drift_mm_per_s=20", "effects.tangential.drift_mm_per_s=1", HUNTS]),
     ("soft_ball", &[LOW, MORE, LESS, "effects.object_stiffness.yield_mm_per_n=0.2", "effects.object_stiffness.yield_mm_per_n=1", HUNTS]),
-    ("step_ladder", &[LOW, "controller.inertia_ug_m2=20", "controller.inertia_ug_m2=300", "motor.inertia_g_cm2=0.2", "controller.modulus_pa=100000", "controller.modulus_pa=40000", "controller.force_max_mn=50", HUNTS]),
+    ("step_ladder", &[LOW, "controller.approach_um_per_s=40000", "controller.inertia_ug_m2=20", "controller.inertia_ug_m2=300", "motor.inertia_g_cm2=0.2", "controller.modulus_pa=100000", "controller.modulus_pa=40000", "controller.force_max_mn=50", HUNTS]),
     ("tilted_plane", &[LOW, LESS, MORE, "object.centre_x_mm=7", "effects.tilted_plane.along_columns_deg=0.5", HUNTS]),
     ("wall", &[MORE, LESS, HUNTS]),
     ("worn_sensor", &[LOW, MORE, LESS, "effects.broken_taxels.dead=[]", "effects.creep.rate_percent_per_decade=0", "effects.noise.rms_codes=7", "controller.encoder_counts_per_turn=700"]),

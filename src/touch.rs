@@ -25,7 +25,7 @@ const STEP_BITS: u32 = 2;
 const ROSE_NS: u32 = 10_000_000;
 /// Longest frame time in which no object moves that far, ns.
 pub const FRAME_NS_MAX: u32 = 500_000;
-/// Time for which a force stays away before the touch is doubtful, or stays before it pushes a tip at rest, ns.
+/// Time for which a force stays away before the touch is doubtful, or stays before it is no peak of noise, ns.
 const DOUBTFUL_NS: u32 = 3_000_000;
 /// Time for which a new force stays before it has a place, longer than a peak of noise on a residue, ns.
 const PEAK_NS: u32 = 300_000;
@@ -145,11 +145,9 @@ impl Touch {
                 self.away_ns = self.away_ns.saturating_add(config.timing.frame_ns);
                 self.least = self.least.min(shown);
                 self.frames = (self.frames + 1).min(FRAMES_MAX);
-                let above = shown.0 > self.least.0.saturating_add(config.contact_on.0);
-                self.risen = if above { (self.risen + 1).min(FRAMES_MAX) } else { 0 };
                 // Peaks of noise on a residue are shorter.
                 let long_ns = if self.stage == Stage::Clear { PUSH_NS } else { 0 };
-                if self.risen.saturating_mul(config.timing.frame_ns) > long_ns {
+                if self.rises(long_ns, config) {
                     self.begin(inputs, by_motor());
                 }
             }
@@ -230,13 +228,18 @@ impl Touch {
         }
     }
 
-    /// Looks for the surface's place.
-    fn find(&mut self, inputs: &TouchInputs, config: &Config) {
+    /// Counts a frame. Returns true once the force has been above its least by `contact_on_mn` for longer than this.
+    #[inline(always)]
+    fn rises(&mut self, long_ns: u32, config: &Config) -> bool {
         let above = self.shown.0 > self.least.0.saturating_add(config.contact_on.0);
         self.risen = if above { (self.risen + 1).min(FRAMES_MAX) } else { 0 };
+        self.risen.saturating_mul(config.timing.frame_ns) > long_ns
+    }
+
+    /// Looks for the surface's place.
+    fn find(&mut self, inputs: &TouchInputs, config: &Config) {
         let long_ns = if self.place == Place::Here { PEAK_NS } else { DOUBTFUL_NS };
-        let lasts = self.risen.saturating_mul(config.timing.frame_ns) > long_ns;
-        let rises = lasts && (inputs.presses || self.place != Place::Before);
+        let rises = self.rises(long_ns, config) && (inputs.presses || self.place != Place::Before);
         let here = place(inputs, self.by_motor);
         let sure = inputs.contact.doubt == 0;
         match self.place {

@@ -218,7 +218,7 @@ fn arrays(runs: &mut Vec<Run>) {
             true => frames.iter().cycle().take(ROWS).for_each(|frame| follow(array, frame, &config)),
             false => frames.iter().for_each(|frame| tare(array, frame, &config)),
         };
-        // Codes in Q16.
+        // Zeros are converter codes in Q16.
         let outputs: [Output<Array>; 1] =
             [("sum of the tares", |array| array.tare().flatten().map(|tare| i64::from(*tare)).sum(), 0)];
         runs.push(Box::new(move || judge(input, &start, &outputs, step)));

@@ -5,7 +5,8 @@ use crate::*;
 use solve::modulus;
 use solve::modulus::Modulus;
 
-/// Errors of tips that are drawn by these seeds, with gains that spread by up to this, and pressed in this way.
+/// Draws a tip for each seed, with gains that spread by up to `percent`, presses it, and sums up the errors of the modulus
+/// that is solved.
 fn errors(name: &str, seeds: Range<u64>, percent: f64, press: impl Fn(&Draw) -> Vec<Press>) -> [f64; 4] {
     let errors = seeds.map(|seed| {
         let draw = Draw::any(seed, [0.0, percent], [0, 2]);

@@ -47,7 +47,7 @@ named! {
     // Conductances of the taxels of a row, S.
     conductance: Slot,
     network: Network,
-    // Voltages of the amplifiers.
+    // Output voltages of the column amplifiers.
     volts: Slot,
     // Codes of the converter before rounding.
     codes: Slot,

@@ -269,7 +269,7 @@ pub struct Table {
 
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Knot {
-    /// Indentation; rising from knot to knot.
+    /// Indentation, larger than in the knot before.
     d_mm: f64,
     force_n: f64,
     energy_mj: f64,

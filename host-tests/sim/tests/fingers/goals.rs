@@ -108,11 +108,7 @@ fn goal_zero_releases_an_object_that_moved_while_it_was_held() {
 fn an_object_that_vanishes_after_a_lowered_goal_is_followed_slowly() {
     let array = "[effects.noise]\nrms_codes = 3\n[effects.hysteresis]\nwidth_percent = 10\n\
         [effects.creep]\nrate_percent_per_decade = 4\n";
-    let mut tasks = Vec::new();
-    for before_n in [2.0, 3.0, 5.0, 7.0] {
-        tasks.extend([0.2, 0.3, 0.4, 0.6, 1.0].map(|goal_n| (before_n, goal_n)));
-    }
-    let cases = cores::map(tasks, |(before_n, goal_n)| {
+    let cases = each(&[2.0, 3.0, 5.0, 7.0], &[0.2, 0.3, 0.4, 0.6, 1.0], |before_n, goal_n| {
         let mut finger = finger(&(object(6.0, 0.0) + array + LOSSES));
         press(&mut finger, before_n, 1.0);
         press(&mut finger, goal_n, 0.4);

@@ -6,10 +6,6 @@ fn noise(rms_codes: f64) -> String {
     format!("[effects.noise]\nrms_codes = {rms_codes:?}\n")
 }
 
-fn clearance(clearance_um: i32) -> String {
-    format!("[controller]\nclearance_um = {clearance_um}\n")
-}
-
 /// Presses, releases, and waits for half a second.
 fn released(tables: &str, goal_n: f64) -> Finger {
     let mut finger = finger(&(object(3.0, 0.0) + LOSSES + tables));
@@ -21,13 +17,8 @@ fn released(tables: &str, goal_n: f64) -> Finger {
 /// The push is no residue that the baseline may learn: the tip yields, and the next force is true.
 #[test]
 fn a_released_finger_yields_to_a_slow_push() {
-    let mut tasks = Vec::new();
-    for rms_codes in [0.5, 1.5, 2.5, 3.0] {
-        for mm_per_s in [0.5, 1.0, 2.0, 5.0, 20.0] {
-            tasks.extend([0.0, 0.3].map(|wait_s| (rms_codes, mm_per_s, wait_s)));
-        }
-    }
-    let cases = cores::map(tasks, |(rms_codes, mm_per_s, wait_s)| {
+    let waits = [0.5, 1.0, 2.0, 5.0, 20.0].map(|mm_per_s| [0.0, 0.3].map(|wait_s| (mm_per_s, wait_s)));
+    let cases = each(&[0.5, 1.5, 2.5, 3.0], waits.as_flattened(), |rms_codes, (mm_per_s, wait_s)| {
         let mut finger = released(&noise(rms_codes), 2.0);
         finger.run(wait_s);
         finger.carry_object(3.0, 1.0, mm_per_s, |_| {});
@@ -43,12 +34,9 @@ fn a_released_finger_yields_to_a_slow_push() {
 
 #[test]
 fn a_finger_with_little_clearance_yields_to_a_push() {
-    let mut tasks = Vec::new();
-    for clearance_um in [500, 600, 800] {
-        tasks.extend([1.0, 5.0, 20.0].map(|mm_per_s| (clearance_um, mm_per_s)));
-    }
-    let cases = cores::map(tasks, |(clearance_um, mm_per_s)| {
-        let mut finger = released(&(noise(0.5) + &clearance(clearance_um)), 2.0);
+    let cases = each(&[500, 600, 800], &[1.0, 5.0, 20.0], |clearance_um, mm_per_s| {
+        let controller = format!("[controller]\nclearance_um = {clearance_um}\n");
+        let mut finger = released(&(noise(0.5) + &controller), 2.0);
         finger.carry_object(3.0, 1.0, mm_per_s, |_| {});
         finger.run(0.6);
         Case::new(format!("{clearance_um} um, {mm_per_s} mm/s"), finger.truth().force_n, 0.1)

@@ -2,7 +2,7 @@
 
 use fingertip::link::table::{Access, Kind};
 use fingertip::shipped::REGISTERS;
-use host_tests::{control_table, figures, page};
+use host_tests::{analogue, control_table, figures, page};
 use std::error::Error;
 
 fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
@@ -12,6 +12,7 @@ fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
         "docs/firmware.md" => page::PAGE.renewed(&page::table())?,
         "examples/dynamixel/fingertip.model" => control_table::text(false),
         "examples/dynamixel/fingertip_direct.model" => control_table::text(true),
+        "docs/board.md" => analogue::PAGE.renewed(&analogue::markdown())?,
         "docs/pictures/figure-7.svg" => figures::figure_7()?,
         "docs/pictures/figure-10.svg" => figures::figure_10()?,
         "docs/pictures/figure-11.svg" => figures::figure_11()?,

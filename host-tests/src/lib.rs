@@ -2,6 +2,7 @@
 //!
 //! All of it is simulated; nothing here has touched silicon.
 
+pub mod analogue;
 pub mod control_table;
 pub mod figures;
 pub mod fit_cases;

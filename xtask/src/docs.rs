@@ -9,7 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Files that the example `generated` prints by their paths, and one by another example.
-const GENERATED: &str = "docs/control-table.md docs/firmware.md examples/dynamixel/fingertip.model \
+const GENERATED: &str = "docs/control-table.md docs/firmware.md docs/board.md examples/dynamixel/fingertip.model \
                          examples/dynamixel/fingertip_direct.model python/fingertip/registers.py \
                          docs/pictures/figure-7.svg docs/pictures/figure-10.svg docs/pictures/figure-11.svg";
 const SCENES: (&str, &str) = ("docs/scenes.md", "scenes-page");

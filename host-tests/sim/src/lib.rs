@@ -36,6 +36,8 @@ pub mod run;
 pub mod scene;
 pub mod setup;
 #[cfg(feature = "files")]
+pub mod shards;
+#[cfg(feature = "files")]
 pub mod sweep;
 pub mod watch;
 pub mod world;

@@ -14,19 +14,17 @@ pub use read::{folder, load, read};
 pub use report::Report;
 
 use crate::cli::verdict;
-use crate::cores;
 use crate::effects::stream;
 use crate::part::{Part, make_folder, write};
 use crate::population::report::{Ran, judged};
 use crate::run::{Run, RunError, run};
 use crate::scene::{self, Scene, SceneErrors, set};
-use crate::sweep::{Shard, progress};
+use crate::shards::Shard;
 use clap::{Parser, Subcommand, ValueEnum};
 use draw::Draw;
 use fastrand::Rng;
 use output::say;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
 use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -153,50 +151,36 @@ fn written(value: &Drawn, whole: bool) -> String {
 
 /// Draws fingers and runs them on all cores.
 pub fn fingers(population: &Population, seed: u64, all: usize, shard: Shard, board: Run) -> Result<Vec<Ran>, RunError> {
-    go_on(population, seed, (0..all).filter(|number| shard.has(*number)), Vec::new(), board, |_| Ok(()))
+    go_on(population, seed, all, shard, Vec::new(), board, |_| Ok(()))
 }
 
-/// Simulates the fingers that are not in `fingers`, passes each result to `keep`, and returns all in order.
+/// Simulates the fingers of a shard that are not `done`, passes each result to `keep`, and returns all in order.
 fn go_on(
     population: &Population,
     seed: u64,
-    numbers: impl Iterator<Item = usize>,
-    mut fingers: Vec<Ran>,
+    all: usize,
+    shard: Shard,
+    done: Vec<Ran>,
     board: Run,
-    mut keep: impl FnMut(&Ran) -> Result<(), RunError>,
+    keep: impl FnMut(&Ran) -> Result<(), RunError>,
 ) -> Result<Vec<Ran>, RunError> {
-    let done: BTreeSet<usize> = fingers.iter().map(|ran| ran.finger).collect();
-    let numbers: Vec<usize> = numbers.filter(|number| !done.contains(&(number + 1))).collect();
-    let progress = progress(numbers.len() + done.len(), "fingers")?.with_position(done.len() as u64);
     let work = |number: usize| {
-        let told = |error: RunError| format!("{}: finger {} of seed {seed}: {error}", population.file, number + 1);
-        let finger = population.finger(seed, number).map_err(|errors| told(errors.into()))?;
+        let told = |error: RunError| format!("{}: finger {number} of seed {seed}: {error}", population.file);
+        let finger = population.finger(seed, number - 1).map_err(|errors| told(errors.into()))?;
         let outcome = run(&finger.scene, board, &mut []).map_err(told)?;
-        Ok::<_, RunError>(Ran::new(number, &finger, &outcome))
+        Ok(Ran::new(number, &finger, &outcome))
     };
-    cores::each(numbers, work, |ran| {
-        progress.inc(1);
-        keep(&ran)?;
-        fingers.push(ran);
-        Ok(())
-    })?;
-    progress.finish_and_clear();
-    fingers.sort_by_key(|ran| ran.finger);
-    Ok(fingers)
+    let done = done.into_iter().map(|ran| (ran.finger, ran)).collect();
+    Ok(shard.go_on(all, "fingers", done, work, keep)?.into_values().collect())
 }
 
 /// Writes the scenes of the `count` worst fingers into a folder, in the order of [`Report::worst`].
-pub fn write_worst(
-    population: &Population,
-    report: &Report,
-    count: usize,
-    out: &Path,
-) -> Result<Vec<PathBuf>, RunError> {
+pub fn write_worst(from: &Population, report: &Report, count: usize, out: &Path) -> Result<Vec<PathBuf>, RunError> {
     make_folder(out)?;
     let mut paths = Vec::new();
     for ran in report.worst().into_iter().take(count) {
-        let scene = population.finger(report.seed, ran.finger - 1)?.scene;
-        let (name, seed, of) = (&population.name, report.seed, report.of_fingers);
+        let scene = from.finger(report.seed, ran.finger - 1)?.scene;
+        let (name, seed, of) = (&from.name, report.seed, report.of_fingers);
         let head = format!("# Drawn from the population `{name}`, seed {seed}; of {of}.\n# {}\n", judged(ran));
         let mut text = set(&scene.text, "seed", &scene.seed.to_string())?;
         // Removed draws leave empty lines.
@@ -299,7 +283,6 @@ fn population(args: &Args, board: Run) -> Result<bool, RunError> {
     let board_name = args.board.to_possible_value().expect("no board is hidden");
     let board_name = board_name.get_name();
     let all = args.fingers as usize;
-    let numbers = (0..all).filter(|number| shard.has(*number));
     // For a regular file the progress is kept in a file next to it. Terminals and pipes get everything at the end.
     let into_file = |path: &&PathBuf| fs::metadata(path).is_ok_and(|known| known.is_file()) || !path.exists();
     let mut part = None;
@@ -314,7 +297,7 @@ fn population(args: &Args, board: Run) -> Result<bool, RunError> {
         part = Some(opened);
     }
     let keep = |ran: &Ran| part.as_mut().map_or(Ok(()), |part| part.add(&serde_json::to_string(ran)?));
-    let fingers = go_on(&population, args.seed, numbers, done, board, keep)?;
+    let fingers = go_on(&population, args.seed, all, shard, done, board, keep)?;
     let report = Report::new(&population, board_name, args.seed, all, fingers);
     match (part, &args.json) {
         (Some(part), _) => {

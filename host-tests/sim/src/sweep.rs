@@ -8,22 +8,22 @@ mod summary;
 
 pub use summary::Table;
 
+use crate::cli;
 use crate::effects::{self, NamedEffect, draws};
 use crate::events::Event;
 use crate::metrics::METRICS;
-use crate::part::{self, cannot_write, make_folder};
+use crate::part::{Part, cannot_write, check, make_folder};
 use crate::run::{Run, RunError, run};
 use crate::scene::tables::Key;
 use crate::scene::{Bound, Scene};
-use crate::{cli, cores};
+use crate::shards::{Shard, complete};
 use csv::{Reader, ReaderBuilder};
-use indicatif::{ProgressBar, ProgressStyle};
 use output::kept::Lock;
 use output::say;
 use std::collections::BTreeMap;
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use std::{fmt, fs};
 
 #[derive(Clone, Debug, clap::Args)]
 pub struct Plan {
@@ -75,30 +75,25 @@ pub fn sweep(plan: &Plan, board: Run) -> Result<(Table, PathBuf), RunError> {
     }
     let head = head(plan, first, all);
     let out = plan.out.clone().unwrap_or_else(|| Path::new(FOLDER).join(&head.id));
-    let mut rows = Rows::open(plan, &out, &head)?;
-    say::aside(match rows.done.len() {
+    let (mut part, done) = resume(plan, &out, &head)?;
+    say::aside(match done.len() {
         0 => format!("the runs go to {}", out.display()),
         count => format!("goes on in {}, where {count} runs are done", out.display()),
     });
-    let tasks: Vec<usize> =
-        (0..all).filter(|run| plan.shard.has(*run) && !rows.done.contains_key(&(run + 1))).collect();
-    let progress = progress(tasks.len() + rows.done.len(), "runs")?.with_position(rows.done.len() as u64);
-    let work = |run: usize| {
-        let (values, scene) = &points[run / seeds];
-        let scene = Scene { seed: scene.seed + (run % seeds) as u64, ..scene.clone() };
-        Ok((run + 1, row(&head, run + 1, values, scene, board)?))
+    let work = |number: usize| {
+        let (values, scene) = &points[(number - 1) / seeds];
+        let scene = Scene { seed: scene.seed + ((number - 1) % seeds) as u64, ..scene.clone() };
+        row(&head, number, values, scene, board)
     };
-    cores::each(tasks, work, |(number, row)| {
-        progress.inc(1);
-        rows.add(number, row)
-    })?;
-    progress.finish_and_clear();
-    Ok((rows.finish(head.columns, plan, &out)?, out))
-}
-
-pub fn progress(all: usize, things: &str) -> Result<ProgressBar, RunError> {
-    let template = format!("{{bar:40}} {{pos}} of {{len}} {things}, {{eta}} to go");
-    Ok(ProgressBar::new(all as u64).with_style(ProgressStyle::with_template(&template)?))
+    let keep = |row: &Vec<String>| part.add(String::from_utf8(summary::csv([row])?)?.trim_end());
+    let rows = plan.shard.go_on(all, "runs", done, work, keep)?;
+    let table = Table { head: head.columns, rows: rows.into_values().collect() };
+    part.write(table.csv()?)?;
+    if plan.shard.is_whole() {
+        table.write_rest(&out, part.lock())?;
+    }
+    part.done()?;
+    Ok((table, out))
 }
 
 /// Row of a run: numbers, values, seed, verdict, digest, metrics and bounds.
@@ -219,59 +214,27 @@ fn head(plan: &Plan, scene: &Scene, runs: usize) -> Head {
     let max = |bound: &Bound| bound.max.filter(|_| bound.max_per_goal_n.is_none());
     let expected = scene.bounds.iter().map(|bound| format!("{}..{}", side(bound.min), side(max(bound)))).collect();
     let said = format!("{} {:?} {}\n{}", env!("CARGO_PKG_VERSION"), plan.vary, plan.seeds, scene.text);
-    Head { columns, id: format!("{}-{}", scene.name, part::check(&said)), runs, expected }
+    Head { columns, id: format!("{}-{}", scene.name, check(&said)), runs, expected }
 }
 
-/// Rows so far, also on disk, so that a sweep that is stopped can continue.
-struct Rows {
-    /// Rows by the number of their run, from 1.
-    done: BTreeMap<usize, Vec<String>>,
-    part: part::Part,
-}
-
-impl Rows {
-    /// Resumes from the rows of an earlier try of the same sweep.
-    fn open(plan: &Plan, out: &Path, head: &Head) -> Result<Self, RunError> {
-        let file = out.join(runs_name(plan));
-        let name = format!("the sweep {} of {} runs", head.id, head.runs);
-        refuse_others(&file, &head.id)?;
-        let (part, lines) = part::Part::open(&file, &name)?;
-        let (mut rows, width) = (BTreeMap::new(), head.columns.len());
-        for line in lines {
-            let mut reader = ReaderBuilder::new().has_headers(false).from_reader(line.as_bytes());
-            let row: Vec<String> = reader.deserialize().next().ok_or("an empty row")??;
-            let number = row.get(1).and_then(|number| number.parse().ok());
-            // Every line is complete, so another form means another version.
-            let number = number.filter(|number| row.len() == width && (1..=head.runs).contains(number));
-            let number =
-                number.ok_or_else(|| format!("{}.part has a row of another form: remove it", file.display()))?;
-            rows.insert(number, row);
-        }
-        Ok(Self { done: rows, part })
-    }
-
-    fn add(&mut self, number: usize, row: Vec<String>) -> Result<(), RunError> {
-        let line = summary::csv([&row])?;
-        self.part.add(String::from_utf8(line)?.trim_end())?;
-        self.done.insert(number, row);
-        Ok(())
-    }
-
-    /// Writes the files and then removes the rows so far.
-    fn finish(self, head: Vec<String>, plan: &Plan, out: &Path) -> Result<Table, RunError> {
-        let table = Table { head, rows: self.done.into_values().collect() };
-        self.part.write(table.csv()?)?;
-        if plan.shard.is_whole() {
-            table.write_rest(out, self.part.lock())?;
-        }
-        self.part.done()?;
-        Ok(table)
-    }
-}
-
-fn runs_name(plan: &Plan) -> String {
+/// Resumes from the rows of an earlier try of the same sweep, by the number of their run, from 1.
+fn resume(plan: &Plan, out: &Path, head: &Head) -> Result<(Part, BTreeMap<usize, Vec<String>>), RunError> {
     let Shard { number, of } = plan.shard;
-    if plan.shard.is_whole() { "runs.csv".into() } else { format!("runs-{number}-of-{of}.csv") }
+    let whole = plan.shard.is_whole();
+    let file = out.join(if whole { "runs.csv".into() } else { format!("runs-{number}-of-{of}.csv") });
+    refuse_others(&file, &head.id)?;
+    let (part, lines) = Part::open(&file, &format!("the sweep {} of {} runs", head.id, head.runs))?;
+    let mut rows = BTreeMap::new();
+    for line in lines {
+        let mut reader = ReaderBuilder::new().has_headers(false).from_reader(line.as_bytes());
+        let row: Vec<String> = reader.deserialize().next().ok_or("an empty row")??;
+        let number = row.get(1).and_then(|number| number.parse().ok());
+        // Every line is complete, so another form means another version.
+        let number = number.filter(|number| row.len() == head.columns.len() && (1..=head.runs).contains(number));
+        let number = number.ok_or_else(|| format!("{}.part has a row of another form: remove it", file.display()))?;
+        rows.insert(number, row);
+    }
+    Ok((part, rows))
 }
 
 /// Refuses to replace the runs of another sweep.
@@ -298,54 +261,6 @@ pub fn merge(files: &[PathBuf], out: &Path) -> Result<Table, RunError> {
     lock.write(table.csv()?).map_err(|error| cannot_write(&file, &error))?;
     table.write_rest(out, &lock)?;
     Ok(table)
-}
-
-/// Share of the runs: each n-th one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shard {
-    /// Number of the share, from 1.
-    pub number: usize,
-    pub of: usize,
-}
-
-impl Shard {
-    pub const WHOLE: Self = Self { number: 1, of: 1 };
-
-    /// True if a run, counted from 0, is in the share.
-    pub const fn has(self, run: usize) -> bool {
-        run % self.of == self.number - 1
-    }
-
-    pub const fn is_whole(self) -> bool {
-        self.of == 1
-    }
-}
-
-/// Returns the rows of merged shards, which must have every number from 1 to `all`.
-pub(crate) fn complete<T>(rows: BTreeMap<usize, T>, all: usize, thing: &str) -> Result<Vec<T>, String> {
-    if let Some(first) = (1..=all).find(|number| !rows.contains_key(number)) {
-        let missing = all - rows.len();
-        return Err(format!("{missing} of {all} {thing}s are missing, {thing} {first} the first: is a shard missing?"));
-    }
-    Ok(rows.into_values().collect())
-}
-
-impl fmt::Display for Shard {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}/{}", self.number, self.of)
-    }
-}
-
-impl FromStr for Shard {
-    type Err = String;
-
-    /// Parses `i/n`.
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("`{text}`: needs I/N, I from 1 to N");
-        let (number, of) = text.split_once('/').ok_or_else(wrong)?;
-        let shard = Self { number: number.parse().map_err(|_| wrong())?, of: of.parse().map_err(|_| wrong())? };
-        if (1..=shard.of).contains(&shard.number) { Ok(shard) } else { Err(wrong()) }
-    }
 }
 
 /// Largest number in a file. Metrics and keys are far smaller, and sums and differences of such numbers are finite.

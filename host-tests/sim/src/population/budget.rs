@@ -7,7 +7,7 @@ use crate::native::calibrated::{Calibrated, changed};
 use crate::native::{self, simulate_calibrated};
 use crate::run::{Run, RunError, run};
 use crate::scene::Scene;
-use crate::sweep::Shard;
+use crate::shards::Shard;
 use crate::watch::Watch;
 use fingertip::contact::FitLevel;
 use std::fmt::Write as _;

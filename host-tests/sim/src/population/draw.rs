@@ -169,19 +169,15 @@ impl Parser<'_, '_> {
     }
 
     /// Parses terms with operators of the same rank between them, from the left.
-    fn chain(
-        &mut self,
-        operators: [char; 2],
-        part: fn(&mut Self) -> Result<[f64; 2], String>,
-    ) -> Result<[f64; 2], String> {
+    fn chain(&mut self, signs: [char; 2], part: fn(&mut Self) -> Result<[f64; 2], String>) -> Result<[f64; 2], String> {
         let mut all = part(self)?;
         loop {
             self.rest = self.rest.trim_start();
-            let Some(operator) = operators.into_iter().find(|letter| self.rest.starts_with(*letter)) else {
+            let Some(sign) = signs.into_iter().find(|sign| self.rest.starts_with(*sign)) else {
                 return Ok(all);
             };
             self.rest = &self.rest[1..];
-            all = apply(operator, all, part(self)?);
+            all = apply(sign, all, part(self)?);
         }
     }
 
@@ -208,8 +204,8 @@ impl Parser<'_, '_> {
     }
 }
 
-fn apply(operator: char, a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
-    let of: fn(f64, f64) -> f64 = match operator {
+fn apply(sign: char, a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    let of: fn(f64, f64) -> f64 = match sign {
         '+' => |a, b| a + b,
         '-' => |a, b| a - b,
         '*' => |a, b| a * b,

@@ -5,7 +5,7 @@ use super::{Counted, Finger, Population};
 use crate::metrics::{Hold, Verdict, shown};
 use crate::part::check;
 use crate::run::{Outcome, RunError, asked};
-use crate::sweep::complete;
+use crate::shards::complete;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
@@ -49,7 +49,7 @@ pub struct Ran {
 impl Ran {
     pub fn new(number: usize, finger: &Finger, outcome: &Outcome) -> Self {
         Self {
-            finger: number + 1,
+            finger: number,
             seed: finger.scene.seed,
             inside: outcome.passed(),
             drawn: finger.drawn.iter().map(|(name, value)| (name.clone(), json!(value))).collect(),

@@ -4,7 +4,7 @@
 use crate::*;
 use sim::population::budget::{Budget, CAUSES, GOALS_N};
 use sim::population::{self, Drawn, Population, Report, fingers, load, write_worst};
-use sim::sweep::Shard;
+use sim::shards::Shard;
 
 /// Population of this text, preceded by the keys that every scene needs.
 fn population(lines: &str) -> Population {

@@ -2,7 +2,8 @@
 
 use crate::interrupted::{SIM, SWEEP};
 use crate::*;
-use sim::sweep::{Plan, Shard, Table, merge, sweep};
+use sim::shards::Shard;
+use sim::sweep::{Plan, Table, merge, sweep};
 use std::process::{Command, Stdio};
 
 /// Short, near, and with noise.

@@ -224,13 +224,7 @@ pub const EFFECTS: &[Description] = &[
             Key::number("gain_percent_per_k", "Change of the gain.", -1.0, 1.0, 0.36),
             Key::number("zero_kpa_per_k", "Change of the reading without pressure.", -1.0, 1.0, 0.01),
             Key::number("chip_share", "Share of the warming that the chip shows.", -2.0, 4.0, 1.0),
-            Key::number(
-                "chip_time_constant_s",
-                "Time constant of the microcontroller; 0 is that of the array.",
-                0.0,
-                1e6,
-                0.0,
-            ),
+            Key::number("chip_time_constant_s", "Time constant of the chip; 0 is that of the array.", 0.0, 1e6, 0.0),
         ],
         build: |build, parts| {
             let [warming_k, time_constant_s, zero_kpa_per_k, chip_share] =
@@ -345,14 +339,7 @@ pub const EFFECTS: &[Description] = &[
         equations: &["v' = min(v, V_ref - headroom_mv)"],
         state: "none",
         reference: "output swing to the rail in data sheets of amplifiers, 5 to 200 mV",
-        keys: &[Key::number(
-            "headroom_mv",
-            "Distance of their upper rail from the reference of 3.3 V.",
-            0.0,
-            3000.0,
-            50.0,
-        )
-        .idle(0.0)],
+        keys: &[Key::number("headroom_mv", "Distance of their upper rail from 3.3 V.", 0.0, 3000.0, 50.0).idle(0.0)],
         build: |build, parts| {
             let rail_v = Array::default().reference_v - build.number("headroom_mv") * 1e-3;
             parts.sensor.volts.push(

@@ -3,24 +3,23 @@
 use crate::events::{EVENT, KINDS, own_keys};
 use crate::population::draw::{self, Draw, Drawn};
 use crate::population::{Counted, Events, Place, Population};
-use crate::scene::reader::{SceneError, SceneErrors, did_you_mean, item_span, key_span, not_toml};
-use crate::scene::tables::{EXPECT, Key, Kind, ROOT, SCRIPT, TABLES};
+use crate::scene::reader::{Reader, SceneErrors, Span, did_you_mean, item_span, key_span};
+use crate::scene::tables::{self, EXPECT, Key, Kind, ROOT, SCRIPT, TABLES};
 use crate::{effects, metrics, scene};
 use std::fs;
-use std::ops::Range;
 use std::path::{Path, PathBuf};
-use toml_edit::{ArrayOfTables, Document, DocumentMut, InlineTable, Item, Table, TableLike, Value};
+use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
 /// Place and text of a mistake, and allowed values.
-pub type Wrong = (Range<usize>, String, String);
+pub type Wrong = (Span, String, String);
 
 pub const WAYS: [&str; 6] = ["uniform", "log_uniform", "normal", "choice", "is", "by"];
 const EXAMPLES: &str = "{ uniform = [1, 10] }, { log_uniform = [0.3, 3] }, { normal = [0, 0.05] } (mean, deviation), \
     { choice = [256, 512], weights = [1, 2] }, { is = \"1000 * modulus_kpa\" }, { by = \"thing\", ball = 0.05, otherwise = 0 }; \
     with follows = \"magnitude\" or \"1 / magnitude\"";
 
-impl Parts {
-    pub fn draw(&self, value: &Value) -> Result<Draw, Wrong> {
+impl Parts<'_> {
+    fn draw(&self, value: &Value) -> Result<Draw, Wrong> {
         let number = number(value).map(Drawn::Number);
         match (value.as_inline_table(), number.or_else(|| value.as_str().map(|word| Drawn::Word(word.into())))) {
             (Some(table), _) => self.table(table, at(value)),
@@ -29,7 +28,7 @@ impl Parts {
         }
     }
 
-    fn table(&self, table: &InlineTable, place: Range<usize>) -> Result<Draw, Wrong> {
+    fn table(&self, table: &InlineTable, place: Span) -> Result<Draw, Wrong> {
         let mut ways = WAYS.iter().filter_map(|way| Some((*way, table.get(way)?)));
         let (Some((way, value)), None) = (ways.next(), ways.next()) else {
             let given: Vec<&str> = table.iter().map(|(name, _)| name).collect();
@@ -154,7 +153,7 @@ pub fn number(value: &Value) -> Option<f64> {
     value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64)).filter(|number| number.is_finite())
 }
 
-fn at(value: &Value) -> Range<usize> {
+fn at(value: &Value) -> Span {
     value.span().unwrap_or(0..0)
 }
 
@@ -235,15 +234,14 @@ const OWN: [&str; 4] = ["magnitude", "draw", "events", "count"];
 
 /// Reads the text of a population without `extends`.
 pub fn read(file: &str, text: &str) -> Result<Population, SceneErrors> {
-    let error = |(at, message, allowed): Wrong| SceneError::new(file, text, at, &message, &allowed);
-    let document = Document::parse(text).map_err(|failure| not_toml(file, text, &failure))?;
+    let (mut reader, document) = Reader::of(file, text)?;
     let root = document.as_table();
     let magnitude =
         root.get("magnitude").map_or(Some(1.0), |item| number(item.as_value()?)).filter(|magnitude| *magnitude > 0.0);
-    let mut parts = Parts { magnitude: magnitude.unwrap_or(1.0), ..Parts::default() };
     if magnitude.is_none() {
-        parts.refuse(item_span(root, "magnitude"), "`magnitude` is a number above 0", "1 is as the file says");
+        reader.error(item_span(root, "magnitude"), "`magnitude` is a number above 0", "1 is as the file says");
     }
+    let mut parts = Parts { reader, magnitude: magnitude.unwrap_or(1.0), variables: Vec::new(), keys: Vec::new() };
     parts.variables(root);
     parts.keys("", root);
     let events = parts.events(root);
@@ -251,12 +249,8 @@ pub fn read(file: &str, text: &str) -> Result<Population, SceneErrors> {
     let counted = parts.counted(root);
     let blanks = OWN.iter().flat_map(|name| own_text(root, name));
     parts.keys.extend(blanks.map(|at| Place { at, key: String::new(), whole: false, draw: None }));
-    let Parts { variables, mut keys, wrong, .. } = parts;
-    if !wrong.is_empty() {
-        let mut errors: Vec<SceneError> = wrong.into_iter().map(error).collect();
-        errors.sort_by_key(|error| (error.line, error.column));
-        return Err(SceneErrors(errors));
-    }
+    let Parts { variables, mut keys, reader, .. } = parts;
+    reader.finish(Some(()))?;
     // Draws of events are not in the scene: each event has its own.
     keys.retain(|place: &Place| !place.key.starts_with("events."));
     keys.sort_by_key(|place: &Place| place.at.start);
@@ -276,33 +270,31 @@ pub fn read(file: &str, text: &str) -> Result<Population, SceneErrors> {
     Ok(population)
 }
 
-#[derive(Default)]
-struct Parts {
+struct Parts<'a> {
+    reader: Reader<'a>,
     magnitude: f64,
     variables: Vec<(String, Draw)>,
     keys: Vec<Place>,
-    wrong: Vec<Wrong>,
 }
 
-impl Parts {
-    fn refuse(&mut self, at: Range<usize>, message: impl Into<String>, allowed: impl Into<String>) {
-        self.wrong.push((at, message.into(), allowed.into()));
+impl Parts<'_> {
+    /// Reads a draw; none if it is wrong.
+    fn read(&mut self, value: &Value) -> Option<Draw> {
+        self.draw(value).map_err(|(at, message, allowed)| self.reader.error(at, message, allowed)).ok()
     }
 
     fn variables(&mut self, root: &Table) {
         let Some(item) = root.get("draw") else { return };
         let Some(table) = item.as_table() else {
-            return self.refuse(key_span(root, "draw"), "`draw` is a table", "[draw], once");
+            return self.reader.error(key_span(root, "draw"), "`draw` is a table", "[draw], once");
         };
         for (name, item) in table.iter() {
             let Some(value) = item.as_value() else {
-                self.refuse(key_span(table, name), format!("`{name}` is no draw"), "a value or a draw");
+                self.reader.error(key_span(table, name), format!("`{name}` is no draw"), "a value or a draw");
                 continue;
             };
-            match self.draw(value) {
-                Ok(draw) => self.variables.push((name.into(), draw)),
-                Err(wrong) => self.wrong.push(wrong),
-            }
+            let draw = self.read(value);
+            self.variables.extend(draw.map(|draw| (name.into(), draw)));
         }
     }
 
@@ -310,39 +302,29 @@ impl Parts {
     fn keys(&mut self, path: &str, table: &dyn TableLike) {
         for (name, item) in table.iter().filter(|(name, _)| !path.is_empty() || !OWN.contains(name)) {
             let key = if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") };
-            match item {
-                Item::Table(inner) => self.keys(&key, inner),
-                Item::ArrayOfTables(tables) => {
-                    tables.iter().enumerate().for_each(|(place, table)| self.keys(&format!("{key}.{place}"), table));
-                }
-                Item::Value(value) if value.is_inline_table() && !is_table(&key) => self.key(key, value),
-                Item::Value(value) => {
-                    if let Some(inner) = value.as_inline_table() {
-                        self.keys(&key, inner);
-                    }
-                }
-                Item::None => {}
+            if let Some(tables) = item.as_array_of_tables() {
+                tables.iter().enumerate().for_each(|(place, table)| self.keys(&format!("{key}.{place}"), table));
+            } else if let Some(inner) = item.as_table_like().filter(|_| item.is_table() || is_table(&key)) {
+                self.keys(&key, inner);
+            } else if let Some(value) = item.as_value().filter(|value| value.is_inline_table()) {
+                self.key(key, value);
             }
         }
     }
 
-    fn key(&mut self, key: String, value: &toml_edit::Value) {
-        let at = value.span().unwrap_or(0..0);
-        let draw = match self.draw(value) {
-            Ok(draw) => draw,
-            Err(wrong) => return self.wrong.push(wrong),
-        };
+    fn key(&mut self, key: String, value: &Value) {
+        let at = at(value);
+        let Some(draw) = self.read(value) else { return };
         let described = described(&key);
         if let (Some(described), Some([low, high])) = (described, draw.range(&|name| self.range(name)))
             && let Some([min, max]) = numbers(described)
             && (low < min || high > max)
         {
-            let [low, high] =
-                [low, high].map(|end| format!("{end:.6}").trim_end_matches('0').trim_end_matches('.').to_owned());
+            let [low, high] = [low, high].map(|end| metrics::shown(Some(end)));
             let magnitude =
                 if self.magnitude == 1.0 { String::new() } else { format!(" at a magnitude of {}", self.magnitude) };
             let message = format!("`{key}` is drawn from {low} to {high}{magnitude}");
-            self.refuse(at.clone(), message, described.allowed());
+            self.reader.error(at.clone(), message, described.allowed());
         }
         let whole =
             described.is_some_and(|key| matches!(key.kind, Kind::Whole { .. } | Kind::Optional { whole: true, .. }));
@@ -357,18 +339,15 @@ impl Parts {
         for (name, item) in table.iter().filter(|(name, _)| !own.contains(name)) {
             let known = KINDS.iter().find(|kind| kind.name == name);
             let (Some(kind), Some(given)) = (known, item.as_table()) else {
-                let names = KINDS.iter().map(|kind| kind.name);
-                let meant = did_you_mean(name, names.clone());
-                let allowed = format!("count, at_s, and a table for each of {}", names.collect::<Vec<_>>().join(", "));
-                self.refuse(key_span(table, name), format!("`{name}` is no kind of event{meant}"), allowed);
+                let names = own.into_iter().chain(KINDS.iter().map(|kind| kind.name));
+                self.reader.unknown(&format!("key `{name}` in [events]"), name, key_span(table, name), names);
                 continue;
             };
             let keys = own_keys(kind);
-            for (name, _) in
-                given.iter().filter(|(name, _)| *name != "weight" && keys.iter().all(|key| key.name != *name))
-            {
-                let allowed = keys.iter().map(|key| key.name).chain(["weight"]).collect::<Vec<_>>().join(", ");
-                self.refuse(key_span(given, name), format!("unknown key `{name}` in [events.{}]", kind.name), allowed);
+            let words = keys.iter().map(|key| key.name).chain(["weight"]);
+            for (name, _) in given.iter().filter(|(name, _)| words.clone().all(|word| word != *name)) {
+                let what = format!("key `{name}` in [events.{}]", kind.name);
+                self.reader.unknown(&what, name, key_span(given, name), words.clone());
             }
             for key in keys {
                 let place = self.drawn(given, key.name, &format!("events.{}", kind.name));
@@ -378,7 +357,7 @@ impl Parts {
             kinds.push((weight.unwrap_or(0.0), Draw::Always(Drawn::Word(kind.name.into()))));
         }
         if kinds.is_empty() {
-            self.refuse(table.span().unwrap_or(0..0), "[events] names no kind", "[events.tare] and the like");
+            self.reader.error(table.span().unwrap_or(0..0), "[events] names no kind", "[events.tare] and the like");
         }
         let [count, at_s] = own.map(|name| self.drawn(table, name, "events"));
         let kind = Place { at: 0..0, key: "kind".into(), whole: false, draw: Some(Draw::Choice(kinds)) };
@@ -388,7 +367,7 @@ impl Parts {
     /// Reads a required draw.
     fn drawn(&mut self, table: &Table, name: &str, path: &str) -> Option<Place> {
         let Some(value) = table.get(name).and_then(Item::as_value) else {
-            self.refuse(table.span().unwrap_or(0..0), format!("[{path}] lacks `{name}`"), "a value or a draw");
+            self.reader.error(table.span().unwrap_or(0..0), format!("[{path}] lacks `{name}`"), "a value or a draw");
             return None;
         };
         let known = self.keys.len();
@@ -398,18 +377,16 @@ impl Parts {
 
     /// Refuses variables that nothing uses.
     fn unused(&mut self, root: &Table) {
+        // The variables of a wrong draw are unknown.
+        let Some(table) = root.get("draw").and_then(Item::as_table).filter(|_| self.reader.errors.is_empty()) else {
+            return;
+        };
         let draws =
             self.variables.iter().map(|(_, draw)| draw).chain(self.keys.iter().filter_map(|key| key.draw.as_ref()));
         let used: Vec<&str> = draws.flat_map(Draw::uses).collect();
-        let unused = self.variables.iter().filter(|(name, _)| !used.contains(&name.as_str()));
-        let table = root.get("draw").and_then(Item::as_table);
-        let unused: Vec<(Range<usize>, String)> =
-            unused.map(|(name, _)| (table.map_or(0..0, |table| key_span(table, name)), name.clone())).collect();
-        // The variables of a wrong draw are unknown.
-        let sound = self.wrong.is_empty();
-        for (at, name) in unused.into_iter().filter(|_| sound) {
+        for (name, _) in table.iter().filter(|(name, _)| !used.contains(name)) {
             let allowed = format!("{{ is = \"{name}\" }} or {{ by = \"{name}\", ... }} at a key of the scene");
-            self.refuse(at, format!("`{name}` is drawn, and nothing uses it"), allowed);
+            self.reader.error(key_span(table, name), format!("`{name}` is drawn, and nothing uses it"), allowed);
         }
     }
 
@@ -420,20 +397,10 @@ impl Parts {
     }
 
     fn counted(&mut self, root: &Table) -> Vec<Counted> {
-        let tables = root.get("count").and_then(Item::as_array_of_tables);
         let mut counted = Vec::new();
-        for table in tables.into_iter().flatten() {
-            let metric = table.get("metric").and_then(Item::as_str).unwrap_or_default();
-            let above = table.get("above").and_then(Item::as_value).and_then(number);
-            let known = metrics::names().contains(&metric);
-            match above.filter(|_| known && table.len() == 2) {
-                Some(above) => counted.push(Counted { metric: metric.into(), above }),
-                None => {
-                    let meant = if known { String::new() } else { did_you_mean(metric, metrics::names()) };
-                    let message = format!("[[count]] is a metric and a number{meant}");
-                    let example = "metric = \"rest_duty_percent\", above = 2.0";
-                    self.refuse(table.span().unwrap_or(0..0), message, example);
-                }
+        for (given, at) in self.reader.many(&tables::COUNT, root) {
+            if let Some(values) = self.reader.values(&tables::COUNT, given, at, false) {
+                counted.push(Counted { metric: self.reader.metric(given, &values), above: values.number("above") });
             }
         }
         counted
@@ -441,7 +408,7 @@ impl Parts {
 }
 
 /// Returns the ranges of the text that only a population has: a key with its value, or tables from head to last value.
-fn own_text(root: &Table, name: &str) -> Vec<Range<usize>> {
+fn own_text(root: &Table, name: &str) -> Vec<Span> {
     let whole = |table: &Table| {
         let head = table.span()?;
         let ends = table.iter().filter(|(_, item)| !item.is_table()).filter_map(|(_, item)| Some(item.span()?.end));

@@ -10,45 +10,50 @@ use fingertip::shipped::{Config, ROWS};
 use std::fmt;
 use std::ops::Range;
 use std::path::Path;
-use toml_edit::{Document, Item, TableLike, TomlError};
+use toml_edit::{Document, Item, TableLike};
+
+/// Range of bytes of a text.
+pub(crate) type Span = Range<usize>;
 
 /// Reads a scene. Errors name the file `file`.
 pub fn read(file: &str, text: &str) -> Result<Scene, SceneErrors> {
-    let document = Document::parse(text).map_err(|error| not_toml(file, text, &error))?;
-    let mut reader = Reader { file, text, errors: Vec::new() };
-    match reader.scene(document.as_table()) {
-        Some(scene) if reader.errors.is_empty() => Ok(scene),
-        _ => {
-            reader.errors.sort_by_key(|error| (error.line, error.column));
-            Err(SceneErrors(reader.errors))
-        }
-    }
+    let (mut reader, document) = Reader::of(file, text)?;
+    let scene = reader.scene(document.as_table());
+    reader.finish(scene)
 }
 
-pub(crate) fn not_toml(file: &str, text: &str, error: &TomlError) -> SceneErrors {
-    let message = format!("this is not TOML: {}", error.message().trim().replace('\n', "; "));
-    SceneErrors(vec![SceneError::new(file, text, error.span().unwrap_or(0..0), &message, "")])
-}
-
-struct Reader<'a> {
+pub(crate) struct Reader<'a> {
     file: &'a str,
     text: &'a str,
-    errors: Vec<SceneError>,
+    pub errors: Vec<SceneError>,
 }
 
-impl Reader<'_> {
-    fn error(&mut self, at: Range<usize>, message: impl Into<String>, allowed: impl Into<String>) {
+impl<'a> Reader<'a> {
+    /// Parses a text. Places in the document are those of the text.
+    pub fn of(file: &'a str, text: &'a str) -> Result<(Self, Document<&'a str>), SceneErrors> {
+        let mut reader = Self { file, text, errors: Vec::new() };
+        match Document::parse(text) {
+            Ok(document) => Ok((reader, document)),
+            Err(error) => {
+                let message = format!("this is not TOML: {}", error.message().trim().replace('\n', "; "));
+                reader.error(error.span().unwrap_or(0..0), message, "");
+                Err(SceneErrors(reader.errors))
+            }
+        }
+    }
+
+    /// Returns what was read, or all errors in the order of the text.
+    pub fn finish<T>(mut self, read: Option<T>) -> Result<T, SceneErrors> {
+        self.errors.sort_by_key(|error| (error.line, error.column));
+        read.filter(|_| self.errors.is_empty()).ok_or(SceneErrors(self.errors))
+    }
+
+    pub fn error(&mut self, at: Span, message: impl Into<String>, allowed: impl Into<String>) {
         self.mistaken(at, message, allowed, None);
     }
 
     /// Reports a mistake with the word that was probably meant.
-    fn mistaken(
-        &mut self,
-        at: Range<usize>,
-        message: impl Into<String>,
-        allowed: impl Into<String>,
-        meant: Option<&str>,
-    ) {
+    fn mistaken(&mut self, at: Span, message: impl Into<String>, allowed: impl Into<String>, meant: Option<&str>) {
         let mut error = SceneError::new(self.file, self.text, at, &message.into(), &allowed.into());
         if let Some(meant) = meant {
             error.text += &format!("\n  did you mean `{meant}`?");
@@ -57,9 +62,20 @@ impl Reader<'_> {
     }
 
     /// Reports an unknown word, with the known ones.
-    fn unknown<'w>(&mut self, what: &str, given: &str, at: Range<usize>, words: impl Iterator<Item = &'w str> + Clone) {
+    pub fn unknown<'w>(&mut self, what: &str, given: &str, at: Span, words: impl Iterator<Item = &'w str> + Clone) {
         let allowed = words.clone().collect::<Vec<_>>().join(", ");
         self.mistaken(at, format!("unknown {what}"), allowed, alike(given, words));
+    }
+
+    /// Returns the metric that a table names. Refuses an unknown one.
+    pub fn metric(&mut self, given: &dyn TableLike, values: &Values) -> String {
+        let (metric, known) = (values.text("metric"), metrics::names());
+        if !known.contains(&metric) {
+            // The metrics of single fingers repeat those of the scene.
+            let words = known.iter().copied().filter(|known| !known.contains('.'));
+            self.unknown(&format!("metric `{metric}`"), metric, item_span(given, "metric"), words);
+        }
+        metric.to_owned()
     }
 
     /// Returns none if a required part is missing. Its error is among the others.
@@ -119,7 +135,7 @@ impl Reader<'_> {
     }
 
     /// Returns the tables of a `[[name]]`, each with its place.
-    fn many<'i>(&mut self, table: &Table, root: &'i dyn TableLike) -> Vec<(&'i dyn TableLike, Range<usize>)> {
+    pub fn many<'i>(&mut self, table: &Table, root: &'i dyn TableLike) -> Vec<(&'i dyn TableLike, Span)> {
         let Some(item) = root.get(table.name) else { return Vec::new() };
         let at = key_span(root, table.name);
         if let Some(tables) = item.as_array_of_tables() {
@@ -210,25 +226,18 @@ impl Reader<'_> {
     }
 
     fn bounds(&mut self, root: &dyn TableLike) -> Vec<Bound> {
-        let metrics = metrics::names();
         let mut bounds: Vec<Bound> = Vec::new();
         for (given, place) in self.many(&EXPECT, root) {
             let Some(values) = self.values(&EXPECT, given, place.clone(), false) else { continue };
             let bound = Bound {
-                metric: values.text("metric").to_owned(),
+                metric: self.metric(given, &values),
                 min: values.optional("min"),
                 max: values.optional("max"),
                 max_per_goal_n: values.optional("max_per_goal_n"),
             };
-            let metric = || item_span(given, "metric");
-            if !metrics.contains(&bound.metric.as_str()) {
-                // The metrics of single fingers repeat those of the scene.
-                let words = metrics.iter().copied().filter(|metric| !metric.contains('.'));
-                self.unknown(&format!("metric `{}`", bound.metric), &bound.metric, metric(), words);
-            }
             if bounds.iter().any(|before| before.metric == bound.metric) {
                 let message = format!("bounds of `{}` for the second time", bound.metric);
-                self.error(metric(), message, "one [[expect]] a metric, with min, max or both");
+                self.error(item_span(given, "metric"), message, "one [[expect]] a metric, with min, max or both");
             }
             let by_goal = metrics::BY_GOAL.iter().map(|(name, _)| *name);
             if bound.max_per_goal_n.is_some() {
@@ -260,7 +269,7 @@ impl Reader<'_> {
 
 impl Reader<'_> {
     /// Returns the checked values of a table; none if one is wrong or missing. `open` accepts unknown keys.
-    fn values(&mut self, table: &Table, given: &dyn TableLike, place: Range<usize>, open: bool) -> Option<Values> {
+    pub fn values(&mut self, table: &Table, given: &dyn TableLike, place: Span, open: bool) -> Option<Values> {
         let errors = self.errors.len();
         let strange = |name: &str| !open && table.keys.iter().all(|key| key.name != name);
         for (name, _) in given.iter().filter(|(name, _)| strange(name)) {
@@ -290,7 +299,7 @@ impl Reader<'_> {
         (complete && self.errors.len() == errors).then_some(values)
     }
 
-    fn unknown_key(&mut self, table: &Table, name: &str, at: Range<usize>) {
+    fn unknown_key(&mut self, table: &Table, name: &str, at: Span) {
         let words = table.keys.iter().map(|key| key.name);
         let suggestion = alike(name, words.clone());
         let meant = suggestion.and_then(|word| table.keys.iter().find(|key| key.name == word));
@@ -307,7 +316,7 @@ impl Reader<'_> {
         self.mistaken(at, message, allowed, suggestion);
     }
 
-    fn value(&mut self, key: &Key, item: &Item, at: Range<usize>) -> Option<Value> {
+    fn value(&mut self, key: &Key, item: &Item, at: Span) -> Option<Value> {
         let name = key.name;
         let number = item.as_float().or_else(|| item.as_integer().map(|whole| whole as f64));
         // Adding 0 turns -0 into 0.
@@ -364,12 +373,12 @@ fn pairs(item: &Item, below: i64) -> Option<Vec<[i64; 2]>> {
 }
 
 /// Range of a key in the text.
-pub(crate) fn key_span(table: &dyn TableLike, name: &str) -> Range<usize> {
+pub(crate) fn key_span(table: &dyn TableLike, name: &str) -> Span {
     table.get_key_value(name).and_then(|(key, _)| key.span()).unwrap_or(0..0)
 }
 
 /// Range of the value of a key in the text.
-pub(crate) fn item_span(table: &dyn TableLike, name: &str) -> Range<usize> {
+pub(crate) fn item_span(table: &dyn TableLike, name: &str) -> Span {
     table.get(name).and_then(Item::span).unwrap_or_else(|| key_span(table, name))
 }
 
@@ -385,7 +394,7 @@ pub struct SceneError {
 
 impl SceneError {
     /// Creates an error at a range of bytes of a text.
-    pub fn new(file: &str, text: &str, at: Range<usize>, message: &str, allowed: &str) -> Self {
+    pub fn new(file: &str, text: &str, at: Span, message: &str, allowed: &str) -> Self {
         let start = (0..=at.start.min(text.len())).rev().find(|at| text.is_char_boundary(*at)).unwrap_or(0);
         let line_start = text[..start].rfind('\n').map_or(0, |newline| newline + 1);
         let source_line = text[line_start..].lines().next().unwrap_or("");

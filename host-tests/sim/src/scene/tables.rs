@@ -18,7 +18,7 @@ impl Table {
     pub fn title(&self) -> String {
         match self.name {
             "" => "the scene".into(),
-            name if MANY.contains(&name) => format!("[[{name}]]"),
+            name if MANY.contains(&name) || name == COUNT.name => format!("[[{name}]]"),
             name if KINDS.iter().any(|kind| kind.name == name) => format!("[[event]] of kind `{name}`"),
             name if TABLES.iter().any(|table| table.name == name) => format!("[{name}]"),
             name => format!("[effects.{name}]"),
@@ -65,6 +65,12 @@ pub const EXPECT: Table = Table {
             Kind::Optional { min: 0.0, max: 1e6, whole: false },
         ),
     ],
+};
+/// Table of a population.
+pub(crate) const COUNT: Table = Table {
+    name: "count",
+    about: "Count of the fingers whose metric is above a value.",
+    keys: &[EXPECT.keys[0], Key::required("above", "Value that is not counted.", -1e12, 1e12)],
 };
 const ANY: Kind = Kind::Optional { min: -1e12, max: 1e12, whole: false };
 
@@ -151,13 +157,7 @@ pub const TABLES: &[Table] = &[
             Key::whole("fit_level", "Requested fit level, 0 to 5.", 0, 5, 2),
             number("read_ms", "Time between readings; 0 reads nothing and does not grip.", 0.0, 1000.0, 0.0),
             number("grip_friction", "Friction coefficient that the host trusts.", 0.01, 10.0, 0.5),
-            number(
-                "grip_n_per_mm",
-                "Stiffness of the patch along the surface, as the host assumes.",
-                0.001,
-                1000.0,
-                1.0,
-            ),
+            number("grip_n_per_mm", "Assumed stiffness of the patch along the surface.", 0.001, 1000.0, 1.0),
             number("grip_drop_mm", "Distance of a returning centre that counts as a slip.", 0.001, 20.0, 0.05),
             number("grip_most_n", "Largest force that the grip requests.", 0.0, 150.0, 4.0),
             number("centre_n_per_mm", "Decrease of the goal per travel, to centre a free object.", 0.0, 10.0, 0.0),

@@ -242,7 +242,6 @@ pub struct Check {
 }
 
 impl Check {
-    /// Compares a figure with its bounds, lower and upper.
     pub fn new(name: impl Into<String>, measured: Option<f64>, unit: &'static str, bounds: [Option<f64>; 2]) -> Self {
         let [at_least, at_most] = bounds;
         let inside =
@@ -323,9 +322,9 @@ impl StepFigures {
         let setup = Setup::default();
         let [volts, amperes] =
             [Params::DEFAULT.voltage_max_mv, Params::DEFAULT.current_max_ma].map(|milli| f64::from(milli) * 1e-3);
-        let [d_from_mm, d_to_mm] = [asked.from_n, asked.goal_n].map(|force_n| setup.tip.indentation_mm(force_n));
-        let optimal = profile(&setup, d_from_mm, d_to_mm, volts, amperes);
-        let no_bound = |why| format!("no bound for a step from {d_from_mm} mm to {d_to_mm} mm of indentation: {why}");
+        let d_mm = [asked.from_n, asked.goal_n].map(|force_n| setup.tip.indentation_mm(force_n));
+        let optimal = profile(&setup, d_mm, volts, amperes);
+        let no_bound = |why| format!("no bound for a step of the indentation over {d_mm:?} mm: {why}");
         let time_optimal_ms = 1e3 * optimal.map_err(no_bound)?.total_s;
         let measured = asked.meter.measured();
         let settling_ms = measured.get("settling_ms");
@@ -356,21 +355,14 @@ fn steady_mn(goal_n: f64) -> f64 {
     goal_n * 5.0 + 5.0
 }
 
-/// Returns all checks as a table, and the time of each step over the shortest possible one.
-pub fn table(checks: &[Check], forces: &Forces) -> String {
+/// Returns all checks as a table.
+pub fn table(checks: &[Check]) -> String {
     let mut text = format!("{:<44} {:>12} {:<5} {:>16}\n", "", "measured", "", "bound");
     for check in checks {
         let measured = check.measured.map_or_else(|| "never".to_owned(), |value| shown(Some(value)));
         let verdict = if check.pass { "pass" } else { "FAIL" };
         let bound = asked(check.at_least, check.at_most);
         let _ = writeln!(text, "{:<44} {measured:>12} {:<5} {bound:>16}  {verdict}", check.name, check.unit);
-    }
-    let _ = writeln!(text);
-    for step in &forces.steps {
-        let StepFigures { from_n, to_n, time_optimal_ms, settling_to_optimal_ratio, .. } = step;
-        let times = settling_to_optimal_ratio.map_or("for ever, not".into(), |ratio| format!("{ratio:.2}"));
-        let needs = format!("the motor at its limits needs {time_optimal_ms:.1} ms");
-        let _ = writeln!(text, "{from_n:.1} to {to_n:.1} N: {needs}; the loop took {times} times as long");
     }
     text
 }

@@ -131,7 +131,7 @@ fn demo(image: &Path, json: Option<&Path>, out: &Path, quick: bool) -> Result<()
     let drawn = draw(&run, &figures.forces, out);
     json.map_or(Ok(()), |path| write(path, &figures))?;
     say::line(format_args!("sha-256  {} ({} bytes, as flashed)\n", figures.image_sha256, figures.image_bytes));
-    say::text(table(&figures.checks, &figures.forces));
+    say::text(table(&figures.checks));
     say::line(format_args!("\ntrace    {}", figures.trace_sha256));
     if let Some(repeated) = &figures.repeated_trace_sha256 {
         say::line(format_args!("repeated {repeated}"));

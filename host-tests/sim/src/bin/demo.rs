@@ -41,7 +41,7 @@ fn run(quick: bool, out: &Path) -> Result<usize, RunError> {
     let forces = Forces::of(&run)?;
     let checks = forces.checks();
     let drawn = draw(&run, &forces, out);
-    say::text(table(&checks, &forces));
+    say::text(table(&checks));
     drawn?.iter().for_each(|path| say::line(format_args!("picture  {}", path.display())));
     Ok(missed(&checks))
 }

@@ -206,22 +206,17 @@ pub enum Unreachable {
 }
 
 /// Returns the time-optimal motion from rest at one indentation to rest at another, with which force steps are compared.
-/// The voltage is at most that of the supply.
+/// The limits are in V and A, the voltage at most that of the supply.
 ///
 /// The drive uses the limits of voltage and current, then brakes with them, and switches once: the time-optimal profile
 /// for a shaft with friction against a load that depends on the place. The switch time is found by shooting: bisection on
 /// the plant's equations of motion.
-pub fn profile(
-    setup: &Setup,
-    d_from_mm: f64,
-    d_to_mm: f64,
-    voltage_limit: f64,
-    current_limit: f64,
-) -> Result<Profile, Unreachable> {
+pub fn profile(setup: &Setup, d_mm: [f64; 2], volts: f64, amperes: f64) -> Result<Profile, Unreachable> {
+    let [d_from_mm, d_to_mm] = d_mm;
     if d_from_mm == d_to_mm {
         return Ok(Profile { switch_s: 0.0, total_s: 0.0 });
     }
-    let shooting = Shooting::new(setup, d_from_mm, d_to_mm, voltage_limit, current_limit);
+    let shooting = Shooting::new(setup, d_mm, volts, amperes);
     let reaches = |switch_s| Ok(shooting.passed(&shooting.shoot(switch_s)?.0));
     let (mut short_s, mut long_s) = (0.0, STEP_S);
     while !reaches(long_s)? {
@@ -253,13 +248,13 @@ struct Shooting<'a> {
 }
 
 impl<'a> Shooting<'a> {
-    fn new(setup: &'a Setup, d_from_mm: f64, d_to_mm: f64, voltage_limit: f64, current_limit: f64) -> Self {
+    fn new(setup: &'a Setup, [d_from_mm, d_to_mm]: [f64; 2], volts: f64, amperes: f64) -> Self {
         let (supply, mm_per_rad) = (&setup.supply, setup.transmission.mm_per_rad());
-        let duty = (voltage_limit / supply.source_v).min(1.0);
+        let duty = (volts / supply.source_v).min(1.0);
         let drive = Source {
             volts: duty * supply.source_v * (d_to_mm - d_from_mm).signum(),
             ohms: supply.circuit_ohm(&setup.motor, duty),
-            limit_a: current_limit,
+            limit_a: amperes,
             kept_a: 0.0,
         };
         let rotor = Rotor {

@@ -134,7 +134,7 @@ fn the_demonstration_holds_its_bounds_and_draws_the_same_pictures_each_time() {
     let run = demonstrated();
     let forces = Forces::of(&run).unwrap();
     let checks = forces.checks();
-    assert_eq!((missed(&checks), checks.len()), (0, 26), "\n{}", table(&checks, &forces));
+    assert_eq!((missed(&checks), checks.len()), (0, 26), "\n{}", table(&checks));
     let pictures = drawn(&run, "demo/once");
     assert_eq!(pictures, drawn(&demonstrated(), "demo/again"));
     for svg in &pictures {

@@ -221,7 +221,7 @@ fn a_pushed_mass_takes_its_closed_form_and_friction_helps_the_brake() {
             let [speeding, braking] =
                 [torque_nm - friction_nm, torque_nm + friction_nm].map(|nm| mm_per_s2(&setup, nm));
             let expected_s = (2.0 * f64::abs(way_mm) * (1.0 / speeding + 1.0 / braking)).sqrt();
-            let got = profile(&setup, 3.0, 3.0 + way_mm, 1e9, current_a).unwrap();
+            let got = profile(&setup, [3.0, 3.0 + way_mm], 1e9, current_a).unwrap();
             assert!((got.total_s / expected_s - 1.0).abs() < 1e-6, "{} s for {expected_s} s", got.total_s);
             assert!((got.switch_s * speeding - (got.total_s - got.switch_s) * braking).abs() < 1e-3);
         }
@@ -232,7 +232,7 @@ fn a_pushed_mass_takes_its_closed_form_and_friction_helps_the_brake() {
 fn the_world_driven_so_arrives_at_rest() {
     let setup = Setup::default();
     for (from, to) in [(0.5, 1.6), (1.6, 2.5), (2.5, 1.1), (0.0, 3.0)] {
-        let best = profile(&setup, from, to, 6.0, NO_LIMIT).unwrap();
+        let best = profile(&setup, [from, to], 6.0, NO_LIMIT).unwrap();
         let mut world = Plant::new(&setup);
         world.place(setup.wall.distance_mm + from);
         let sign = f64::signum(to - from);
@@ -252,7 +252,7 @@ fn the_world_driven_so_arrives_at_rest() {
 fn no_other_single_switch_is_faster() {
     // With less drive or less brake, whoever stops at the target stops later.
     let setup = Setup::default();
-    let time_s = |volts, amperes| profile(&setup, 0.5, 1.6, volts, amperes).unwrap().total_s;
+    let time_s = |volts, amperes| profile(&setup, [0.5, 1.6], volts, amperes).unwrap().total_s;
     assert!([6.0, 5.0, 4.0, 3.0].map(|volts| time_s(volts, NO_LIMIT)).is_sorted_by(|a, b| a < b));
     assert!([NO_LIMIT, 1.5, 1.0, 0.5].map(|amperes| time_s(6.0, amperes)).is_sorted_by(|a, b| a < b));
 }
@@ -260,12 +260,12 @@ fn no_other_single_switch_is_faster() {
 #[test]
 fn what_the_motor_cannot_do_is_said() {
     let setup = Setup::default();
-    let weak = profile(&setup, 0.5, 3.0, 6.0, 0.1).unwrap_err();
+    let weak = profile(&setup, [0.5, 3.0], 6.0, 0.1).unwrap_err();
     assert_eq!(weak, Unreachable::TooWeak);
     assert!(weak.to_string().contains("allow more voltage or current"), "{weak}");
     let mut slick = Setup::default();
     slick.transmission.efficiency = 1.0;
     slick.motor.friction_nm = 0.0;
-    assert_eq!(profile(&slick, 3.0, 2.0, 6.0, 0.05).unwrap_err(), Unreachable::RunsAway);
-    assert_eq!(profile(&setup, 2.0, 2.0, 6.0, 1.0).unwrap().total_s, 0.0);
+    assert_eq!(profile(&slick, [3.0, 2.0], 6.0, 0.05).unwrap_err(), Unreachable::RunsAway);
+    assert_eq!(profile(&setup, [2.0, 2.0], 6.0, 1.0).unwrap().total_s, 0.0);
 }

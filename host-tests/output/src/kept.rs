@@ -72,7 +72,6 @@ impl Lock {
         &self.path
     }
 
-    /// Replaces the file.
     pub fn write(&self, bytes: impl AsRef<[u8]>) -> io::Result<()> {
         self.write_with(&self.path, bytes)
     }
@@ -95,7 +94,6 @@ impl Drop for Lock {
     }
 }
 
-/// Who has a lock.
 fn holder(file: &mut File) -> String {
     let mut text = String::new();
     // Some systems do not let others read what is locked.
@@ -116,7 +114,6 @@ pub struct Whole {
 }
 
 impl Whole {
-    /// Begins a file.
     pub fn create(path: &Path) -> io::Result<Self> {
         Self::begin(path, Some(Lock::take(path)?))
     }

@@ -101,37 +101,24 @@ pub enum Curve {
 
 impl Curve {
     fn draw(&self, chart: &mut Chart<'_, '_>) -> Result<(), PlotError> {
+        let dashes = |points: &[(f64, f64)], [dash, gap]: [u32; 2], style| {
+            DashedLineSeries::new(points.to_vec(), dash * FINE, gap * FINE, style)
+        };
         match self {
-            Self::Solid(points) => line(chart, points, INK.stroke_width(2 * FINE)),
-            Self::Pale(points) => line(chart, points, PALE_INK.stroke_width(FINE)),
-            Self::Dashed(points) => dashes(chart, points, [7, 4], GOAL_INK.stroke_width(2 * FINE)),
-            Self::Dotted(points) => dashes(chart, points, [2, 3], BLACK.stroke_width(FINE)),
+            Self::Solid(points) => chart.draw_series(LineSeries::new(points.clone(), INK.stroke_width(2 * FINE)))?,
+            Self::Pale(points) => chart.draw_series(LineSeries::new(points.clone(), PALE_INK.stroke_width(FINE)))?,
+            Self::Dashed(points) => chart.draw_series(dashes(points, [7, 4], GOAL_INK.stroke_width(2 * FINE)))?,
+            Self::Dotted(points) => chart.draw_series(dashes(points, [2, 3], BLACK.stroke_width(FINE)))?,
             Self::Circles(points) => {
-                let circles = points.iter().map(|point| Circle::new(*point, 4 * FINE, BLACK.stroke_width(FINE)));
-                chart.draw_series(circles)?;
-                Ok(())
+                let circle = |point: &(f64, f64)| Circle::new(*point, 4 * FINE, BLACK.stroke_width(FINE));
+                chart.draw_series(points.iter().map(circle))?
             }
-        }
+        };
+        Ok(())
     }
 }
 
 type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
-
-fn line(chart: &mut Chart<'_, '_>, points: &[(f64, f64)], style: ShapeStyle) -> Result<(), PlotError> {
-    chart.draw_series(LineSeries::new(points.iter().copied(), style))?;
-    Ok(())
-}
-
-fn dashes(
-    chart: &mut Chart<'_, '_>,
-    points: &[(f64, f64)],
-    [dash, gap]: [u32; 2],
-    style: ShapeStyle,
-) -> Result<(), PlotError> {
-    let line = DashedLineSeries::new(points.iter().copied(), dash * FINE, gap * FINE, style);
-    chart.draw_series(line)?;
-    Ok(())
-}
 
 #[derive(Clone, Debug)]
 pub struct Curves<'a> {
@@ -419,7 +406,6 @@ fn draw_dot(area: &Area<'_>, dot: &Dot, (x, y): Pixel) -> Result<(), PlotError> 
     Ok(())
 }
 
-/// Names of the points by their numbers.
 fn draw_names(area: &Area<'_>, dots: &[Dot]) -> Result<(), PlotError> {
     for (n, dot) in dots.iter().enumerate() {
         let y = 40 + NAME_PX * n as i32;

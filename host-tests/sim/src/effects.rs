@@ -24,7 +24,6 @@ macro_rules! named {
                 $(self.$list.any())||*
             }
 
-            /// Cost of each effect so far.
             pub fn costs(&self) -> impl Iterator<Item = Cost> {
                 core::iter::empty()$(.chain(self.$list.0.iter().map(Metered::cost)))*
             }
@@ -143,12 +142,10 @@ impl<T: ?Sized> Stage<T> {
         !self.0.is_empty()
     }
 
-    /// Calls each effect.
     pub fn each(&mut self, mut f: impl FnMut(&mut T)) {
         self.0.iter_mut().for_each(|effect| effect.call(&mut f));
     }
 
-    /// Calls each effect and returns the results.
     pub fn map<R>(&mut self, mut f: impl FnMut(&mut T) -> R) -> impl DoubleEndedIterator<Item = R> {
         self.0.iter_mut().map(move |effect| effect.call(&mut f))
     }
@@ -232,7 +229,6 @@ pub struct Parts {
 }
 
 impl Parts {
-    /// Effects that the scene names.
     pub fn of(scene: &Scene, finger: usize) -> Self {
         let mut parts = Self::default();
         for NamedEffect { effect, values } in &scene.effects {

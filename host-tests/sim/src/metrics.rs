@@ -271,7 +271,7 @@ pub const METRICS: &[Metric] = &[
     metric("current_max_a", MOTOR, Largest, "largest current in the winding", |f| Some(f.current_a.max)),
     metric("winding_max_c", MOTOR, Largest, "highest temperature of the winding", |f| f.winding_max_c),
     metric("runaway_mm", MOTION, Largest, "largest distance of the tip beyond the end of the travel, or behind the first touch less the largest indentation and the clearance (before a touch: behind the start less the clearance)", |f| Some(f.conduct.runaway_mm)),
-    metric("air_speed_percent", MOTION, Largest, "largest speed in the air, as a share of the approach speed, from 20 ms after a contact ended", |f| Some(100.0 * f.conduct.air_share())),
+    metric("air_speed_percent", MOTION, Largest, "largest speed in the air, as a share of the approach speed, from 20 ms after a contact ended", |f| Some(100.0 * (f.conduct.air_mm_per_s / f.conduct.approach_mm_per_s))),
     metric("over_force_mn", FORCE, Largest, "largest true force beyond the goal. A reduced goal counts for 200 ms more, and during a fault or torque off. A push of the object on a finger without torque does not count", |f| largest(&f.conduct.over_force_mn).or(Some(0.0))),
     metric("over_force_defective_mn", FORCE, Largest, "the same during a defect and for a second after it, which `over_force_mn` leaves out", |f| largest(&f.conduct.over_force_defective_mn).or(Some(0.0))),
     metric("stop_force_mn", FORCE, Largest, "largest true force from 0.5 s after a stop (goal 0 or torque off) until the stop ends, a fault occurs, or the object comes nearer or is put back; with torque off, less the force that dry friction and gear hold", |f| Some(1e3 * f.conduct.stop_force_n)),

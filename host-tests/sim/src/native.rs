@@ -45,15 +45,14 @@ pub fn board(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, RunError> 
 
 /// Runs a scene with the effects that it names.
 pub fn simulate(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, SimError> {
-    let started = Instant::now();
-    Board::new(scene)?.whole(scene, started, None, watch)
+    Board::new(scene)?.whole(scene, None, watch)
 }
 
 /// Runs a scene as [`simulate`], with gains of the taxels of the first finger, Q14.
 pub fn simulate_calibrated(scene: &Scene, gains: &Gains, watch: &mut dyn Watch) -> Result<Summary, SimError> {
     let mut board = Board::new(scene)?;
     board.units[0].pipeline.calibrate(&Calibration::of(gains));
-    board.whole(scene, Instant::now(), Some(*gains.rows()), watch)
+    board.whole(scene, Some(gains), watch)
 }
 
 /// Controller of a finger, and everything between it and the world.
@@ -74,6 +73,7 @@ struct Unit {
 }
 
 struct Board {
+    begun: Instant,
     world: World,
     units: Vec<Unit>,
     bridges: Vec<Bridge>,
@@ -95,14 +95,10 @@ impl Board {
     }
 
     /// Builds the board from these parts, a finger for each.
-    fn of(
-        scene: &Scene,
-        config: &Config,
-        setup: &Setup,
-        fingers: impl Iterator<Item = Parts>,
-    ) -> Result<Self, SimError> {
+    fn of(scene: &Scene, config: &Config, setup: &Setup, parts: impl Iterator<Item = Parts>) -> Result<Self, SimError> {
+        let begun = Instant::now();
         let (mut units, mut effects) = (Vec::new(), Vec::new());
-        for (finger, parts) in fingers.enumerate() {
+        for (finger, parts) in parts.enumerate() {
             effects.push((parts.drive, parts.contact));
             let readout = Readout::new(&setup.array, ArrayEvents::of(scene, finger));
             units.push(Unit {
@@ -125,6 +121,7 @@ impl Board {
         let slot_s = f64::from(config.timing.slot.0) / f64::from(fingertip::shipped::CLOCKS.timer_hz);
         let bridges = vec![Bridge::Coast; units.len()];
         Ok(Self {
+            begun,
             world,
             units,
             bridges,
@@ -132,29 +129,23 @@ impl Board {
             clock: Clock::default(),
             slot_s,
             longest_s,
-            digest: Digest::new(),
+            digest: Digest(Hasher::new()),
             runs: false,
         })
     }
 
-    /// Runs the scene. The calibration is the gain of each taxel of the first finger, Q14.
-    fn whole(
-        mut self,
-        scene: &Scene,
-        started: Instant,
-        calibration: Option<[[u16; COLUMNS]; ROWS]>,
-        watch: &mut dyn Watch,
-    ) -> Result<Summary, SimError> {
+    /// Runs the scene. The gains are those of the taxels of the first finger, Q14.
+    fn whole(mut self, scene: &Scene, gains: Option<&Gains>, watch: &mut dyn Watch) -> Result<Summary, SimError> {
         let mut controllers = vec![Controller { params: self.params, calibration: None }; self.units.len()];
-        controllers[0].calibration = calibration;
+        controllers[0].calibration = gains.map(|gains| *gains.rows());
         watch.begin(&controllers);
         self.tare(watch);
-        let set_up_s = started.elapsed().as_secs_f64();
+        let set_up_s = self.begun.elapsed().as_secs_f64();
         self.run(scene, watch);
         Ok(Summary {
             virtual_s: self.time_s(),
             set_up_s,
-            wall_s: started.elapsed().as_secs_f64() - set_up_s,
+            wall_s: self.begun.elapsed().as_secs_f64() - set_up_s,
             ledger: self.costs(scene),
             digest: self.digest.hex(),
         })
@@ -338,11 +329,6 @@ const UNITS: i128 = 21_000_000_000_000_000;
 pub struct Clock(i128);
 
 impl Clock {
-    /// Returns the instant at a time after the start of the clock.
-    pub fn from_start(seconds: f64) -> Self {
-        Self(seconds.trunc() as i128 * UNITS + units(seconds.fract()))
-    }
-
     pub fn go_on(&mut self, seconds: f64) {
         self.0 += units(seconds);
     }
@@ -363,10 +349,6 @@ fn units(seconds: f64) -> i128 {
 struct Digest(Hasher);
 
 impl Digest {
-    pub fn new() -> Self {
-        Self(Hasher::new())
-    }
-
     /// Adds a control step. The command is complete but for whether a tare is forced: the outputs show the result.
     pub fn add(&mut self, frame: &Frame, sense: &Sense, command: &Command, duty: Duty, status: &Status) {
         let Sense { encoder, supply_mv, bus_silent_ms, bridge_fault, answer, chip: _ } = *sense;
@@ -416,7 +398,7 @@ mod tests {
     fn of(change: impl Fn(&mut Step)) -> String {
         let mut step = (Frame::EMPTY, Sense::default(), Command::default(), Duty(0), Status::default());
         change(&mut step);
-        let mut digest = Digest::new();
+        let mut digest = Digest(Hasher::new());
         digest.add(&step.0, &step.1, &step.2, step.3, &step.4);
         digest.hex()
     }

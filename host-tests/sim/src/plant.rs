@@ -107,15 +107,12 @@ impl Plant {
     /// Codes of a slot, sampled [`crate::setup::Array::sample_after_s`] after its edge.
     pub fn slot_codes(&mut self, slot: usize) -> [u16; COLUMNS] {
         let array = self.finger().setup.array;
-        let [before, end] = [(slot + SLOTS - 1) % SLOTS, slot].map(|slot| self.settled_volts(&driven_in(slot)));
+        // Only the row of the slot is driven, and none in the last slot.
+        let [before, end] =
+            [(slot + SLOTS - 1) % SLOTS, slot].map(|slot| self.settled_volts(&core::array::from_fn(|row| row == slot)));
         let left = decay(array.sample_after_s / array.settle_tau_s);
         core::array::from_fn(|column| array.code(end[column] + left * (before[column] - end[column])))
     }
-}
-
-/// Drive of the rows while the codes of a row are sampled: that row alone, or no row for [`ROWS`].
-fn driven_in(slot: usize) -> [bool; ROWS] {
-    core::array::from_fn(|row| row == slot)
 }
 
 impl core::fmt::Debug for Plant {

@@ -8,6 +8,7 @@ pub use crate::report::trace::{Instant, Kept, Trace, Track, Tracks};
 
 use crate::metrics::{GROUPS, METRICS, Metric, Verdict, shown};
 use crate::report::plots::{Line, Plot, Style};
+use crate::report::trace::rows;
 use crate::run::{Outcome, RunError, Without, asked, difference, differences, ledger_rows};
 use crate::scene::Scene;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -185,7 +186,7 @@ fn finger(number: usize, tracks: &Tracks, several: bool) -> Markup {
                 }
                 figure.plot data-title="strip" {
                     h3 { "Mode, faults and limits" }
-                    (plots::strip(&tracks.strip(), &tracks.time.means()))
+                    (plots::strip(&rows(&tracks.states), &tracks.time.means()))
                     figcaption { "What occurred, however short, is as wide as a nine-hundredth of the run." }
                 }
             }
@@ -198,7 +199,7 @@ fn finger(number: usize, tracks: &Tracks, several: bool) -> Markup {
 fn metrics(report: &Report) -> Markup {
     let verdicts = &report.outcome.verdicts;
     html! {
-        @for Group { title, metrics, broken } in groups(verdicts) {
+        @for (title, metrics, broken) in groups(verdicts) {
             details.group open[broken > 0] {
                 summary {
                     (title)
@@ -273,11 +274,8 @@ fn ablation(report: &Report) -> Markup {
     }
 }
 
-struct Group {
-    title: &'static str,
-    metrics: Vec<&'static Metric>,
-    broken: usize,
-}
+/// Title of a group, its metrics, and number of its broken bounds.
+type Group = (&'static str, Vec<&'static Metric>, usize);
 
 /// Returns all metrics. Groups with a broken bound are first.
 fn groups(verdicts: &[Verdict]) -> [Group; GROUPS.len()] {
@@ -286,10 +284,11 @@ fn groups(verdicts: &[Verdict]) -> [Group; GROUPS.len()] {
     let group = |title| {
         let metrics: Vec<&Metric> = METRICS.iter().filter(|metric| metric.group == title).collect();
         let is_broken = |verdict: &&Verdict| !verdict.held && metrics.iter().any(|metric| is_of(verdict, metric));
-        Group { title, broken: verdicts.iter().filter(is_broken).count(), metrics }
+        let broken = verdicts.iter().filter(is_broken).count();
+        (title, metrics, broken)
     };
     let mut groups = GROUPS.map(group);
-    groups.sort_by_key(|group| group.broken == 0);
+    groups.sort_by_key(|(.., broken)| *broken == 0);
     groups
 }
 
@@ -315,7 +314,7 @@ fn finger_data(tracks: &Tracks) -> Value {
     json!({
         "times_s": tracks.time.means().into_iter().map(rounded).collect::<Vec<_>>(),
         "plots": plots::all(tracks).iter().map(plot_data).collect::<Vec<_>>(),
-        "strip": tracks.strip(),
+        "strip": rows(&tracks.states),
         "maps": maps_data(&tracks.instants),
     })
 }

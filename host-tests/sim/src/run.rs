@@ -75,7 +75,12 @@ impl Outcome {
         for (name, value) in &self.measured.0 {
             let _ = writeln!(text, "  {name:width$}  {:>10}{}", shown(*value), self.bound_of(name, *value));
         }
-        let _ = writeln!(text, "\n{}", ledger_text(&self.summary));
+        let _ = writeln!(text, "\n  {:24} {:>12} {:>10} {:>8}", "effect", "evaluations", "time, s", "share");
+        for (effect, evaluations, seconds, percent) in ledger_rows(&self.summary) {
+            let evaluations = evaluations.map_or(String::new(), |count| count.to_string());
+            let _ = writeln!(text, "  {effect:24} {evaluations:>12} {seconds:>10.4} {percent:>6.1} %");
+        }
+        text.push('\n');
         let ratio = if *wall_s > 0.0 { virtual_s / wall_s } else { f64::INFINITY };
         let _ = writeln!(
             text,
@@ -131,16 +136,6 @@ impl Watch for Vec<&mut dyn Watch> {
     fn step(&mut self, step: &Step) {
         self.iter_mut().for_each(|watch| watch.step(step));
     }
-}
-
-/// Formats evaluations, time and share of the run, one effect per line.
-pub fn ledger_text(summary: &Summary) -> String {
-    let mut text = format!("  {:24} {:>12} {:>10} {:>8}\n", "effect", "evaluations", "time, s", "share");
-    for (effect, evaluations, seconds, percent) in ledger_rows(summary) {
-        let evaluations = evaluations.map_or(String::new(), |count| count.to_string());
-        let _ = writeln!(text, "  {effect:24} {evaluations:>12} {seconds:>10.4} {percent:>6.1} %");
-    }
-    text
 }
 
 /// Returns the cost of each effect in the order of the scene, over all fingers and stages.

@@ -101,7 +101,6 @@ impl Array {
         2.0 * line / (1.0 + (1.0 + 4.0 * self.growth * line / range).sqrt())
     }
 
-    /// Conductance of a taxel that shows one code, S.
     pub fn siemens_per_code(&self) -> f64 {
         self.reference_v / (self.feedback_ohm * self.drive_v * Self::CODES)
     }
@@ -156,7 +155,6 @@ pub struct Transmission {
 }
 
 impl Transmission {
-    /// Travel of the tip per angle of the motor.
     pub fn mm_per_rad(&self) -> f64 {
         self.drum_radius_mm / self.ratio
     }

@@ -14,17 +14,13 @@ pub const SEED: u64 = 0x2003_0914;
 const CHUNK: u64 = 1_000;
 
 /// Tallies without results: force, indentation, contact radius, stiffness and pressure.
-const TALLIES: [Tally; 5] = [
-    Tally::new("F(d)", 0.5),
-    Tally::new("d(F)", 0.5),
-    Tally::new("r_c(d)", 0.5),
-    Tally::new("k(d)", 0.5),
-    Tally::new("p(r, d)", 0.5),
-];
+fn tallies() -> [Tally; 5] {
+    ["F(d)", "d(F)", "r_c(d)", "k(d)", "p(r, d)"].map(|name| Tally::new(name, 0.5))
+}
 
 /// Random tips, depths, forces and distances.
 pub fn points(range: Range<u64>, progress: Progress<'_>) -> [Tally; 5] {
-    parallel(range, CHUNK, TALLIES, progress, |range, tallies| {
+    parallel(range, CHUNK, tallies(), progress, |range, tallies| {
         let mut rng = Rng::with_seed(SEED ^ range.start);
         for _ in range {
             let Point { tip, d, force, r } = Point::random(&mut rng);
@@ -39,7 +35,7 @@ pub fn points(range: Range<u64>, progress: Progress<'_>) -> [Tally; 5] {
 /// Every combination of boundary tips with boundary depths, forces and distances.
 pub fn boundaries(progress: Progress<'_>) -> [Tally; 5] {
     let tips = boundary_tips();
-    parallel(0..tips.len() as u64, 1, TALLIES, progress, |range, tallies| {
+    parallel(0..tips.len() as u64, 1, tallies(), progress, |range, tallies| {
         for tip in &tips[range.start as usize..range.end as usize] {
             let reference = Reference::new(tip);
             for force in boundary_forces(tip) {

@@ -97,19 +97,13 @@ pub fn path() -> std::path::PathBuf {
 
 /// Every point of the oracle.
 pub fn check() -> Result<[Tally; 5], Box<dyn Error>> {
-    let mut tallies = [
-        Tally::new("r_c(d)", 0.501),
-        Tally::new("theta_max(d)", 0.501),
-        Tally::new("p(r, d)", 0.501),
-        Tally::new("F(d)", 0.501),
-        Tally::new("k(d)", 0.501),
-    ];
+    let mut tallies = ["r_c(d)", "theta_max(d)", "p(r, d)", "F(d)", "k(d)"].map(|name| Tally::new(name, 0.501));
     for record in csv::Reader::from_path(path())?.deserialize::<HashMap<String, String>>() {
         let record = record?;
         let read = |name: &str| parse(record.get(name).ok_or_else(|| format!("no column {name}"))?);
-        let a = fixed(&read("a_mm")?, 24);
-        let y = fixed(&read("Y_kPa")?, 16);
-        let (d, r) = (fixed(&read("d_mm")?, 24), fixed(&read("r_mm")?, 24));
+        let a = fixed(read("a_mm")?, 24);
+        let y = fixed(read("Y_kPa")?, 16);
+        let (d, r) = (fixed(read("d_mm")?, 24), fixed(read("r_mm")?, 24));
         let tip = Tip::new(Millimetres::from_bits(a), Kilopascals::from_bits(y))?;
         let number = |bits: i32| f64::from(bits) / f64::from(1 << 24);
         // As a fixed-point number, as the others are: nothing judged here needs more digits.
@@ -135,11 +129,8 @@ fn parse(text: &str) -> Result<Real, Box<dyn Error>> {
 }
 
 /// The nearest fixed-point number.
-fn fixed(value: &Real, fraction_bits: i32) -> i32 {
-    (value * real(1 << (fraction_bits / 2), 0) * real(1 << (fraction_bits - fraction_bits / 2), 0))
-        .to_f64()
-        .value()
-        .round() as i32
+fn fixed(value: Real, fraction_bits: isize) -> i32 {
+    (value << fraction_bits).to_f64().value().round() as i32
 }
 
 const CHUNK: u64 = 1_000;

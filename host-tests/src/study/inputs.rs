@@ -144,10 +144,11 @@ impl Inputs {
 
     /// Every n-th of the numbers, of the frames and of the contacts, with this number of pictures of a contact.
     fn every(&self, [number, frame, contact]: [usize; 3], pictures: usize) -> Vec<u8> {
-        let some = |pairs: &[Pair], each| pairs_to_bytes(&pairs.iter().copied().step_by(each).collect::<Vec<_>>());
         let mut bytes = Vec::new();
         for section in [&self.root, &self.force, &self.indentation, &self.pressure] {
-            bytes.extend(some(section, number));
+            let words = section.iter().step_by(number).flatten().copied();
+            let count = section.len().div_ceil(number) as i32;
+            bytes.extend([count].into_iter().chain(words).flat_map(i32::to_le_bytes));
         }
         let contacts = self.frames.contacts.iter().copied().step_by(frame).collect();
         bytes.extend(Frames { contacts, ..self.frames }.to_bytes());
@@ -168,11 +169,6 @@ impl Inputs {
         (0..RECORDS).for_each(|_| bytes.extend(bench.record(&mut pipeline).to_bytes()));
         bytes
     }
-}
-
-fn pairs_to_bytes(pairs: &[Pair]) -> Vec<u8> {
-    let words = [pairs.len() as i32].into_iter().chain(pairs.iter().flatten().copied());
-    words.flat_map(i32::to_le_bytes).collect()
 }
 
 /// A distance of 0 to 1.05 contact radii.

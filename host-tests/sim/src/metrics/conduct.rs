@@ -42,7 +42,7 @@ pub struct Hold {
 #[derive(Clone, Debug, Default)]
 pub struct Conduct {
     /// Parameters of the controller: approach speed, clearance and largest travel.
-    approach_mm_per_s: f64,
+    pub(super) approach_mm_per_s: f64,
     clearance_mm: f64,
     travel_mm: f64,
     goal_n: f64,
@@ -72,7 +72,7 @@ pub struct Conduct {
     ended: Ended,
     pub(super) travel_min_mm: f64,
     pub(super) runaway_mm: f64,
-    air_mm_per_s: f64,
+    pub(super) air_mm_per_s: f64,
     /// Largest true force beyond each goal, mN, except where a smaller goal has a larger one; also while a defect acts.
     pub(super) over_force_mn: Vec<AtGoal>,
     pub(super) over_force_defective_mn: Vec<AtGoal>,
@@ -214,11 +214,6 @@ impl Conduct {
             ended.rest_mm = worse(ended.rest_mm, travel_mm.width);
         }
         ended
-    }
-
-    /// Returns the largest speed without a contact, as a share of the approach speed.
-    pub(super) fn air_share(&self) -> f64 {
-        self.air_mm_per_s / self.approach_mm_per_s
     }
 }
 

@@ -24,7 +24,7 @@ fn sensed_n(status: &Status) -> f64 {
 }
 
 /// Integral of a square over time.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Squares {
     sum: f64,
     time_s: f64,
@@ -112,12 +112,12 @@ impl Finger {
 
     /// Returns the largest steady error and its root mean square over all responses.
     pub(super) fn steady_error_n(&self) -> Option<[f64; 2]> {
-        let largest_n = self.worst(|response| Some(response.steady_max_n))?;
-        let sum = |(squares, samples), response: &Response| {
-            (squares + response.steady_squares, samples + response.steady_samples)
-        };
-        let (squares, samples) = self.responses.iter().fold((0.0, 0), sum);
-        (samples > 0).then(|| [largest_n, (squares / samples as f64).sqrt()])
+        let largest_n = self.worst(|response| Some(response.steady_n.max))?;
+        let mut all = Squares::default();
+        for Response { steady_n, .. } in &self.responses {
+            (all.sum, all.time_s) = (all.sum + steady_n.sum, all.time_s + steady_n.time_s);
+        }
+        Some([largest_n, all.rms()?])
     }
 
     fn force(&mut self, step: &Step) {
@@ -245,10 +245,8 @@ pub struct Response {
     /// Largest force beyond the goal, in the direction of the step.
     pub beyond_n: f64,
     inside_since_s: Option<f64>,
-    /// Largest steady error, the sum of the squares of these errors, and their number.
-    pub steady_max_n: f64,
-    pub steady_squares: f64,
-    pub steady_samples: u64,
+    /// Steady errors; each sample counts as a second.
+    steady_n: Squares,
 }
 
 impl Response {
@@ -276,9 +274,7 @@ impl Response {
             self.inside_since_s.get_or_insert(time_s);
         }
         if self.is_steady(time_s) {
-            self.steady_max_n = self.steady_max_n.max(error_n.abs());
-            self.steady_squares += error_n * error_n;
-            self.steady_samples += 1;
+            self.steady_n.add(error_n, 1.0);
         }
     }
 

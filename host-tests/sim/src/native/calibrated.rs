@@ -75,13 +75,8 @@ impl Calibrated {
     /// The scene with the parameters found.
     pub fn scene(&self, scene: &Scene) -> Result<Scene, RunError> {
         let Params { modulus_pa, codes_per_kpa_milli, .. } = self.params;
-        changed(
-            scene,
-            &[
-                ("controller.modulus_pa", modulus_pa.to_string()),
-                ("controller.codes_per_kpa_milli", codes_per_kpa_milli.to_string()),
-            ],
-        )
+        let found = [("controller.modulus_pa", modulus_pa), ("controller.codes_per_kpa_milli", codes_per_kpa_milli)];
+        changed(scene, &found.map(|(key, value)| (key, value.to_string())))
     }
 }
 
@@ -153,19 +148,16 @@ pub fn calibrate(bench: &mut Bench, scene: &Scene) -> Result<Calibrated, RunErro
 /// The scene's finger before a level or inclined plate, with the contact at a place.
 pub fn plate(scene: &Scene, place: Place) -> Result<Scene, RunError> {
     let ([x, y], [along_columns, along_rows]) = (place.centre_mm, place.tilt_deg);
-    let number = |path, value: f64| (path, format!("{value:?}"));
-    changed(
-        scene,
-        &[
-            number("object.centre_x_mm", x),
-            number("object.centre_y_mm", y),
-            number("effects.tilted_plane.along_columns_deg", along_columns),
-            number("effects.tilted_plane.along_rows_deg", along_rows),
-            number("effects.sphere.curvature_per_mm", 0.0),
-            number("effects.cylinder.curvature_per_mm", 0.0),
-            number("effects.object_stiffness.yield_mm_per_n", 0.0),
-        ],
-    )
+    let numbers = [
+        ("object.centre_x_mm", x),
+        ("object.centre_y_mm", y),
+        ("effects.tilted_plane.along_columns_deg", along_columns),
+        ("effects.tilted_plane.along_rows_deg", along_rows),
+        ("effects.sphere.curvature_per_mm", 0.0),
+        ("effects.cylinder.curvature_per_mm", 0.0),
+        ("effects.object_stiffness.yield_mm_per_n", 0.0),
+    ];
+    changed(scene, &numbers.map(|(path, value)| (path, format!("{value:?}"))))
 }
 
 /// Returns a scene with other values in its text, each by its path. The seed of a drawn finger is not in its text.

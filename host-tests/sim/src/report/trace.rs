@@ -145,17 +145,12 @@ pub struct Tracks {
     /// True force, N, and travel, mm, less those of the other board, if there is one.
     pub differences: [Track; 2],
     pub instants: Vec<Instant>,
-    states: Vec<States>,
+    /// Modes, faults and limits that occurred in each stretch of `time`, a bit each.
+    pub states: Vec<u64>,
     first: Option<Frame>,
     /// Mode and goal, and the time of their last change.
     asked: (Mode, Newtons),
     asked_s: f64,
-}
-
-impl Tracks {
-    pub fn strip(&self) -> Vec<Row> {
-        rows(&self.states)
-    }
 }
 
 #[derive(Clone, Debug)]
@@ -218,10 +213,9 @@ impl Watch for Trace {
         if let Some(differences) = self.other.as_ref().and_then(|other| other.difference(step)) {
             tracks.differences.iter_mut().zip(differences).for_each(|(track, value)| track.add(stretch, value));
         }
-        // One for each stretch of the track of times.
-        tracks.states.resize(tracks.time.0.len(), States::default());
+        tracks.states.resize(tracks.time.0.len(), 0);
         if let Some(states) = tracks.states.last_mut() {
-            states.add(status);
+            *states |= bits(status);
         }
         if due {
             let first = *tracks.first.get_or_insert(*step.frame);
@@ -251,16 +245,9 @@ const NAMES: [(u32, &str, &[&str]); 3] = [
     ]),
 ];
 
-/// Modes, faults and limits that occurred in a stretch of time, a bit each.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct States(u64);
-
-impl States {
-    pub fn add(&mut self, status: &Status) {
-        let Status { mode, fault, limits, .. } = *status;
-        let fault = fault.map_or(0, |fault| 1 << (FAULTS + fault as u32));
-        self.0 |= 1 << mode as u32 | fault | u64::from(limits.0) << LIMITS;
-    }
+fn bits(&Status { mode, fault, limits, .. }: &Status) -> u64 {
+    let fault = fault.map_or(0, |fault| 1 << (FAULTS + fault as u32));
+    1 << mode as u32 | fault | u64::from(limits.0) << LIMITS
 }
 
 /// A mode, a fault or a limit that occurred.
@@ -275,7 +262,7 @@ pub struct Row {
 }
 
 /// Modes, faults and limits that occurred, each in the order of their numbers.
-fn rows(states: &[States]) -> Vec<Row> {
+pub fn rows(states: &[u64]) -> Vec<Row> {
     let row = |bit: u32| {
         let spans = spans(states, bit);
         let (first, kind, names) = NAMES.into_iter().rfind(|(first, ..)| *first <= bit)?;
@@ -287,9 +274,9 @@ fn rows(states: &[States]) -> Vec<Row> {
     (0..u64::BITS).filter_map(row).collect()
 }
 
-fn spans(states: &[States], bit: u32) -> Vec<[usize; 2]> {
+fn spans(states: &[u64], bit: u32) -> Vec<[usize; 2]> {
     let mut spans: Vec<[usize; 2]> = Vec::new();
-    for at in (0..states.len()).filter(|at| states[*at].0 >> bit & 1 == 1) {
+    for at in (0..states.len()).filter(|at| states[*at] >> bit & 1 == 1) {
         match spans.last_mut() {
             Some([_, end]) if *end == at => *end = at + 1,
             _ => spans.push([at, at + 1]),
@@ -354,14 +341,14 @@ mod tests {
 
     #[test]
     fn what_occurred_in_a_stretch_is_kept_however_short_it_was() {
-        let mut states = [States::default(); 5];
+        let mut states = [0; 5];
         let status = |mode, fault, limits| Status { mode, fault, limits: Limits(limits), ..Status::default() };
-        states[0].add(&status(Mode::Approach, None, 0));
-        states[1].add(&status(Mode::Approach, None, Limits::GUARD));
-        states[1].add(&status(Mode::Force, None, 0));
-        states[2].add(&status(Mode::Force, None, Limits::VOLTAGE));
-        states[3].add(&status(Mode::Fault, Some(Fault::Unseen), 0));
-        states[4].add(&status(Mode::Approach, None, Limits::TORQUE_HELD));
+        states[0] |= bits(&status(Mode::Approach, None, 0));
+        states[1] |= bits(&status(Mode::Approach, None, Limits::GUARD));
+        states[1] |= bits(&status(Mode::Force, None, 0));
+        states[2] |= bits(&status(Mode::Force, None, Limits::VOLTAGE));
+        states[3] |= bits(&status(Mode::Fault, Some(Fault::Unseen), 0));
+        states[4] |= bits(&status(Mode::Approach, None, Limits::TORQUE_HELD));
         let row = |kind, name: &str, spans: &[[usize; 2]]| Row { kind, name: name.into(), spans: spans.to_vec() };
         assert_eq!(
             rows(&states),

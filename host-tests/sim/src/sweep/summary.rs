@@ -106,10 +106,7 @@ impl Table {
             let name = &self.head[column];
             let Some(spread) = spread(values(self.rows.iter(), column)) else { continue };
             let [low, median, high] = spread.map(|value| shown(Some(value)));
-            let side = |side: Option<f64>| side.map_or(String::new(), |side| side.to_string());
-            let expected = self
-                .expected(name)
-                .map_or(String::new(), |[min, max]| format!("   expected {}..{}", side(min), side(max)));
+            let expected = self.expected(name).map_or(String::new(), |bounds| format!("   expected {bounds}"));
             let _ = writeln!(text, "  {name:width$} {low:>11} {median:>11} {high:>11}{expected}");
         }
         let (passed, all) = (self.passes(self.rows.iter()), self.rows.len());
@@ -135,10 +132,10 @@ impl Table {
         self.place(DIGEST) + 1..end
     }
 
-    pub(super) fn expected(&self, metric: &str) -> Option<[Option<f64>; 2]> {
+    /// Bounds of a metric as a row has them: `0.5..`.
+    pub(super) fn expected(&self, metric: &str) -> Option<&str> {
         let place = self.head.iter().position(|name| name.strip_prefix(EXPECT) == Some(metric))?;
-        let (min, max) = self.rows.first()?[place].split_once("..")?;
-        Some([min.parse().ok(), max.parse().ok()])
+        Some(&self.rows.first()?[place])
     }
 
     /// Number of these rows that stayed within their bounds.
@@ -225,7 +222,8 @@ fn spread_over_seeds<'a>(table: &Table, column: usize, x: &'a str) -> Curves<'a>
 }
 
 fn bounds(table: &Table, column: usize) -> Vec<f64> {
-    table.expected(&table.head[column]).into_iter().flatten().flatten().collect()
+    let sides = table.expected(&table.head[column]).into_iter().flat_map(|bounds| bounds.split(".."));
+    sides.filter_map(|side| side.parse().ok()).collect()
 }
 
 fn around_all(values: &[f64]) -> [f64; 2] {

@@ -17,7 +17,7 @@ static LOCKS: AtomicU64 = AtomicU64::new(0);
 /// The right to write a file; given back when it is dropped.
 #[derive(Debug)]
 pub struct Lock {
-    path: PathBuf,
+    pub path: PathBuf,
     lock: PathBuf,
     _file: File,
 }
@@ -66,10 +66,6 @@ impl Lock {
                 return Ok(Self { path: path.into(), lock, _file: file });
             }
         }
-    }
-
-    pub fn path(&self) -> &Path {
-        &self.path
     }
 
     pub fn write(&self, bytes: impl AsRef<[u8]>) -> io::Result<()> {

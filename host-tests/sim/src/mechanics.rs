@@ -168,18 +168,15 @@ impl Finger {
         if self.now.dt_s > 0.0 {
             self.now.rad_per_s2 = (self.now.shaft.speed_rad_per_s - self.now.before.speed_rad_per_s) / self.now.dt_s;
         }
-        self.stop_at_ends();
+        if let Some([rear_mm, front_mm]) = self.faults.end_stops_mm
+            && !(rear_mm..=front_mm).contains(&self.flank_mm())
+        {
+            let angle_rad = self.flank_mm().clamp(rear_mm, front_mm) / self.mm_per_rad;
+            self.now.shaft = Shaft { angle_rad, speed_rad_per_s: 0.0 };
+        }
         self.now.tip_mm = self.flank_mm();
         self.drive.heat.each(|part| part.after(self.now.dt_s, end.square_a2_s));
         self.drive.play.each(|part| self.now.tip_mm = part(self.now.tip_mm, surface_mm));
-    }
-
-    fn stop_at_ends(&mut self) {
-        let Some([rear_mm, front_mm]) = self.faults.end_stops_mm else { return };
-        let held_mm = self.flank_mm().clamp(rear_mm, front_mm);
-        if held_mm != self.flank_mm() {
-            self.now.shaft = Shaft { angle_rad: held_mm / self.mm_per_rad, speed_rad_per_s: 0.0 };
-        }
     }
 
     /// True if the shaft did not move in the last step.

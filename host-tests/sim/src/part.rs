@@ -14,7 +14,8 @@ const CRC: crc::Crc<u64> = crc::Crc::<u64>::new(&crc::CRC_64_XZ);
 /// Lines of a future file NAME so far. They are in NAME.part, and only this process writes NAME.
 #[derive(Debug)]
 pub struct Part {
-    lock: Lock,
+    /// Lock under which everything made of the lines is written.
+    pub lock: Lock,
     path: PathBuf,
     file: File,
     /// Length up to the end of the last whole line.
@@ -74,14 +75,9 @@ impl Part {
 
     pub fn write(&self, bytes: impl AsRef<[u8]>) -> Result<(), RunError> {
         let told = |error| {
-            format!("{}; all that was done is kept in {}", cannot_write(self.lock.path(), &error), self.path.display())
+            format!("{}; all that was done is kept in {}", cannot_write(&self.lock.path, &error), self.path.display())
         };
         Ok(self.lock.write(bytes).map_err(told)?)
-    }
-
-    /// Lock under which everything made of the lines is written.
-    pub fn lock(&self) -> &Lock {
-        &self.lock
     }
 
     /// Removes the lines once everything made of them is written.

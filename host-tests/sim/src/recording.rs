@@ -61,15 +61,22 @@ fn controller_of(value: &Value) -> Option<Controller> {
 
 /// Last part of each topic, name of its schema, and schema.
 pub fn schemas() -> [(&'static str, &'static str, String); 4] {
-    let [frame, image] = [
-        include_str!("../../../tool/src/messages/frame.json"),
-        include_str!("../../../tool/src/messages/raw_image.json"),
-    ];
+    let scalar = |(name, about, _): &Scalar| ((*name).to_owned(), json!({ "type": "number", "description": about }));
+    let scalars: Map<_, _> = SCALARS.iter().map(scalar).collect();
+    let record = "Frame, sense and command in the layout of images::record::Record, base64";
+    let digest = "CRC-64/XZ of the duty and of every field of the status, hexadecimal";
+    let core = json!({
+        "record": { "type": "string", "contentEncoding": "base64", "description": record },
+        "duty": { "type": "integer", "description": "The duty that the core answered, Q15" },
+        "digest": { "type": "string", "description": digest },
+    });
+    let object = |title, properties: Value| json!({ "title": title, "type": "object", "properties": properties });
+    let of = |what, title: &'static str, properties| (what, title, object(title, properties).to_string());
     [
-        ("scalars", "fingertip.Scalars", scalars_schema().to_string()),
-        ("frame", "fingertip.Frame", frame.into()),
-        ("image", "foxglove.RawImage", image.into()),
-        ("core", "fingertip.Core", core_schema().to_string()),
+        of("scalars", "fingertip.Scalars", scalars.into()),
+        ("frame", "fingertip.Frame", include_str!("../../../tool/src/messages/frame.json").into()),
+        ("image", "foxglove.RawImage", include_str!("../../../tool/src/messages/raw_image.json").into()),
+        of("core", "fingertip.Core", core),
     ]
 }
 
@@ -101,28 +108,6 @@ pub const SCALARS: [Scalar; 20] = [
     ("slip_mm", "Distance that the contact has slipped", |s| s.truth.slip_mm),
     ("object_height_mm", "Height of the object", |s| s.truth.object_mm[1]),
 ];
-
-fn scalars_schema() -> Value {
-    let properties: serde_json::Map<_, _> = SCALARS
-        .iter()
-        .map(|(name, about, _)| ((*name).to_owned(), json!({ "type": "number", "description": about })))
-        .collect();
-    json!({ "title": "fingertip.Scalars", "type": "object", "properties": properties })
-}
-
-fn core_schema() -> Value {
-    let record = "Frame, sense and command in the layout of images::record::Record, base64";
-    let digest = "CRC-64/XZ of the duty and of every field of the status, hexadecimal";
-    json!({
-        "title": "fingertip.Core",
-        "type": "object",
-        "properties": {
-            "record": { "type": "string", "contentEncoding": "base64", "description": record },
-            "duty": { "type": "integer", "description": "The duty that the core answered, Q15" },
-            "digest": { "type": "string", "description": digest },
-        },
-    })
-}
 
 /// Checks a file: every byte of it is covered by a checksum, or has fixed contents. The error names the part.
 pub fn check(bytes: &[u8]) -> Result<(), RunError> {

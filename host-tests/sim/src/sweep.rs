@@ -90,7 +90,7 @@ pub fn sweep(plan: &Plan, board: Run) -> Result<(Table, PathBuf), RunError> {
     let table = Table { head: head.columns, rows: rows.into_values().collect() };
     part.write(table.csv()?)?;
     if plan.shard.is_whole() {
-        table.write_rest(&out, part.lock())?;
+        table.write_rest(&out, &part.lock)?;
     }
     part.done()?;
     Ok((table, out))

@@ -34,10 +34,8 @@ impl Kernel {
 /// Method by which a kernel's errors are found.
 #[derive(Clone, Copy)]
 pub enum Measure {
-    /// Absolute error of a function of one or two numbers: its inputs, and its exact result.
-    Absolute(Section, Exact),
-    /// Relative error of such a function.
-    Relative(Section, Exact),
+    /// Error of a function of one or two numbers.
+    Scalar { relative: bool, section: Section, exact: Exact },
     /// Sum and moments of a frame.
     Frames,
     /// A contact from pictures.
@@ -52,6 +50,10 @@ pub enum Measure {
 type Section = fn(&Inputs) -> &[Pair];
 type Exact = fn(&Reference, &Pair) -> Real;
 
+const fn absolute(section: Section, exact: Exact) -> Measure {
+    Measure::Scalar { relative: false, section, exact }
+}
+
 pub const KERNELS: &[Kernel] = &[
     Kernel {
         name: "root",
@@ -59,7 +61,11 @@ pub const KERNELS: &[Kernel] = &[
         text: "sqrt(x) for 512 numbers from 0.01 to 32767, equally many in each octave.",
         error: "relative error",
         other: None,
-        measure: Measure::Relative(|inputs| &inputs.root, |_, [x, _]| input(*x).sqrt()),
+        measure: Measure::Scalar {
+            relative: true,
+            section: |inputs| &inputs.root,
+            exact: |_, [x, _]| input(*x).sqrt(),
+        },
         why: "it has 32 exact bits of the root of 64, so an indentation of 8 mm is exact to 2^-24 mm, which single precision is not. Its \
             error here is that of a Q48 root cut to Q24.",
     },
@@ -69,7 +75,7 @@ pub const KERNELS: &[Kernel] = &[
         text: "F = pi Y d^2 for 512 indentations from 0.01 to 9.5 mm, a = 10 mm, Y = 250 kPa.",
         error: "force error, N",
         other: None,
-        measure: Measure::Absolute(|inputs| &inputs.force, |reference, [d, _]| reference.force(&input(*d))),
+        measure: absolute(|inputs| &inputs.force, |reference, [d, _]| reference.force(&input(*d))),
         why: "it has no floating-point numbers, and is proven to be correctly rounded for every radius from 4 to 16 mm and \
             every modulus from 20 to 2000 kPa. The cheaper integers serve only the range of this table.",
     },
@@ -79,10 +85,7 @@ pub const KERNELS: &[Kernel] = &[
         text: "d = sqrt(F / (pi Y)) for 512 forces from 1 mN to 70 N.",
         error: "indentation error, mm",
         other: None,
-        measure: Measure::Absolute(
-            |inputs| &inputs.indentation,
-            |reference, [force, _]| reference.indentation(&input(*force)),
-        ),
+        measure: absolute(|inputs| &inputs.indentation, |reference, [force, _]| reference.indentation(&input(*force))),
         why: "",
     },
     Kernel {
@@ -92,10 +95,7 @@ pub const KERNELS: &[Kernel] = &[
             *Textbook*: Y (L - (a - d)) / L. *No cancellation*: Y (r_c^2 - r^2) / (L (L + a - d)). No frame computes `Tip::pressure`.",
         error: "pressure error, kPa",
         other: None,
-        measure: Measure::Absolute(
-            |inputs| &inputs.pressure,
-            |reference, [r, d]| reference.pressure(&input(*r), &input(*d)),
-        ),
+        measure: absolute(|inputs| &inputs.pressure, |reference, [r, d]| reference.pressure(&input(*r), &input(*d))),
         why: "The loop itself takes no pressure by radius: the fit has its own arithmetic. The model's function is there for hosts \
             and tests, is correctly rounded everywhere and holds no floating-point number.",
     },
@@ -180,8 +180,7 @@ fn point(kernel: &Kernel, ran: &Ran, inputs: &Inputs) -> Result<Point, String> {
     let one = |errors: Option<[f64; 2]>| errors.map(|errors| (errors, None));
     let two = |errors: Option<[[f64; 2]; 2]>| errors.map(|[force, centre]| (force, Some(centre)));
     let errors = match kernel.measure {
-        Measure::Absolute(section, exact) => one(scalar(ran, section(inputs), exact, false)),
-        Measure::Relative(section, exact) => one(scalar(ran, section(inputs), exact, true)),
+        Measure::Scalar { relative, section, exact } => one(scalar(ran, section(inputs), exact, relative)),
         Measure::Fit { noisy } => two(fit(ran, &inputs.fits[usize::from(noisy)])),
         // Nothing to compare with: neither on a front nor beaten.
         Measure::Cost => one(Some([f64::NAN; 2])),

@@ -120,19 +120,17 @@ impl Bus {
             if device.capture.is_due(&unit.pipeline, &command) {
                 device.capture.begin(&mut unit.pipeline);
             }
-            let status = if scanned {
+            if scanned {
                 device.frame_time_us = ((now_s - device.started_s) * 1e6) as u64 as u32;
                 device.supply_mv = sense.supply_mv;
                 let (_, status) = unit.pipeline.step(frame, &sense, &command);
                 device.capture.record(frame, &sense, &command, status);
                 device.capture.follow(&unit.pipeline);
-                unit.pipeline.status()
             } else {
                 unit.pipeline.stop(Fault::LostFrames);
                 device.capture.end(Ended::Stopped);
-                unit.pipeline.status()
-            };
-            let bridge = Bridge::of(status);
+            }
+            let bridge = Bridge::of(unit.pipeline.status());
             unit.next = device.broken.as_ref().map_or(bridge, |broken| broken.at_motor(bridge));
         }
     }
@@ -359,8 +357,8 @@ impl Bus {
                 self.object.jump(&mut self.board.world, to_mm);
                 Ok(format!("the object is at {to_mm:.2} mm"))
             }
-            ["move", to_mm] => self.move_object(to_mm, None),
-            ["move", to_mm, mm_per_s] => self.move_object(to_mm, Some(mm_per_s)),
+            ["move", to_mm] => self.move_object(to_mm, MM_PER_S),
+            ["move", to_mm, mm_per_s] => self.move_object(to_mm, number(mm_per_s, "MM_PER_S", 0.001, MM_PER_S_MAX)?),
             ["fault"] => Ok(format!("what can be broken: {}", Kind::names())),
             ["fault", kind] => self.break_one(kind, "1"),
             ["fault", kind, finger] => self.break_one(kind, finger),
@@ -385,12 +383,11 @@ impl Bus {
         lines.chain([object]).collect::<Vec<_>>().join("\n")
     }
 
-    fn move_object(&mut self, to_mm: &str, mm_per_s: Option<&str>) -> Result<String, String> {
+    fn move_object(&mut self, to_mm: &str, mm_per_s: f64) -> Result<String, String> {
         if self.devices.len() > 1 {
             return Err("the object lies between two fingers: it cannot be moved towards one".into());
         }
         let to_mm = number(to_mm, "MM", -100.0, 100.0)?;
-        let mm_per_s = mm_per_s.map_or(Ok(MM_PER_S), |text| number(text, "MM_PER_S", 0.001, MM_PER_S_MAX))?;
         // An object that was away starts where it cannot touch.
         if self.object.now_mm == AWAY_MM {
             let tip_mm = self.board.world.fingers[0].now.tip_mm;

@@ -169,38 +169,3 @@ fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     };
     points.chunks((2 * points.len()).div_ceil(POINTS_MAX)).flat_map(extremes).collect()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn thinning_keeps_every_spike_and_the_order() {
-        let mut points: Vec<_> = (0..100_000).map(|n| (f64::from(n), 1.0)).collect();
-        points[77_777].1 = 5.0;
-        points[12_345].1 = -5.0;
-        let thin = thinned(points);
-        assert!(thin.len() <= POINTS_MAX + 2);
-        assert!(thin.contains(&(77_777.0, 5.0)) && thin.contains(&(12_345.0, -5.0)));
-        assert!(thin.is_sorted_by(|a, b| a.0 <= b.0));
-    }
-
-    #[test]
-    fn a_mean_weighs_by_time() {
-        // 1 held for 9 ms, 0 for 1 ms, whatever the samples' distance.
-        let points = vec![(0.0, 1.0), (0.004, 1.0), (0.009, 0.0), (0.010, 0.0)];
-        let smooth = smoothed(points);
-        assert_eq!(smooth.len(), 3);
-        assert!((smooth[1].1 - 1.0).abs() < 1e-12 && (smooth[2].1 - 0.9).abs() < 1e-12, "{smooth:?}");
-        assert!(smoothed(Vec::new()).is_empty());
-    }
-
-    #[test]
-    fn steps_have_a_corner_before_and_after_each_change() {
-        let sample = |(time_s, goal_n)| Sample { time_s, goal_n, ..Sample::default() };
-        let samples = [(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (3.0, 1.0), (4.0, 1.0)].map(sample);
-        let corners = steps_of(&samples, |s| (s.time_s, s.goal_n));
-        assert_eq!(corners, [(0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (4.0, 1.0)]);
-        assert!(steps_of(&[], |s| (s.time_s, s.goal_n)).is_empty());
-    }
-}

@@ -21,28 +21,6 @@ fn names(folder: &Path) -> Vec<String> {
 }
 
 #[test]
-fn a_reader_finds_one_writers_bytes() {
-    let folder = folder("readers");
-    let path = folder.join("file");
-    kept::write(&path, [0; 10_000]).unwrap();
-    let writing = AtomicUsize::new(4);
-    thread::scope(|scope| {
-        for writer in 1..=4_u8 {
-            let (path, writing) = (&path, &writing);
-            scope.spawn(move || {
-                (0..25).for_each(|_| kept::write(path, vec![writer; 10_000 + usize::from(writer)]).unwrap());
-                writing.fetch_sub(1, Ordering::SeqCst);
-            });
-        }
-        while writing.load(Ordering::SeqCst) > 0 {
-            let bytes = fs::read(&path).unwrap();
-            assert!(bytes.iter().all(|byte| *byte == bytes[0]) && bytes.len() == 10_000 + usize::from(bytes[0]));
-        }
-    });
-    assert_eq!(names(&folder), ["file"]);
-}
-
-#[test]
 fn a_lock_is_one_at_a_time_though_its_file_comes_and_goes() {
     let folder = folder("locks");
     let path = folder.join("file");

@@ -160,19 +160,10 @@ mod tests {
         cost 0 2 2 3 3 4 4 5 5 4 9\ncost 1 12 13 23 23 34 34 45 45 54 59\n";
 
     #[test]
-    fn a_run_is_read_and_the_empty_call_taken_off() {
-        let runs = parse(RUN).expect("a run");
-        let [ran] = &runs[..] else { panic!("one variant") };
-        assert_eq!((ran.kernel.as_str(), ran.name.as_str(), ran.firmware), ("root", "ours", true));
-        assert_eq!(ran.returned, [[Number::Fixed(-32_768, 16)], [Number::Float(1.5)]]);
-        assert_eq!(ran.cost.instructions, Passes { median: 10, max: 11 });
-        assert_eq!(ran.cost.flash, Passes { median: 50, max: 55 });
+    fn what_is_no_run_or_another_one_is_refused() {
         assert!(parse(&RUN.replace("cost 1", "cost 2")).is_err(), "a variant was not measured");
         assert!(parse(&RUN.replace("i16 -32768", "i16 x")).is_err(), "no number");
-    }
-
-    #[test]
-    fn two_builds_must_return_the_same() {
+        // Both builds must return the same.
         let runs = || parse(RUN).expect("a run");
         assert!(merged(runs(), runs()).is_ok());
         let other = parse(&RUN.replace("-32768", "-32767")).expect("a run");

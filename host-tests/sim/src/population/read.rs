@@ -3,12 +3,12 @@
 use crate::events::{EVENT, KINDS, own_keys};
 use crate::population::draw::{self, Draw, Drawn};
 use crate::population::{Counted, Events, Place, Population};
-use crate::scene::reader::{Reader, SceneErrors, Span, did_you_mean, item_span, key_span};
+use crate::scene::reader::{Reader, SceneErrors, Span, did_you_mean, item_span, key_span, stem};
 use crate::scene::tables::{self, EXPECT, Key, Kind, ROOT, SCRIPT, TABLES};
 use crate::{effects, metrics, scene};
 use std::fs;
 use std::path::{Path, PathBuf};
-use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, TableLike, Value};
+use toml_edit::{DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
 /// Place and text of a mistake, and allowed values.
 pub type Wrong = (Span, String, String);
@@ -31,9 +31,8 @@ impl Parts<'_> {
     fn table(&self, table: &InlineTable, place: Span) -> Result<Draw, Wrong> {
         let mut ways = WAYS.iter().filter_map(|way| Some((*way, table.get(way)?)));
         let (Some((way, value)), None) = (ways.next(), ways.next()) else {
-            let given: Vec<&str> = table.iter().map(|(name, _)| name).collect();
-            let meant = given.iter().map(|name| did_you_mean(name, WAYS)).find(|meant| !meant.is_empty());
-            let meant = meant.unwrap_or_default();
+            let mut meant = table.iter().map(|(name, _)| did_you_mean(name, WAYS));
+            let meant = meant.find(|meant| !meant.is_empty()).unwrap_or_default();
             return Err((place, format!("a draw has one way to be drawn{meant}"), EXAMPLES.into()));
         };
         let draw = match way {
@@ -63,15 +62,14 @@ impl Parts<'_> {
         if words > 0 && words < draw.ends().len() {
             return Err(wrong(value, "a draw is of words or of numbers", "all of them words, or none"));
         }
-        Ok(match table.get("follows").map(|value| (value, value.as_str())) {
-            None => draw,
-            Some((value, _)) if words > 0 => return Err(wrong(value, "words follow nothing", "no `follows`")),
-            Some((_, Some("magnitude"))) => Draw::Times(self.magnitude, Box::new(draw)),
-            Some((_, Some("1 / magnitude"))) => Draw::Times(1.0 / self.magnitude, Box::new(draw)),
-            Some((value, _)) => {
-                return Err(wrong(value, "nothing else can be followed", "\"magnitude\" or \"1 / magnitude\""));
-            }
-        })
+        let Some(followed) = table.get("follows") else { return Ok(draw) };
+        check(words == 0, followed, "words follow nothing", "no `follows`")?;
+        let factor = match followed.as_str() {
+            Some("magnitude") => self.magnitude,
+            Some("1 / magnitude") => 1.0 / self.magnitude,
+            _ => return Err(wrong(followed, "nothing else can be followed", "\"magnitude\" or \"1 / magnitude\"")),
+        };
+        Ok(Draw::Times(factor, Box::new(draw)))
     }
 
     fn choice(&self, value: &Value, weights: Option<&Value>) -> Result<Draw, Wrong> {
@@ -200,9 +198,16 @@ fn overlay(base: &mut Table, over: &Table) {
     for (name, item) in over.iter().filter(|(name, _)| *name != "extends") {
         match (base.get_mut(name), item) {
             (Some(Item::Table(base)), Item::Table(over)) => overlay(base, over),
-            (Some(Item::ArrayOfTables(base)), Item::ArrayOfTables(over)) if name == EXPECT.name => bounds(base, over),
             (Some(Item::ArrayOfTables(base)), Item::ArrayOfTables(over)) if name != SCRIPT.name => {
-                over.iter().for_each(|table| base.push(table.clone()));
+                let metric = |table: &Table| table.get("metric").and_then(Item::as_str).map(str::to_owned);
+                for table in over {
+                    let same = |known: &&mut Table| name == EXPECT.name && metric(known) == metric(table);
+                    let known = base.iter_mut().find(same);
+                    match known {
+                        Some(known) => overlay(known, table),
+                        None => base.push(table.clone()),
+                    }
+                }
             }
             (Some(known), item) => *known = item.clone(),
             (None, item) => {
@@ -210,23 +215,6 @@ fn overlay(base: &mut Table, over: &Table) {
             }
         }
     }
-}
-
-fn bounds(base: &mut ArrayOfTables, over: &ArrayOfTables) {
-    let metric = |table: &Table| table.get("metric").and_then(Item::as_str).map(str::to_owned);
-    for table in over {
-        let place = base.iter().position(|known| metric(known) == metric(table));
-        match place.and_then(|place| base.get_mut(place)) {
-            Some(known) => table.iter().for_each(|(name, item)| {
-                known.insert(name, item.clone());
-            }),
-            None => base.push(table.clone()),
-        }
-    }
-}
-
-pub fn stem(file: &str) -> String {
-    Path::new(file).file_stem().map_or(String::new(), |stem| stem.to_string_lossy().into_owned())
 }
 
 /// Keys of a population that a scene does not have, except `extends`.

@@ -97,9 +97,8 @@ impl<'a> Reader<'a> {
         let events = self.events(root, duration_s, &effects);
         let bounds = self.bounds(root);
         let head = head?;
-        let stem = Path::new(self.file).file_stem().map_or("".into(), |stem| stem.to_string_lossy());
         let scene = Scene {
-            name: stem.into_owned(),
+            name: stem(self.file),
             text: self.text.to_owned(),
             set: Vec::new(),
             about: head.text("about").to_owned(),
@@ -370,6 +369,11 @@ fn pairs(item: &Item, below: i64) -> Option<Vec<[i64; 2]>> {
         pairs.push(pair);
     }
     Some(pairs)
+}
+
+/// Name of a file without its ending.
+pub(crate) fn stem(file: &str) -> String {
+    Path::new(file).file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// Range of a key in the text.

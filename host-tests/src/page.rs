@@ -15,12 +15,10 @@ pub fn renew(name: &str, text: &str, check: bool) -> Result<bool, String> {
     if !(fresh || check) {
         fs::write(path(name), text).map_err(|error| format!("{name}: {error}"))?;
     }
-    let state = if fresh {
-        "fresh"
-    } else if check {
-        "stale"
-    } else {
-        "written"
+    let state = match (fresh, check) {
+        (true, _) => "fresh",
+        (false, true) => "stale",
+        (false, false) => "written",
     };
     println!("{state:<9}{name}");
     Ok(fresh || !check)

@@ -101,7 +101,6 @@ pub fn page() -> String {
     page
 }
 
-/// Adds a list of keys to the page.
 fn keys_on(page: &mut String, keys: &[Key], indent: &str) {
     for key in keys {
         let allowed = key.allowed().replace("whole number", "whole").replace("number, ", "");

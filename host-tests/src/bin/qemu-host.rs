@@ -5,25 +5,21 @@
 
 use host_tests::{program, stimulus};
 use images::same_bits::{Comparison, INPUTS};
-use std::{
-    collections::BTreeMap,
-    env,
-    error::Error,
-    fs,
-    path::{Path, PathBuf},
-    process::ExitCode,
-};
+use std::collections::BTreeMap;
+use std::error::Error;
+use std::path::Path;
+use std::process::ExitCode;
+use std::{env, fs};
 
 const RECORDING: &str = "stimulus.bin";
 
 fn main() -> ExitCode {
-    let mut arguments = env::args_os().skip(1);
-    let (Some(image), Some(folder)) = (arguments.next(), arguments.next()) else {
+    let arguments: Vec<String> = env::args().skip(1).collect();
+    let [image, folder, failure @ ..] = &arguments[..] else {
         eprintln!("usage: qemu-host IMAGE FOLDER [panic|hardfault|hang]");
         return ExitCode::from(2);
     };
-    let failure = arguments.next().and_then(|word| word.into_string().ok());
-    match compare(&PathBuf::from(image), &PathBuf::from(folder), failure.as_deref()) {
+    match compare(Path::new(image), Path::new(folder), failure) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("{error}");
@@ -32,7 +28,7 @@ fn main() -> ExitCode {
     }
 }
 
-fn compare(image: &Path, folder: &Path, failure: Option<&str>) -> Result<(), Box<dyn Error>> {
+fn compare(image: &Path, folder: &Path, failure: &[String]) -> Result<(), Box<dyn Error>> {
     let records = stimulus::records();
     fs::create_dir_all(folder)?;
     // Written aside and moved into place, so that two runs at once cannot read half a file.
@@ -40,7 +36,7 @@ fn compare(image: &Path, folder: &Path, failure: Option<&str>) -> Result<(), Box
     fs::write(&aside, stimulus::to_bytes(&records))?;
     fs::rename(aside, folder.join(RECORDING))?;
 
-    let words: Vec<_> = [RECORDING].into_iter().chain(failure).collect();
+    let words: Vec<_> = [RECORDING].into_iter().chain(failure.iter().map(String::as_str)).collect();
     let text = program::run(image, folder, &words)?;
     let report: BTreeMap<_, _> = text.lines().filter_map(|line| line.split_once(' ')).collect();
     let figure = |name| report.get(name).copied().ok_or_else(|| format!("the image reported no {name}:\n{text}"));

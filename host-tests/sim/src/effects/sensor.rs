@@ -418,7 +418,6 @@ pub struct Settling {
 }
 
 impl Settling {
-    /// Columns before the first scan.
     pub fn new(tau_s: f64, after_s: f64) -> Self {
         Self { tau_s, left: decay(after_s / tau_s), before: None }
     }

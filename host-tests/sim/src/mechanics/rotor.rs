@@ -51,7 +51,6 @@ pub(crate) trait Acting {
     /// Mean supply of the winding over a time.
     fn source(&self, dt_s: f64) -> Source;
 
-    /// Viscous friction, N m s.
     fn viscous_nm_s(&self) -> f64 {
         0.0
     }

@@ -256,7 +256,6 @@ pub fn percentiles(fingers: &[Unlike]) -> [[[f64; 2]; 3]; 2] {
     })
 }
 
-/// Draws and calibrates fingers on all cores.
 pub fn fingers(seed: u64, count: usize) -> Result<Vec<Unlike>, RunError> {
     cores::map(0..count, |number| finger(seed, number)).into_iter().collect()
 }

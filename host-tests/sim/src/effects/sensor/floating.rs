@@ -21,7 +21,6 @@ pub struct Floating {
 }
 
 impl Floating {
-    /// Network of lines with a conductance to the virtual ground.
     pub fn new(hold: f64) -> Self {
         Self { hold, above: Matrix::default(), below: [Matrix::default(); ROWS + 1], next: ROWS }
     }

@@ -75,7 +75,6 @@ fn report(runs: [&Path; 2], whole: &Path, check: bool, json: Option<&Path>) -> R
         let picture = page::draw(kernel, points).map_err(|error| error.to_string())?;
         files.push((format!("docs/pictures/study-{}.svg", kernel.name), picture));
     }
-    verdicts(&studied);
     frame_front(&studied)?;
     let mut stale = Vec::new();
     for (name, text) in &files {
@@ -87,21 +86,6 @@ fn report(runs: [&Path; 2], whole: &Path, check: bool, json: Option<&Path>) -> R
         Ok(())
     } else {
         Err(format!("stale: {}; renew them with `cargo xtask study`", stale.join(", ")))
-    }
-}
-
-fn verdicts(studied: &[Studied]) {
-    for (kernel, points) in studied.iter().filter(|(kernel, _)| kernel.has_error()) {
-        let (count, errors, cycles) = page::span(points);
-        let beaten = page::beaten_by(points);
-        let firmware = points.iter().zip(beaten).filter(|(point, _)| point.firmware);
-        for (point, by) in firmware {
-            let place = by.map_or("front".into(), |by| format!("beaten by {}", points[by].name));
-            let (name, own, [error, ratio]) =
-                (kernel.name, point.cycles(), [point.error_max, errors].map(page::figure));
-            let front = format!("front of {count}, {ratio} times in error, {cycles:.1} times in cycles");
-            println!("{name:<14} {own:>6} cycles, error {error:>8}: {place}; {front}");
-        }
     }
 }
 

@@ -4,7 +4,6 @@ use super::page::figure;
 use sim::mechanics::Bridge;
 use sim::plant::{Plant, Setup};
 use std::fmt::Write as _;
-use std::time::Instant;
 
 /// Steps, us; each is a divisor of [`SAMPLE_US`].
 const STEPS_US: [f64; 7] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0];
@@ -14,7 +13,6 @@ const SAMPLE_US: f64 = 100.0;
 /// Instants that are compared: the tip runs into the wall, is held, is driven off.
 const SAMPLES: usize = 1_000;
 
-/// The table; how long each took beside the usual one is only printed, as it is not the same twice.
 pub fn markdown() -> String {
     let mut page = String::from(
         "\n## The simulation\n\nThe plant: a tip is driven into the wall, held and driven off in 100 ms. Error of the contact force, N, largest, against \
@@ -23,26 +21,11 @@ pub fn markdown() -> String {
         | step, us | plant | Euler |\n| --- | --- | --- |\n",
     );
     let exact = forces(FINEST_US, plant);
-    let integrators: [(&str, Integrator); 2] = [("plant", plant), ("Euler", euler)];
-    let mut usual_s = 0.0;
-    let mut lines = Vec::new();
     for step_us in STEPS_US {
-        let usual = step_us == 10.0;
-        let bold = if usual { "**" } else { "" };
-        let errors = integrators.map(|(name, integrator)| {
-            let started = Instant::now();
-            let forces = forces(step_us, integrator);
-            let taken_s = started.elapsed().as_secs_f64();
-            if usual && name == "plant" {
-                usual_s = taken_s;
-            }
-            lines.push((format!("{name}, {step_us} us"), taken_s));
-            figure(largest(&forces, &exact))
-        });
+        let bold = if step_us == 10.0 { "**" } else { "" };
+        let integrators: [Integrator; 2] = [plant, euler];
+        let errors = integrators.map(|integrator| figure(largest(&forces(step_us, integrator), &exact)));
         let _ = writeln!(page, "| {bold}{step_us}{bold} | {} |", errors.join(" | "));
-    }
-    for (name, taken_s) in lines {
-        println!("{name:<40} {:>8.2} times the wall time of the plant at 10 us", taken_s / usual_s);
     }
     page
 }

@@ -199,19 +199,14 @@ impl Conduct {
             return ended;
         }
         let worse = |known: Option<f64>, value: f64| Some(known.map_or(value, |known| known.max(value)));
-        let [force_n, travel_mm, duty] = [|s: &Sample| s.force_n, |s: &Sample| s.travel_mm, |s: &Sample| s.duty]
-            .map(|of| Spread::of(self.last.iter().map(of)));
-        ended.duty = worse(ended.duty, duty.deviation);
+        let spreads = [|s: &Sample| s.force_n, |s: &Sample| s.travel_mm, |s: &Sample| s.duty]
+            .map(|of| spread(self.last.iter().map(of)));
+        let [[mean_n, _, swing_n], [_, _, rest_mm], [_, deviation, _]] = spreads;
+        ended.duty = worse(ended.duty, deviation);
         if self.goal_n > 0.0 {
-            ended.holds.push(Hold {
-                goal_n: self.goal_n,
-                mean_n: force_n.mean,
-                swing_n: force_n.width,
-                missed: force_n.mean == 0.0,
-                faulty: self.faulty,
-            });
+            ended.holds.push(Hold { goal_n: self.goal_n, mean_n, swing_n, missed: mean_n == 0.0, faulty: self.faulty });
         } else {
-            ended.rest_mm = worse(ended.rest_mm, travel_mm.width);
+            ended.rest_mm = worse(ended.rest_mm, rest_mm);
         }
         ended
     }
@@ -234,18 +229,11 @@ impl Ended {
     }
 }
 
-struct Spread {
-    mean: f64,
-    deviation: f64,
-    width: f64,
-}
-
-impl Spread {
-    fn of(values: impl Iterator<Item = f64> + Clone) -> Self {
-        let count = values.clone().count().max(1) as f64;
-        let mean = values.clone().sum::<f64>() / count;
-        let square = values.clone().map(|value| (value - mean) * (value - mean)).sum::<f64>() / count;
-        let fold = |of: fn(f64, f64) -> f64| values.clone().reduce(of).unwrap_or(0.0);
-        Self { mean, deviation: square.sqrt(), width: fold(f64::max) - fold(f64::min) }
-    }
+/// Mean, standard deviation and range.
+fn spread(values: impl Iterator<Item = f64> + Clone) -> [f64; 3] {
+    let count = values.clone().count().max(1) as f64;
+    let mean = values.clone().sum::<f64>() / count;
+    let square = values.clone().map(|value| (value - mean) * (value - mean)).sum::<f64>() / count;
+    let fold = |of: fn(f64, f64) -> f64| values.clone().reduce(of).unwrap_or(0.0);
+    [mean, square.sqrt(), fold(f64::max) - fold(f64::min)]
 }

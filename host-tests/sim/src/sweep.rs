@@ -21,9 +21,9 @@ use csv::{Reader, ReaderBuilder};
 use output::kept::Lock;
 use output::say;
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::{fs, slice};
 
 #[derive(Clone, Debug, clap::Args)]
 pub struct Plan {
@@ -116,7 +116,7 @@ fn points(plan: &Plan) -> Result<Vec<(Vec<String>, Scene)>, RunError> {
     let mut combinations = vec![Vec::new()];
     for vary in &plan.vary {
         let longer =
-            |values: Vec<String>| vary.values.iter().map(move |value| [&values[..], &[value.clone()]].concat());
+            |values: Vec<String>| vary.values.iter().map(move |value| [&values[..], slice::from_ref(value)].concat());
         combinations = combinations.into_iter().flat_map(longer).collect();
     }
     let point = |values: Vec<String>| {

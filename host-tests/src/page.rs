@@ -9,19 +9,23 @@ fn path(name: &str) -> PathBuf {
     Path::new(env!("FINGERTIP_ROOT")).join(name)
 }
 
-/// Writes a file that is not fresh, or only checks it; false if a check found it stale.
-pub fn renew(name: &str, text: &str, check: bool) -> Result<bool, String> {
-    let fresh = fs::read_to_string(path(name)).is_ok_and(|present| present == text);
-    if !(fresh || check) {
-        fs::write(path(name), text).map_err(|error| format!("{name}: {error}"))?;
+/// Writes those of the files, each a name and its text, that are not fresh. With `check`, fails where one is stale instead.
+pub fn renew(files: &[(String, String)], check: bool, command: &str) -> Result<(), String> {
+    let mut stale = Vec::new();
+    for (name, text) in files {
+        let fresh = fs::read_to_string(path(name)).is_ok_and(|present| present == *text);
+        let state = if fresh {
+            "fresh"
+        } else if check {
+            stale.push(name.as_str());
+            "stale"
+        } else {
+            fs::write(path(name), text).map_err(|error| format!("{name}: {error}"))?;
+            "written"
+        };
+        println!("{state:<9}{name}");
     }
-    let state = match (fresh, check) {
-        (true, _) => "fresh",
-        (false, true) => "stale",
-        (false, false) => "written",
-    };
-    println!("{state:<9}{name}");
-    Ok(fresh || !check)
+    if stale.is_empty() { Ok(()) } else { Err(format!("stale: {}; renew with `{command}`", stale.join(", "))) }
 }
 
 /// A page with generated tables between two marker lines.
@@ -42,10 +46,7 @@ impl Page {
 
     /// Checks that these are its tables, or writes them.
     pub fn renew(&self, tables: &str, check: bool) -> Result<(), String> {
-        if renew(self.name, &self.renewed(tables)?, check)? {
-            return Ok(());
-        }
-        Err(format!("{} is stale: renew it with `{}`", self.name, self.command))
+        renew(&[(self.name.to_owned(), self.renewed(tables)?)], check, self.command)
     }
 
     /// A page's text with its tables replaced; `None` if it lacks the lines around them.

@@ -76,17 +76,7 @@ fn report(runs: [&Path; 2], whole: &Path, check: bool, json: Option<&Path>) -> R
         files.push((format!("docs/pictures/study-{}.svg", kernel.name), picture));
     }
     frame_front(&studied)?;
-    let mut stale = Vec::new();
-    for (name, text) in &files {
-        if !renew(name, text, check)? {
-            stale.push(name.as_str());
-        }
-    }
-    if stale.is_empty() {
-        Ok(())
-    } else {
-        Err(format!("stale: {}; renew them with `cargo xtask study`", stale.join(", ")))
-    }
+    renew(&files, check, "cargo xtask study")
 }
 
 /// The frame's front must give a choice: three points, 10 times in error, 3 times in cycles.

@@ -3,7 +3,7 @@
 use crate::common::*;
 use fingertip::capture::{Ended, Head, digest_words};
 use fingertip::shipped::Gains;
-use replay::{Frames, ReplayError, replay};
+use replay::{ReplayError, replay};
 
 // A finger that is captured from its tare on.
 
@@ -114,7 +114,7 @@ proptest! {
             kept += usize::from(capture.standing().state == CaptureState::Recording);
         }
         capture.end(Ended::Asked);
-        let (head, frames) = Frames::<ROWS, COLUMNS>::new(capture.data()).expect("a capture");
+        let (head, frames) = replay::frames::<ROWS, COLUMNS>(capture.data()).expect("a capture");
         prop_assert_eq!(head.frames as usize, kept);
         prop_assert!(kept == steps.len() || head.ended == Ended::Full);
         let frames: Vec<_> = frames.collect::<Result<_, _>>().expect("every frame");
@@ -142,7 +142,7 @@ proptest! {
             head[24..28].copy_from_slice(&digest_words(0, words).to_le_bytes());
             bytes = [head, bytes].concat();
         }
-        let read = Frames::<ROWS, COLUMNS>::new(&bytes);
+        let read = replay::frames::<ROWS, COLUMNS>(&bytes);
         prop_assert_eq!(read.is_ok(), real);
         if let Ok((_, frames)) = read {
             prop_assert!(frames.filter(Result::is_err).count() <= 1);

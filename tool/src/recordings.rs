@@ -10,16 +10,14 @@
 //! | `/fingerN/scalars`, `/fingerN/frame`, N the ID less one | as in a scene's recording: what the core on this machine makes of the frames |
 
 use crate::commands::params::named;
-use crate::state::{SHAPE, Stamp, State};
+use crate::state::{Stamp, State};
 use crate::{Client, Error};
-use base64::prelude::{BASE64_STANDARD, Engine as _};
 use fingertip::capture::Head;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{CLOCKS, COLUMNS, ROWS, SLOTS, TAXELS, address};
-use mcap::records::{MessageHeader, Metadata, Record};
-use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, McapError, WriteOptions, Writer};
-use replay::{CapturedFrame, ReplayError, Replayed, replay};
+use replay::{CapturedFrame, ReplayError, Replayed, file, replay};
 use serde_json::{Map, Value, json};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -54,62 +52,21 @@ pub fn open(path: &Path) -> Result<Kept, String> {
     of_bytes(&fs::read(path).map_err(|why| format!("cannot be read: {why}"))?)
 }
 
-pub fn of_bytes(mut rest: &[u8]) -> Result<Kept, String> {
-    if !rest.starts_with(mcap::MAGIC) {
-        return Err("this is no MCAP file: it does not begin as one".into());
-    }
-    if !rest.ends_with(mcap::MAGIC) {
-        return Err("the file was cut off: it does not end as an MCAP file does".into());
-    }
-    let damaged = |why: &dyn std::fmt::Display| format!("the file is damaged: {why}");
-    let options = LinearReaderOptions::default()
-        .with_emit_chunks(true)
-        .with_check_finishes_after_end_magic(true)
-        .with_validate_data_section_crc(true)
-        .with_validate_summary_section_crc(true)
-        .with_record_length_limit(rest.len());
-    let mut reader = LinearReader::new_with_options(options);
-    let (mut bytes, mut about, mut ends) = (None, None, Vec::new());
-    while let Some(event) = reader.next_event() {
-        match event.map_err(|why| damaged(&why))? {
-            LinearReadEvent::ReadRequest(wanted) => {
-                let (now, later) = rest.split_at(wanted.min(rest.len()));
-                reader.insert(now.len()).copy_from_slice(now);
-                reader.notify_read(now.len());
-                rest = later;
-            }
-            LinearReadEvent::Record { data, opcode } => {
-                match mcap::parse_record(opcode, data).map_err(|why| damaged(&why))? {
-                    Record::Attachment { header, data, .. } if header.name == ATTACHED => {
-                        bytes = Some(data.into_owned())
-                    }
-                    Record::Metadata(metadata) if metadata.name == ABOUT => about = Some(metadata.metadata),
-                    Record::DataEnd(end) => ends.push(end.data_section_crc),
-                    Record::Footer(footer) => ends.push(footer.summary_crc),
-                    Record::Unknown { opcode, .. } => return Err(damaged(&format_args!("a record of kind {opcode}"))),
-                    _ => {}
-                }
-            }
-        }
-    }
-    match ends[..] {
-        [data, summary] if data != 0 && summary != 0 => {}
-        [_, _] => {
-            return Err("the file has no checksums: another program rewrote it. Use the original file".into());
-        }
-        _ => return Err(damaged(&"it has no end of its messages, or no footer")),
-    }
-    let (Some(bytes), Some(about)) = (bytes, about) else {
-        return Err("the file holds no capture: a scene's recording is replayed by the scene's own tests".into());
-    };
-    Ok(Kept { bytes, about })
+pub fn of_bytes(bytes: &[u8]) -> Result<Kept, String> {
+    file::check(bytes)?;
+    let none = "the file holds no capture: a scene's recording is replayed by the scene's own tests";
+    let about = file::metadata(bytes, ABOUT).map_err(|_| none)?.metadata;
+    let attached = file::summary(bytes)?.attachment_indexes.into_iter().find(|index| index.name == ATTACHED);
+    let attached = mcap::read::attachment(bytes, &attached.ok_or(none)?).map_err(|why| why.to_string())?;
+    Ok(Kept { bytes: attached.data.into_owned(), about })
 }
 
 /// Frames from one message of scalars to the next, and from one of codes to the next.
 const SCALARS_EVERY: u32 = 5;
 const CODES_EVERY: u32 = 50;
+
 /// Schema of a frame; recordings of scenes include the same file.
-const FRAME_SCHEMA: [&str; 2] = ["fingertip.Frame", include_str!("messages/frame.json")];
+const FRAME_SCHEMA: &str = include_str!("messages/frame.json");
 
 /// Writes a capture with what is known of it.
 pub fn write(to: impl Write + Seek, bytes: &[u8], about: &About) -> Result<(), String> {
@@ -162,7 +119,7 @@ fn put(
     out.write_metadata(&Metadata { name: ABOUT.into(), metadata })?;
     let id = about.get("id").and_then(|id| id.parse().ok()).unwrap_or(1);
     let scalars = Topic::Scalars.add_to(&mut out, id, about)?;
-    let codes = out.add_schema(FRAME_SCHEMA[0], "jsonschema", FRAME_SCHEMA[1].as_bytes())?;
+    let codes = out.add_schema("fingertip.Frame", "jsonschema", FRAME_SCHEMA.as_bytes())?;
     let codes = out.add_channel(codes, &topic(id, "frame"), "json", about)?;
     let first = shown.first().map_or(0, |(taken, _)| taken.frame.sequence);
     let since_ns = |taken: &Frame| u64::from(taken.frame.sequence.wrapping_sub(first)) * u64::from(head.frame_ns);
@@ -255,7 +212,11 @@ impl Topic {
                 let named = scalars(stamp.time_s, state).map(|(name, _, value)| (name.to_owned(), value));
                 Value::Object(Map::from_iter(named))
             }
-            Self::Image => image(stamp.frame_ns, state),
+            Self::Image => {
+                let grey = |pa: &i64| (pa / PA_PER_GREY).clamp(0, 255) as u8;
+                let rows = state.pressures_pa.chunks(COLUMNS).map(|row| row.iter().map(grey).collect());
+                file::image(stamp.frame_ns, "array", &rows.collect::<Vec<_>>())
+            }
         };
         message.to_string().into_bytes()
     }
@@ -298,16 +259,4 @@ fn scalars(time_s: f64, state: &State) -> [(&'static str, &'static str, Value); 
         ("fault", "Fault, by its number on the bus; 0 is none", json!(state.fault)),
         ("limits", "Limits, a bit each as on the bus", json!(state.limits)),
     ]
-}
-
-fn image(time_ns: u64, state: &State) -> Value {
-    let [rows, columns] = SHAPE;
-    let grey = |pa: &i64| (pa / PA_PER_GREY).clamp(0, 255) as u8;
-    // The last row on top.
-    let data: Vec<u8> = state.pressures_pa.chunks(columns).rev().flatten().map(grey).collect();
-    json!({
-        "timestamp": { "sec": time_ns / 1_000_000_000, "nsec": time_ns % 1_000_000_000 },
-        "frame_id": "array", "width": columns, "height": rows, "encoding": "mono8", "step": columns,
-        "data": BASE64_STANDARD.encode(data),
-    })
 }

@@ -21,10 +21,11 @@ use fingertip::params::Params;
 use fingertip::shipped::{COLUMNS, Calibration, Config, Pipeline, ROWS, SLOTS};
 use images::record::{Digest, Record};
 use mcap::read::Options;
-use mcap::records::{MessageHeader, Metadata, op};
-use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, McapError, McapResult, MessageStream, WriteOptions, Writer};
 use output::kept::Whole;
+pub use replay::file::check;
+use replay::file::{self, metadata};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
@@ -109,50 +110,6 @@ pub const SCALARS: [Scalar; 20] = [
     ("object_height_mm", "Height of the object", |s| s.truth.object_mm[1]),
 ];
 
-/// Checks a file: every byte of it is covered by a checksum, or has fixed contents. The error names the part.
-pub fn check(bytes: &[u8]) -> Result<(), RunError> {
-    let options = LinearReaderOptions::default()
-        .with_emit_chunks(true)
-        .with_record_length_limit(bytes.len())
-        .with_check_finishes_after_end_magic(true)
-        .with_validate_data_section_crc(true)
-        .with_validate_summary_section_crc(true);
-    let mut reader = LinearReader::new_with_options(options);
-    let mut rest = bytes;
-    while let Some(event) = reader.next_event() {
-        match event.map_err(damage)? {
-            LinearReadEvent::ReadRequest(wanted) => {
-                let (next, later) = rest.split_at(wanted.min(rest.len()));
-                reader.insert(next.len()).copy_from_slice(next);
-                reader.notify_read(next.len());
-                rest = later;
-            }
-            LinearReadEvent::Record { opcode: op::DATA_END | op::FOOTER, data } if data.ends_with(&[0; 4]) => {
-                let message = "the recording lacks a checksum: another program rewrote it. Replay the original";
-                return Err(message.into());
-            }
-            LinearReadEvent::Record { .. } => {}
-        }
-    }
-    Ok(())
-}
-
-fn damage(error: McapError) -> String {
-    match error {
-        McapError::BadMagic => "this is no MCAP file: it does not begin and end as one".into(),
-        McapError::UnexpectedEof => "the recording was cut off: it does not end as an MCAP file does".into(),
-        McapError::BadDataCrc { .. } => {
-            "the recording is damaged in its messages, its metadata or the attached scene: \
-                                         the CRC differs. Copy it or record the scene again"
-                .into()
-        }
-        McapError::BadSummaryCrc { .. } => {
-            "the recording is damaged in its summary, behind its messages: the CRC differs".into()
-        }
-        error => format!("the recording is damaged: {error}"),
-    }
-}
-
 #[derive(Clone, Debug, PartialEq)]
 pub struct Replay {
     /// Steps of all fingers, up to the first difference.
@@ -174,7 +131,7 @@ pub fn replay(path: &Path) -> Result<Replay, RunError> {
 }
 
 fn replay_bytes(bytes: &[u8]) -> Result<Replay, RunError> {
-    check(bytes)?;
+    file::check(bytes)?;
     let setup = metadata(bytes, SETUP)?;
     if setup.metadata.get(WHOLE).is_some_and(|whole| whole == "false") {
         let message = "a recording of the emulated board: what its core was given is not all in it, so it cannot be fed \
@@ -231,13 +188,6 @@ fn replay_bytes(bytes: &[u8]) -> Result<Replay, RunError> {
         }
     }
     Ok(Replay { steps, difference: None })
-}
-
-fn metadata(bytes: &[u8], name: &str) -> Result<Metadata, RunError> {
-    let summary = mcap::Summary::read(bytes)?.ok_or("the file has no summary: the recording was cut off")?;
-    let index = summary.metadata_indexes.iter().find(|index| index.name == name);
-    let index = index.ok_or_else(|| format!("no {name} in the file: not a whole recording of this project"))?;
-    Ok(mcap::read::metadata(bytes, index)?)
 }
 
 /// Time between two frames that are recorded as arrays and images.
@@ -385,21 +335,11 @@ fn scalars(step: &Step) -> Value {
     Value::Object(values.collect())
 }
 
-/// Codes of the taxels in grey, the last row on top.
+/// Codes of the taxels in grey.
 fn image(step: &Step, log_time: u64) -> Value {
     let grey = |code: u16| (code / CODES_PER_GREY).min(255) as u8;
-    let rows = (0..ROWS).rev();
-    let data: Vec<u8> =
-        rows.flat_map(|row| (0..COLUMNS).map(move |column| grey(step.frame.code(row, column)))).collect();
-    json!({
-        "timestamp": { "sec": log_time / 1_000_000_000, "nsec": log_time % 1_000_000_000 },
-        "frame_id": format!("finger{}", step.finger),
-        "width": COLUMNS,
-        "height": ROWS,
-        "encoding": "mono8",
-        "step": COLUMNS,
-        "data": BASE64_STANDARD.encode(data),
-    })
+    let rows = (0..ROWS).map(|row| (0..COLUMNS).map(|column| grey(step.frame.code(row, column))).collect());
+    file::image(log_time, &format!("finger{}", step.finger), &rows.collect::<Vec<_>>())
 }
 
 fn core(step: &Step) -> Value {

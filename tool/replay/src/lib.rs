@@ -3,6 +3,8 @@
 
 #![allow(missing_docs, reason = "parts of the project's own programs: a name that says all needs no comment")]
 
+pub mod file;
+
 use fingertip::capture::{
     ESCAPE, Ended, Head, LAYOUT, Last, MAGIC, VERSION, digest_step, digest_words, short_digest, width,
 };
@@ -49,7 +51,7 @@ pub fn replay<const ROWS: usize, const COLUMNS: usize>(
     clocks: &Clocks,
     mut each: impl FnMut(&CapturedFrame<ROWS, COLUMNS>, &Status),
 ) -> Result<Replayed<ROWS, COLUMNS>, ReplayError> {
-    let (head, frames) = Frames::<ROWS, COLUMNS>::new(bytes)?;
+    let (head, frames) = frames::<ROWS, COLUMNS>(bytes)?;
     let config = Shaped::new(&head.params, clocks).map_err(ReplayError::Config)?;
     let (captured, here) = (head.frame_ns, config.timing.frame_ns);
     if captured != here {
@@ -127,74 +129,56 @@ pub struct CapturedFrame<const ROWS: usize, const COLUMNS: usize> {
     pub digest: u16,
 }
 
-#[derive(Clone, Debug)]
-pub struct Frames<'a, const ROWS: usize, const COLUMNS: usize> {
-    bits: Reader<'a>,
-    last: Last<ROWS, COLUMNS>,
-    read: u32,
-    count: u32,
+/// The head of a capture, and its frames: after one that makes no sense there are no more.
+type Read<Frames, const ROWS: usize, const COLUMNS: usize> = Result<(Head<ROWS, COLUMNS>, Frames), ReplayError>;
+
+/// Reads a capture.
+pub fn frames<const ROWS: usize, const COLUMNS: usize>(
+    bytes: &[u8],
+) -> Read<impl Iterator<Item = Result<CapturedFrame<ROWS, COLUMNS>, ReplayError>>, ROWS, COLUMNS> {
+    let head = read_head(bytes)?;
+    let body = bytes.get(Head::<ROWS, COLUMNS>::BYTES..).ok_or(ReplayError::Cut)?;
+    let need = head.bits.div_ceil(8) as usize;
+    match body.len().cmp(&need) {
+        Ordering::Less => return Err(ReplayError::Cut),
+        Ordering::Greater => return Err(ReplayError::Longer),
+        Ordering::Equal if check(body, head.bits) != head.check => return Err(ReplayError::Damaged),
+        Ordering::Equal => {}
+    }
+    let (mut bits, mut last) = (Reader { bytes: body, at: 0, end: head.bits }, Last::NONE);
+    let mut sound = true;
+    let frames = (0..head.frames).map_while(move |number| {
+        let taken = sound.then(|| take(&mut bits, &mut last))?;
+        let all = number + 1 < head.frames || bits.at == bits.end;
+        sound = taken.is_some() && all;
+        Some(taken.filter(|_| all).ok_or(ReplayError::Frame(number)))
+    });
+    Ok((head, frames))
 }
 
-impl<'a, const ROWS: usize, const COLUMNS: usize> Frames<'a, ROWS, COLUMNS> {
-    /// Reads the head of a capture; returns it and the frames.
-    pub fn new(bytes: &'a [u8]) -> Result<(Head<ROWS, COLUMNS>, Self), ReplayError> {
-        let head = read_head(bytes)?;
-        let body = bytes.get(Head::<ROWS, COLUMNS>::BYTES..).ok_or(ReplayError::Cut)?;
-        let need = head.bits.div_ceil(8) as usize;
-        match body.len().cmp(&need) {
-            Ordering::Less => return Err(ReplayError::Cut),
-            Ordering::Greater => return Err(ReplayError::Longer),
-            Ordering::Equal if check(body, head.bits) != head.check => return Err(ReplayError::Damaged),
-            Ordering::Equal => {}
-        }
-        let frames =
-            Self { bits: Reader { bytes: body, at: 0, end: head.bits }, last: Last::NONE, read: 0, count: head.frames };
-        Ok((head, frames))
+fn take<const ROWS: usize, const COLUMNS: usize>(
+    bits: &mut Reader<'_>,
+    last: &mut Last<ROWS, COLUMNS>,
+) -> Option<CapturedFrame<ROWS, COLUMNS>> {
+    let step = bits.signed(width::SEQUENCE)?.cast_unsigned().wrapping_add(1);
+    let sequence = last.frame.sequence.wrapping_add(step);
+    let sense = sense(bits, &last.sense)?;
+    let command = command(bits, &last.command)?;
+    let duty = i16::try_from(i32::from(last.duty).checked_add(bits.signed(width::DUTY)?)?).ok()?;
+    if bits.get(1)? == 1 {
+        let both = bits.get(16)?;
+        (last.mode, last.fault) = (both as u8, (both >> 8) as u8);
     }
-
-    fn take(&mut self) -> Option<CapturedFrame<ROWS, COLUMNS>> {
-        let (bits, last) = (&mut self.bits, &mut self.last);
-        let step = bits.signed(width::SEQUENCE)?.cast_unsigned().wrapping_add(1);
-        let sequence = last.frame.sequence.wrapping_add(step);
-        let sense = sense(bits, &last.sense)?;
-        let command = command(bits, &last.command)?;
-        let duty = i16::try_from(i32::from(last.duty).checked_add(bits.signed(width::DUTY)?)?).ok()?;
-        if bits.get(1)? == 1 {
-            let both = bits.get(16)?;
-            (last.mode, last.fault) = (both as u8, (both >> 8) as u8);
-        }
-        let digest = bits.get(16)? as u16;
-        let (width, mut spread) = (last.width(), 0_u32);
-        let mut frame = Frame { sequence, ..last.frame };
-        for code in frame.codes.rows.as_flattened_mut().iter_mut().chain(&mut frame.codes.undriven) {
-            let folded = bits.folded(width, 16)?;
-            spread = spread.wrapping_add(folded);
-            *code = code.wrapping_add(unfold(folded) as u16);
-        }
-        *last = Last { frame, sense, command, duty, spread, ..*last };
-        Some(CapturedFrame { frame, sense, command, duty: Duty(duty), mode: last.mode, fault: last.fault, digest })
+    let digest = bits.get(16)? as u16;
+    let (width, mut spread) = (last.width(), 0_u32);
+    let mut frame = Frame { sequence, ..last.frame };
+    for code in frame.codes.rows.as_flattened_mut().iter_mut().chain(&mut frame.codes.undriven) {
+        let folded = bits.folded(width, 16)?;
+        spread = spread.wrapping_add(folded);
+        *code = code.wrapping_add(unfold(folded) as u16);
     }
-}
-
-impl<const ROWS: usize, const COLUMNS: usize> Iterator for Frames<'_, ROWS, COLUMNS> {
-    type Item = Result<CapturedFrame<ROWS, COLUMNS>, ReplayError>;
-
-    /// The next frame; after one that makes no sense there are no more.
-    fn next(&mut self) -> Option<Self::Item> {
-        if self.read == self.count {
-            return None;
-        }
-        let taken = self.take();
-        self.read += 1;
-        let over = self.read == self.count && self.bits.at != self.bits.end;
-        match taken {
-            Some(taken) if !over => Some(Ok(taken)),
-            _ => {
-                self.count = self.read;
-                Some(Err(ReplayError::Frame(self.read - 1)))
-            }
-        }
-    }
+    *last = Last { frame, sense, command, duty, spread, ..*last };
+    Some(CapturedFrame { frame, sense, command, duty: Duty(duty), mode: last.mode, fault: last.fault, digest })
 }
 
 fn sense(bits: &mut Reader<'_>, last: &Sense) -> Option<Sense> {

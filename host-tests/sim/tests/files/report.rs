@@ -400,7 +400,7 @@ fn every_changed_byte_and_what_is_no_recording_is_found_before_the_replay() {
     };
     let find = |text: &str| bytes.windows(text.len()).position(|window| window == text.as_bytes()).unwrap();
     for at in [find("about ="), find("modulus_pa") + 13, first + 100] {
-        contains(at, "in its messages, its metadata or the attached scene");
+        contains(at, "in its messages, its metadata or what is attached");
     }
     contains(bytes.len() - 100, "in its summary");
 

@@ -282,13 +282,8 @@ impl Tcp {
         let mut heard = if bytes { self.hear() } else { Vec::new() };
         if new && let Ok((client, from)) = self.listener.accept() {
             // The present client may have closed the connection after its last bytes.
-            for _ in 0..LAST_READS {
-                let last = self.hear();
-                if last.is_empty() {
-                    break;
-                }
-                heard.extend(last);
-            }
+            let last = std::iter::repeat_with(|| self.hear()).take(LAST_READS);
+            heard.extend(last.take_while(|bytes| !bytes.is_empty()).flatten());
             self.welcome(client, from);
         }
         heard

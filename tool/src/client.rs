@@ -82,24 +82,15 @@ impl Pong {
 impl Client {
     /// Opens the port; asks nothing yet.
     pub fn open(reach: &Reach) -> Result<Self, Error> {
-        let port = reach.port.clone().ok_or(Error::NoPort)?;
-        let line = Line::open(&port, reach.baud).map_err(|why| Error::Open(port.clone(), why))?;
-        let timeout = Duration::from_millis(reach.timeout_ms);
-        Ok(Self {
-            line,
-            port,
-            baud: reach.baud,
-            id: reach.ids[0],
-            timeout,
-            feeds: false,
-            fed: Instant::now(),
-            owed: false,
-        })
+        let (port, baud) = (reach.port.clone().ok_or(Error::NoPort)?, reach.baud);
+        let (id, timeout) = (reach.ids[0], Duration::from_millis(reach.timeout_ms));
+        let line = Line::open(&port, baud)?;
+        Ok(Self { line, port, baud, id, timeout, feeds: false, fed: Instant::now(), owed: false })
     }
 
     /// Opens a port again that was lost.
     pub fn reopen(&mut self) -> Result<(), Error> {
-        self.line = Line::open(&self.port, self.baud).map_err(|why| Error::Open(self.port.clone(), why))?;
+        self.line = Line::open(&self.port, self.baud)?;
         self.owed = false;
         Ok(())
     }
@@ -391,7 +382,11 @@ pub fn ports() -> Vec<String> {
 }
 
 impl Line {
-    pub fn open(port: &str, baud: u32) -> io::Result<Self> {
+    fn open(port: &str, baud: u32) -> Result<Self, Error> {
+        Self::of(port, baud).map_err(|why| Error::Open(port.into(), why))
+    }
+
+    fn of(port: &str, baud: u32) -> io::Result<Self> {
         if let Some(address) = port.strip_prefix(TCP) {
             let stream = TcpStream::connect(address)?;
             stream.set_nodelay(true)?;

@@ -81,10 +81,12 @@ fn answer(json: bool, value: &Value, text: impl std::fmt::Display) {
 }
 
 /// Runs a command for each of these IDs, or for all fingertips, also after an error of one. Before that, all of them get the
-/// values `first`, in one packet each, which no absent ID delays. Several answers in JSON are one array.
+/// values `first`, in one packet each, which no absent ID delays. The answers of several in JSON are one array, also if there
+/// are none.
 pub fn each(
     client: &mut Client,
     ids: &[u8],
+    json: bool,
     titled: bool,
     first: &[(u16, i64)],
     command: impl Fn(&mut Client) -> Result<(), Error>,
@@ -105,21 +107,19 @@ pub fn each(
         client.id = *id;
         return command(client);
     }
-    *answers() = Some(Vec::new());
+    *answers() = json.then(Vec::new);
     let mut failed = Vec::new();
     for id in ids {
         client.id = id;
-        if titled {
+        if titled && !json {
             say(format_args!("ID {id}:"));
         }
         if let Err(why) = command(client) {
             failed.push(format!("ID {id}: {why}"));
         }
     }
-    let all = answers().take().unwrap_or_default();
-    if !all.is_empty() {
-        say_json(&Value::Array(all));
-    }
+    let all = answers().take();
+    all.into_iter().for_each(|all| say_json(&Value::Array(all)));
     if failed.is_empty() { Ok(()) } else { Err(failed.join("; ").into()) }
 }
 

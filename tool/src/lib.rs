@@ -15,9 +15,7 @@ pub mod table;
 pub mod whole;
 
 pub use client::Client;
-
-/// A controller's number for an instruction that came damaged.
-const DAMAGED: u8 = 3;
+use fingertip::link::packet::StatusError;
 
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -58,13 +56,13 @@ impl Error {
         }
     }
 
-    pub fn refused_with(&self, wanted: u8) -> bool {
-        matches!(self, Self::Refused(_, number) if *number == wanted)
+    pub fn refused_with(&self, wanted: StatusError) -> bool {
+        matches!(self, Self::Refused(_, number) if *number == wanted as u8)
     }
 
     /// True if the line may be what was wrong, so that it may go well the next time.
     pub fn is_noise(&self) -> bool {
-        matches!(self, Self::Silent(_) | Self::Damaged(_)) || self.refused_with(DAMAGED)
+        matches!(self, Self::Silent(_) | Self::Damaged(_)) || self.refused_with(StatusError::Crc)
     }
 
     pub fn file(doing: &str, path: &std::path::Path, why: impl std::fmt::Display) -> Self {

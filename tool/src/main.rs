@@ -129,7 +129,7 @@ fn with_examples(command: clap::Command) -> clap::Command {
 fn run(cli: &Cli) -> Result<(), Error> {
     let connect = || Client::connect(&cli.reach);
     let for_each = |command: &dyn Fn(&mut Client) -> Result<(), Error>| {
-        each(&mut Client::open(&cli.reach)?, &cli.reach.ids, !cli.json, &[], |client| {
+        each(&mut Client::open(&cli.reach)?, &cli.reach.ids, cli.json, true, &[], |client| {
             client.check().and_then(|()| command(client))
         })
     };

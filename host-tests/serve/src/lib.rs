@@ -7,7 +7,7 @@
 #![allow(missing_docs, reason = "parts of the project's own programs: a name that says all needs no comment")]
 
 #[cfg(feature = "native")]
-pub mod native;
+mod native;
 mod port;
 
 pub use port::{Event, Place, Port, Stop};
@@ -43,7 +43,9 @@ pub trait Finger {
     }
 
     /// Executes a command from the standard input, and returns what was done.
-    fn command(&mut self, text: &str) -> Result<String, String>;
+    fn command(&mut self, _text: &str) -> Result<String, String> {
+        Err("this finger takes no commands: `cargo xtask serve` without --board virtual does".into())
+    }
 }
 
 /// Serves a finger until it is stopped. An answer counts as late after `late`, without its configured delay. With
@@ -80,11 +82,11 @@ pub fn serve<F: Finger>(finger: &mut F, port: &mut Port, late: Duration, always:
             port.send(&answer);
             pace.answered(answer.len());
         }
-        if let Some(text) = pace.tell(finger.now_s()) {
+        if let Some(text) = pace.tell() {
             say::aside(text);
         }
     }
-    Ok(pace.end(finger.now_s()))
+    Ok(pace.end())
 }
 
 /// Advances with the clock by at most a tick, as a request may arrive in between.
@@ -115,38 +117,47 @@ pub struct Served {
 
 pub struct Pace {
     begun: Instant,
+    /// Time that a finger that keeps up had at `begun`, s; less by what was skipped because it was too far behind.
     begun_s: f64,
-    /// Time skipped because the finger was too far behind, s.
-    lost_s: f64,
+    /// Time of the finger, s, when it was asked last.
+    now_s: f64,
     late: Duration,
     always: bool,
     asked: Option<Instant>,
     all: Served,
-    /// Instant, time of the finger and number of late answers at the last check.
+    /// Instant, virtual time and number of late answers at the last check.
     looked: (Instant, f64, u64),
 }
 
 impl Pace {
     pub fn new(begun_s: f64, late: Duration, always: bool) -> Self {
         let begun = Instant::now();
-        let looked = (begun, begun_s, 0);
-        Self { begun, begun_s, lost_s: 0.0, late, always, asked: None, all: Served::default(), looked }
+        Self {
+            begun,
+            begun_s,
+            now_s: begun_s,
+            late,
+            always,
+            asked: None,
+            all: Served::default(),
+            looked: (begun, 0.0, 0),
+        }
     }
 
     /// Time of a finger that keeps up, s.
     pub fn clock_s(&mut self, now_s: f64) -> f64 {
-        let clock_s = self.begun_s + self.begun.elapsed().as_secs_f64() - self.lost_s;
-        let beyond_s = clock_s - now_s - BEHIND_MAX_S;
-        if beyond_s > 0.0 {
-            self.lost_s += beyond_s;
-            return clock_s - beyond_s;
-        }
-        clock_s
+        // The clock of a finger whose power was cut begins again: it counts on from there.
+        self.all.virtual_s += (now_s - self.now_s).max(0.0);
+        self.now_s = now_s;
+        let clock_s = self.begun_s + self.begun.elapsed().as_secs_f64();
+        let beyond_s = (clock_s - now_s - BEHIND_MAX_S).max(0.0);
+        self.begun_s -= beyond_s;
+        clock_s - beyond_s
     }
 
     /// Instant at which the clock reaches a time of the finger.
     pub fn until(&self, time_s: f64) -> Instant {
-        self.begun + Duration::from_secs_f64((time_s - self.begun_s + self.lost_s).max(0.0))
+        self.begun + Duration::from_secs_f64((time_s - self.begun_s).max(0.0))
     }
 
     pub fn asked(&mut self, bytes: usize) {
@@ -165,14 +176,14 @@ impl Pace {
     }
 
     /// Returns the report on the time since the last check, if one is due.
-    pub fn tell(&mut self, now_s: f64) -> Option<String> {
+    pub fn tell(&mut self) -> Option<String> {
         let (at, virtual_s, late) = self.looked;
         let wall_s = at.elapsed();
         if wall_s < LOOK {
             return None;
         }
-        self.looked = (Instant::now(), now_s, self.all.late);
-        let (ratio, late) = ((now_s - virtual_s) / wall_s.as_secs_f64(), self.all.late - late);
+        self.looked = (Instant::now(), self.all.virtual_s, self.all.late);
+        let (ratio, late) = ((self.all.virtual_s - virtual_s) / wall_s.as_secs_f64(), self.all.late - late);
         let mut text = format!("pace     {ratio:.2} of real time");
         if late > 0 {
             let [allowed_ms, longest_ms] = [self.late.as_secs_f64(), self.all.longest_s].map(|s| s * 1e3);
@@ -182,8 +193,8 @@ impl Pace {
         (self.always || ratio < KEEPS_UP || late > 0).then_some(text)
     }
 
-    pub fn end(&self, now_s: f64) -> Served {
-        Served { virtual_s: now_s - self.begun_s, wall_s: self.begun.elapsed().as_secs_f64(), ..self.all }
+    pub fn end(&self) -> Served {
+        Served { wall_s: self.begun.elapsed().as_secs_f64(), ..self.all }
     }
 }
 

@@ -2,7 +2,6 @@
 
 use clap::Parser;
 use output::say;
-use serve::native::Native;
 use serve::{Place, Port};
 use sim::native::served::Bus;
 use std::io::{self, Write as _};
@@ -51,7 +50,7 @@ fn main() -> ExitCode {
 
 fn run(args: &Args) -> Result<(), String> {
     let scene = sim::cli::load(&args.scene, &args.set, args.seed)?;
-    let bus = Bus::new(&scene).map_err(|why| format!("{}: {why}", scene.name))?;
+    let mut bus = Bus::new(&scene).map_err(|why| format!("{}: {why}", scene.name))?;
     let fingers = scene.table("hand").whole("fingers");
     let place = args.tcp.map_or_else(|| Place::Pty(args.pty.clone()), Place::Tcp);
     let mut port = Port::open(&place).map_err(|why| why.to_string())?.with_commands();
@@ -63,7 +62,7 @@ fn run(args: &Args) -> Result<(), String> {
     let (name, about) = (&scene.name, &scene.about);
     say::line(format_args!("scene    {name}: {about} (simulated on the native core; `help` lists commands)"));
     io::stdout().flush().map_err(|why| format!("cannot say where it serves: {why}"))?;
-    let Ok(served) = serve::serve(&mut Native(bus), &mut port, LATE, false);
+    let Ok(served) = serve::serve(&mut bus, &mut port, LATE, false);
     say::line(served.text());
     Ok(())
 }

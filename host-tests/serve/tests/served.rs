@@ -174,12 +174,20 @@ fn a_last_line_needs_no_end() {
     assert!(served.line().starts_with("finger 1: Off"));
 }
 
+#[test]
+fn time_counts_on_where_the_clock_of_a_finger_begins_again() {
+    let mut pace = serve::Pace::new(3.0, PATIENCE, true);
+    let clocks_s = [10.0, 0.0, 1.0].map(|now_s| pace.clock_s(now_s));
+    assert!(clocks_s[1] < 0.2, "it is not asked to catch up: {clocks_s:?}");
+    assert_eq!(pace.end().virtual_s, 8.0);
+}
+
 /// A job in the background that reads from its terminal is stopped by the system.
 #[test]
 fn behind_a_terminal_it_serves_on_while_somebody_types() {
-    let [path, number] = ["behind", "number"].map(link);
-    let (program, shown) = (env!("CARGO_BIN_EXE_serve"), [&path, &number].map(|path| path.display()));
-    let job = format!("set -m; {program} --pty {} > /dev/null 2>&1 & echo $! > {}; sleep 3600", shown[0], shown[1]);
+    let path = link("behind");
+    let (program, shown) = (env!("CARGO_BIN_EXE_serve"), path.display());
+    let job = format!("set -m; {program} --pty {shown} > /dev/null 2>&1 & sleep 3600");
     let mut script = Command::new("script");
     script.args(["-qc", &job, "/dev/null"]).env("SHELL", "/bin/sh").stdin(Stdio::piped()).stdout(Stdio::piped());
     let mut script = Killed(script.spawn().expect("Debian has it (bsdutils)"));
@@ -192,11 +200,8 @@ fn behind_a_terminal_it_serves_on_while_somebody_types() {
         script.0.stdout.as_mut().expect("it was asked for").read_exact(&mut byte).expect("a terminal");
         shown.push(byte[0]);
     }
-    // The shell may not have come as far as the finger.
-    let written = || std::fs::read_to_string(&number).unwrap_or_default();
-    wait_for(|| written().ends_with('\n'));
-    let pid: i32 = written().trim().parse().expect("a number");
-    std::fs::remove_file(&number).expect("it is there");
+    let lock = std::fs::read_to_string(output::kept::beside(&path, "lock")).expect("it is held");
+    let pid: i32 = lock.split(' ').next().and_then(|pid| pid.parse().ok()).expect("its process");
     let mut port = SerialPort::open(&path, 1_000_000).expect("it is there");
     port.set_read_timeout(std::time::Duration::from_secs(1)).expect("a time-out");
     for _ in 0..200 {

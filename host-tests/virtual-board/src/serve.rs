@@ -65,8 +65,4 @@ impl Finger for Board {
     fn answer(&mut self) -> Result<Vec<u8>, Error> {
         Ok(self.0.take_received()?.iter().map(|timed| timed.byte).collect())
     }
-
-    fn command(&mut self, _text: &str) -> Result<String, String> {
-        Err("the emulated board takes no commands: `cargo xtask serve` without --board virtual does".into())
-    }
 }

@@ -271,14 +271,12 @@ fn find(path: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
 
 /// Result of a file in JSON and in words, and whether it is as expected.
 fn replay(file: &Path) -> (Value, String, bool) {
-    let kept = match recordings::open(file) {
-        Ok(kept) => kept,
-        Err(why) => return (json!({ "file": file, "refused": why }), format!("refused: {why}"), false),
-    };
-    let firmware = kept.about.get("firmware").cloned().unwrap_or_default();
-    match recordings::through_the_core(&kept.bytes, |_, _| {}) {
+    let kept = recordings::open(file);
+    let firmware = kept.as_ref().ok().and_then(|kept| kept.about.get("firmware").cloned()).unwrap_or_default();
+    let replayed =
+        kept.and_then(|kept| recordings::through_the_core(&kept.bytes, |_, _| {}).map_err(|why| why.to_string()));
+    match replayed {
         Err(why) => {
-            let why = why.to_string();
             let of = if firmware.is_empty() { String::new() } else { format!(" (firmware {firmware})") };
             let text = format!("refused: {why}{of}");
             (json!({ "file": file, "firmware": firmware, "refused": why }), text, false)

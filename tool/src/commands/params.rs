@@ -12,7 +12,6 @@ use fingertip::shipped::{Config, Gains, address};
 use fingertip::store::BAUD_RATES;
 use serde_json::{Map, json};
 use std::fs;
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use toml_edit::Document;
@@ -480,10 +479,7 @@ fn write_backup(path: &Path, force: bool, client: &mut Client, stored: &Stored) 
 
 /// Reads it. With the number of a controller, it fails where the backup is of another one.
 fn read_backup(path: &Path, chip: Option<i64>) -> Result<Backup, Error> {
-    let text = fs::read_to_string(path).map_err(|why| match why.kind() {
-        ErrorKind::InvalidData => Error::file("read", path, "it is no text"),
-        _ => Error::file("read", path, why),
-    })?;
+    let text = fs::read_to_string(path).map_err(|why| Error::file("read", path, why))?;
     let document = Document::parse(text.as_str()).map_err(|why| Error::file("read", path, why))?;
     let table = document.get(PARAMETERS).and_then(|item| item.as_table());
     let table = table.ok_or_else(|| Error::file("read", path, format_args!("it has no table [{PARAMETERS}]")))?;

@@ -1,27 +1,22 @@
 //! `fingertip press`.
 
-use super::stop::{Moving, PREVENTED};
-use super::{Interrupt, TOUCHED, aside, no_fault, say, say_json, stopped};
+use super::stop::Moving;
+use super::{Interrupt, TOUCHED, no_fault, report, say, say_json, stopped};
 use crate::state::{Clock, RESTARTED, State};
 use crate::{Client, Error, numbers, table};
+use fingertip::link::packet::StatusError;
 use fingertip::shipped::address;
 use fingertip::state::{Limits, Mode};
 use serde_json::json;
-use std::io::{self, IsTerminal as _, Write as _};
 use std::time::{Duration, Instant};
 
 /// Interval of the checks, and of the reports.
 const LOOK: Duration = Duration::from_millis(10);
 const SAY: Duration = Duration::from_millis(500);
-/// Interval at which the line of a terminal is rewritten, and the text that clears that line.
-const REWRITE: Duration = Duration::from_millis(100);
-const CLEAR: &str = "\r\x1b[K";
 /// Least tolerance of a held force, for small goals: the resolution of a usual array, mN.
 const TOLERANCE_MN: f64 = 20.0;
 /// Time within the tolerance after which a force counts as reached, s: an overshoot passes through faster.
 const SETTLED_S: f64 = 0.1;
-/// A status packet's error for a value beyond what other registers allow.
-const BEYOND: u8 = 6;
 
 #[derive(Debug, clap::Args)]
 #[command(
@@ -71,9 +66,7 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     }
     let interrupt = Interrupt::catch()?;
     let moving = Moving::begin(client, &interrupt)?;
-    let clear = if !json && io::stderr().is_terminal() { CLEAR } else { "" };
-    let pressed = press(args, moving.client, json, clear, &interrupt);
-    let _ = write!(io::stderr(), "{clear}");
+    let pressed = press(args, moving.client, json, &interrupt);
     let held = moving.finish(pressed)?;
     let Held { count, outside, least_mn, most_mn, held_s, .. } = held;
     let (goal_mn, tolerance_mn, reached) = (args.goal_mn, tolerance_mn(args), count > 0);
@@ -126,10 +119,12 @@ pub(super) fn begin(goal_mn: i64, client: &mut Client) -> Result<(), Error> {
     };
     // Some faults show only once torque is on: then it is not the goal that is wrong.
     no_fault(client)?;
-    if why.refused_with(PREVENTED) && Limits(client.number(address::LIMITS)? as u16).has(Limits::TARED_TOUCHING) {
+    if why.refused_with(StatusError::Result)
+        && Limits(client.number(address::LIMITS)? as u16).has(Limits::TARED_TOUCHING)
+    {
         return Err(TOUCHED.into());
     }
-    if !why.refused_with(BEYOND) {
+    if !why.refused_with(StatusError::Limit) {
         return Err(why);
     }
     let most_mn = client.number(table::find("force_max_mn")?.address)?;
@@ -147,8 +142,7 @@ pub(super) fn has_goal(goal_mn: i64, state: &State) -> Result<(), Error> {
     Ok(())
 }
 
-fn press(args: &Args, client: &mut Client, json: bool, clear: &str, interrupt: &Interrupt) -> Result<Held, Error> {
-    let (every, end) = if clear.is_empty() { (SAY, "\n") } else { (REWRITE, "") };
+fn press(args: &Args, client: &mut Client, json: bool, interrupt: &Interrupt) -> Result<Held, Error> {
     let goal_mn = args.goal_mn;
     direction_confirmed(client)?;
     begin(goal_mn, client)?;
@@ -165,9 +159,7 @@ fn press(args: &Args, client: &mut Client, json: bool, clear: &str, interrupt: &
         let settled = near_s.is_some_and(|near_s| time_s - near_s >= SETTLED_S);
         if held.count == 0 && settled {
             held = Held { from_s: time_s, least_mn: force_mn, most_mn: force_mn, ..held };
-            if !json {
-                aside(format_args!("{clear}reached after {time_s:.2} s"));
-            }
+            report(format_args!("reached after {time_s:.2} s"), json);
         }
         if held.count > 0 || settled {
             held.count += 1;
@@ -177,9 +169,9 @@ fn press(args: &Args, client: &mut Client, json: bool, clear: &str, interrupt: &
             held.most_mn = held.most_mn.max(force_mn);
             held.held_s = time_s - held.from_s;
         }
-        if !json && said.elapsed() >= every {
+        if said.elapsed() >= SAY {
             said = Instant::now();
-            let _ = write!(io::stderr(), "{clear}{:10} {force_mn:6} mN of {goal_mn} mN{end}", state.mode_name());
+            report(format_args!("{:10} {force_mn:6} mN of {goal_mn} mN", state.mode_name()), json);
         }
         let late = held.count == 0 && begun.elapsed().as_secs_f64() > args.within_s;
         let done = held.count > 1 && held.held_s >= args.seconds;

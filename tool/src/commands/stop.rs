@@ -151,7 +151,7 @@ pub fn run(args: &Stop, reach: &Reach, json: bool) -> Result<(), Error> {
     } else {
         (&reach.ids, &[(address::GOAL_FORCE_MN, 0), answered])
     };
-    super::each(&mut client, ids, false, first, |client| {
+    super::each(&mut client, ids, json, false, first, |client| {
         let stopped = stop(client, !args.all, json)?;
         if json {
             say_json(&stopped);
@@ -169,7 +169,7 @@ pub const ALL_ANSWERED: i64 = 2;
 /// client's, and stays. Returns whether it was set.
 fn set_watchdog(client: &mut Client, steps: i64) -> Result<bool, Error> {
     let set = client.again(|client| client.set(address::BUS_WATCHDOG, steps)).map(|()| true);
-    set.or_else(|why| if why.refused_with(StatusError::Access as u8) { Ok(false) } else { Err(why) })
+    set.or_else(|why| if why.refused_with(StatusError::Access) { Ok(false) } else { Err(why) })
 }
 
 /// Stops one finger. A grip is released first, so that friction keeps no force at the tip; whatever comes of that, torque
@@ -214,8 +214,6 @@ fn stop(client: &mut Client, releases: bool, json: bool) -> Result<Value, Error>
 
 /// The controller takes a frame or two.
 const RECOVERED_WITHIN: Duration = Duration::from_secs(2);
-/// Error number of a status packet if something prevents the request.
-pub(super) const PREVENTED: u8 = 1;
 
 /// Clears what stopped the motor: one register does it.
 pub fn recover(client: &mut Client, json: bool) -> Result<(), Error> {
@@ -224,7 +222,7 @@ pub fn recover(client: &mut Client, json: bool) -> Result<(), Error> {
     let words = (fault != 0).then(|| table::meaning(address::FAULT, fault));
     if let Err(why) = client.set(address::RECOVER, 1) {
         let hindrance = client.number(address::RECOVER_HINDRANCE)?;
-        if why.refused_with(PREVENTED) && hindrance != 0 {
+        if why.refused_with(StatusError::Result) && hindrance != 0 {
             let hindrance = table::meaning(address::RECOVER_HINDRANCE, hindrance);
             return Err(format!("fault {fault} ({}) cannot be cleared: {hindrance}", words.unwrap_or_default()).into());
         }
@@ -264,9 +262,6 @@ pub fn recover(client: &mut Client, json: bool) -> Result<(), Error> {
 /// Values of `TARE`: a tare, and one that takes as zero whatever the array reads.
 pub(super) const TARE: i64 = 1;
 const TARE_FORCED: i64 = 2;
-/// Values of `TARE_STATE`.
-const TARE_RUNNING: i64 = Taring::Running as i64;
-const TARE_DONE: i64 = Taring::Done as i64;
 
 #[derive(Debug, clap::Args)]
 #[command(
@@ -320,14 +315,14 @@ pub(super) fn no_tare(state: i64, client: &mut Client) -> Error {
 
 pub(super) fn measure_tare(request: i64, within: Duration, client: &mut Client) -> Result<Tared, Error> {
     client.set(address::TARE, request)?;
-    let state = wait_for(client, address::TARE_STATE, within, |state| state != TARE_RUNNING)?;
-    match state {
-        TARE_DONE => {}
-        TARE_RUNNING => {
-            let within_s = within.as_secs_f64();
-            return Err(format!("the tare is still running after {within_s} s: do frames come in?").into());
-        }
-        _ => return Err(no_tare(state, client)),
+    let running = Taring::Running as i64;
+    let state = wait_for(client, address::TARE_STATE, within, |state| state != running)?;
+    if state == running {
+        let within_s = within.as_secs_f64();
+        return Err(format!("the tare is still running after {within_s} s: do frames come in?").into());
+    }
+    if state != Taring::Done as i64 {
+        return Err(no_tare(state, client));
     }
     let touched = Limits(client.number(address::LIMITS)? as u16).has(Limits::TARED_TOUCHING);
     let codes = client.block(address::TARE_CODES, address::TARE_CODES)?.numbers(address::TARE_CODES);

@@ -2,13 +2,10 @@
 //! any request and any failure of the controller.
 
 use crate::served::{Served, fails, line_with, program};
-use fingertip::link::packet::instruction::REBOOT;
 use fingertip::shipped::address;
 use fingertip_cli::Error;
 use serde_json::Value;
 use std::fs;
-use std::io::Read as _;
-use std::os::fd::OwnedFd;
 use std::os::unix::fs::FileTypeExt as _;
 use std::time::Duration;
 
@@ -68,8 +65,9 @@ fn errors_in_json_are_the_last_line_of_standard_error() {
 #[test]
 fn an_answer_to_a_killed_program_is_taken_by_none() {
     let finger = Served::begin("wall");
+    let held = || finger.line(|line| line.stalled.as_ref().map_or(0, Vec::len));
     for length in [0, 40] {
-        finger.command("stall");
+        finger.line(|line| line.stalled = Some(Vec::new()));
         let mut killed = finger.client();
         killed.timeout = Duration::from_millis(1);
         let asked = match length {
@@ -79,29 +77,13 @@ fn an_answer_to_a_killed_program_is_taken_by_none() {
         assert!(matches!(asked, Err(Error::Silent(_))));
         drop(killed);
         // Two packets in one read would count as one.
-        Served::wait_for(|| finger.command("held") == "1");
+        Served::wait_for(|| held() == 1);
         let next = finger.start(&["info"]);
-        Served::wait_for(|| finger.command("held") == "2");
-        finger.command("go on");
+        Served::wait_for(|| held() == 2);
+        finger.go_on();
         let next = next.wait_with_output().expect("it ends");
         assert!(next.status.success(), "{next:?}");
     }
-}
-
-#[test]
-fn a_press_rewrites_one_line_of_a_terminal() {
-    let finger = Served::begin("wall");
-    finger.done(&["tare"]);
-    let (mut near, far) = serial2::SerialPort::pair().expect("a pseudo-terminal");
-    let mut press = finger.fingertip(&["press", "0.5", "--seconds", "0.5", "--within-s", "3600"]);
-    let output = press.stderr(OwnedFd::from(far)).output().expect("it starts");
-    drop(press);
-    let mut shown = Vec::new();
-    let _ = near.read_to_end(&mut shown);
-    let shown = String::from_utf8(shown).expect("UTF-8");
-    assert!(output.status.success(), "{shown}");
-    assert!(shown.matches("\r\x1b[Kforce ").count() > 1 && shown.ends_with("\r\x1b[K"), "{shown:?}");
-    assert_eq!(shown.lines().count(), 2, "{shown:?}");
 }
 
 /// Looks at the help of a command and of all that are below it.
@@ -153,7 +135,7 @@ fn a_controller_that_starts_anew_ends_a_recording_and_a_press() {
     let file = finger.file("again.csv");
     let child = finger.start(&["record", "--rate-hz", "0", "--seconds", "1000000", &file]);
     Served::recorded(&format!("{file}.part"));
-    finger.command(&format!("raw {REBOOT}"));
+    finger.restart();
     fails(&child.wait_with_output().expect("it ends"), &["the recording ends after", "restarted"]);
     // What it had is whole, and its times are.
     let text = fs::read_to_string(&file).expect("it is there");
@@ -164,7 +146,7 @@ fn a_controller_that_starts_anew_ends_a_recording_and_a_press() {
     finger.done(&["tare"]);
     let child = finger.start(&["press", "1", "--seconds", "1000000", "--within-s", "3600"]);
     finger.until("Force:");
-    finger.command(&format!("raw {REBOOT}"));
+    finger.restart();
     fails(&child.wait_with_output().expect("it ends"), &["restarted"]);
 }
 
@@ -186,15 +168,10 @@ fn a_register_that_is_named_twice_changes_nothing() {
 fn a_register_that_cannot_be_put_back_does_not_keep_the_others() {
     let finger = Served::begin("wall");
     let set = ["--timeout-ms", "1000", "params", "set", "return_delay_time=100", "fit_level=4"];
-    let begun = finger.heard();
-    finger.done(&set);
-    let packets = finger.heard() - begun;
-    let begun = finger.heard();
-    finger.done(&["params", "diff"]);
-    let reads = finger.heard() - begun;
+    let (packets, reads) = (finger.packets(&set), finger.packets(&["params", "diff"]));
     finger.done(&["params", "set", "return_delay_time=250", "fit_level=3"]);
     // Lost: the packet that sets `fit_level`, behind which all is read, and the one that puts it back.
-    finger.command(&format!("deaf after {} for 2", packets - reads));
+    finger.deaf(packets - reads, 2);
     finger.refuses(&set, &["putting back failed: set fit_level to 3", "saved values of fit_level\n"]);
     let now = finger.json(&["params", "get", "return_delay_time", "fit_level"]);
     assert_eq!(now, serde_json::json!({ "return_delay_time": 250, "fit_level": 3 }));

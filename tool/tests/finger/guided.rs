@@ -1,9 +1,9 @@
 //! The guided procedures: `commission`, `identify` and `calibrate` against a served finger.
 
-use crate::served::{self, Served};
+use crate::served::{self, Served, Told};
 use crate::stopped::{ENDS, End, RESIDUAL_N, end_behind, is_at_rest};
-use fingertip::link::packet::instruction::REBOOT;
 use fingertip::shipped::address;
+use rustix::process::Signal;
 use serde_json::{Value, json};
 use std::fs;
 use std::io::{BufRead as _, BufReader, Write as _};
@@ -16,13 +16,6 @@ fn output(finger: &Served, arguments: &[&str]) -> (Option<i32>, Value, String) {
     let output = finger.fingertip(&[arguments, &["--json"]].concat()).output().expect("it starts");
     let (code, text) = served::ended(&output);
     (code, serde_json::from_slice(&output.stdout).unwrap_or(Value::Null), text)
-}
-
-/// Exit code and errors of a command whose questions get these lines as answers.
-fn answered(finger: &Served, arguments: &[&str], answers: &str) -> (Option<i32>, String) {
-    let mut child = spawned(finger, arguments, Stdio::piped());
-    child.stdin.take().expect("a pipe").write_all(answers.as_bytes()).expect("it reads");
-    served::ended(&child.wait_with_output().expect("it ends"))
 }
 
 /// Starts a command that reads its answers from this input.
@@ -99,7 +92,7 @@ fn a_killed_session_resumes_where_it_was() {
     let kept = || fs::read_to_string(&file).unwrap_or_default();
     let mut child = finger.start(&[&calibrate[..], &["--json"]].concat());
     Served::wait_for(|| kept().contains("press-1"));
-    Served::kill(&mut child);
+    served::kill(&mut child);
     finger.done(&["stop"]);
     finger.done(&["recover"]);
     let first = step(&kept(), "press-1");
@@ -110,9 +103,14 @@ fn a_killed_session_resumes_where_it_was() {
     assert!(near(&resumed["after"]["modulus_pa"], 250_000.0, 0.05), "{resumed}");
     // A weight that lies on the tip: the object comes to it, and goes.
     let creep = [&calibrate[..], &["--creep-s", "6"]].concat();
-    let [lay, take] = [["lay a weight", "move -0.5", ""], ["take the weight off", "move 5", ""]];
-    let (_, said) = asked(&finger, &creep, "", &[lay, take, ["write these values", "look", "no\n"]]);
-    assert!(said.contains(lay[0]) && said.contains(take[0]), "{said}");
+    let [lay, take] = ["lay a weight", "take the weight off"];
+    let questions: [Question<'_>; 3] = [
+        (lay, &|| drop(finger.command("move -0.5")), ""),
+        (take, &|| drop(finger.command("move 5")), ""),
+        ("write these values", &|| (), "no\n"),
+    ];
+    let (_, said) = asked(&finger, &creep, "", &questions);
+    assert!(said.contains(lay) && said.contains(take), "{said}");
     let weighed = finger.json(&creep);
     assert_eq!((&weighed["after"]["creep_permille"], &weighed["refused"]), (&0.into(), &json!([])), "{weighed}");
     // A damaged record is not solved.
@@ -127,8 +125,8 @@ fn a_session_of_a_finger_is_refused_for_another_one_at_its_id() {
     let calibrate = [&QUICK[..], &["--presses", "1", "--no-scale", "--session", &session]].concat();
     let begun = fingers.file("first/session.json");
     let mut child = fingers.start(&calibrate);
-    Served::wait_for(|| fs::exists(&begun).unwrap_or(false));
-    Served::kill(&mut child);
+    Served::begun(&begun);
+    served::kill(&mut child);
     fingers.done(&["stop"]);
     for (id, other) in [("1", "3"), ("2", "1")] {
         fingers.done(&["--id", id, "params", "set", &format!("id={other}")]);
@@ -149,7 +147,7 @@ fn write_killed(every: usize) {
     let applied = [&calibrate[..], &["--apply"]].concat();
     let (mut seen, mut completed) = ([0; 2], 0);
     for packets in (0..).step_by(every) {
-        if !finger.killed_after(packets, &applied) {
+        if !finger.ended_after(packets, &applied, Signal::KILL) {
             break;
         }
         let now = parameters(&finger);
@@ -165,14 +163,15 @@ fn write_killed(every: usize) {
             completed += 1;
         }
         // Behind a reset there is what was saved.
-        finger.command(&format!("raw {REBOOT}"));
+        finger.restart();
         assert_eq!(parameters(&finger), before);
     }
     assert!(seen.iter().all(|count| *count > 0) && completed > 0, "{seen:?}, {completed} completed");
     assert_eq!((&parameters(&finger)["modulus_pa"], gains(&finger)), (&wanted["modulus_pa"], wanted["gains"].clone()));
 }
 
-// A restart before packets of a write that is saved: flash has all of it or nothing, and a run that ends well has it.
+// A restart before packets of a write that is saved, and before each one of a restore: flash has all of it or nothing, and a run
+// that ends well has it. A controller that restarted has the values of the flash, and reports them as saved.
 sim::sizes!(a_restart_amid_a_write_is_no_success_and_saves_no_half, restarted_every(12), restarted_every(3));
 
 fn restarted_every(every: usize) {
@@ -185,14 +184,14 @@ fn restarted_every(every: usize) {
     finger.done(&calibrate);
     finger.done(&["params", "backup", &new]);
     let is = |file: &str| finger.json(&["params", "diff", file]) == json!({});
-    for arguments in [&calibrate[..], &["params", "restore", &new, "--save"]] {
+    for (arguments, every) in [(&calibrate[..], every), (&["params", "restore", &new, "--save"], 1)] {
         let mut seen = [0; 3];
         for packets in (0..).step_by(every) {
             finger.done(&["params", "restore", &old, "--save"]);
-            finger.command(&format!("restart after {packets}"));
+            finger.line(move |line| line.restart = Some(packets));
             let (code, found, said) = output(&finger, arguments);
-            let restarted = finger.command("restarted") == "true";
-            finger.command(&format!("raw {REBOOT}"));
+            let restarted = finger.line(|line| line.restart.is_none());
+            finger.restart();
             let (as_new, as_old) = (is(&new), is(&old));
             assert!(as_new || as_old && code == Some(1), "{arguments:?}, {packets}: {said}");
             assert!(as_new || found["saved"] != true, "{arguments:?}, {packets}: {found}");
@@ -217,10 +216,10 @@ fn restarted_every(every: usize) {
 fn a_wrong_answer_changes_nothing() {
     let finger = Served::patient("wall");
     let before = parameters(&finger);
-    let (_, text) = answered(&finger, &["commission"], "perhaps\nyes\n");
+    let (_, text) = asked(&finger, &["commission"], "perhaps\nyes\n", &[]);
     assert!(text.contains("`perhaps`: yes or no is expected") && text.contains("give --apply"), "{text}");
     assert_eq!(parameters(&finger), before);
-    let (code, text) = answered(&finger, &["commission"], "no\n");
+    let (code, text) = asked(&finger, &["commission"], "no\n", &[]);
     assert!(text.contains("swap the motor's leads") && code == Some(1), "{text}");
     assert_eq!(parameters(&finger)["direction_confirmed"], 0, "torque is refused from here on");
     finger.refuses(&["identify", "--no-wait"], &["`fingertip commission`"]);
@@ -260,17 +259,21 @@ fn a_program_is_asked_nothing() {
     }
 }
 
-/// Writes `first` to a command. At each question does the command of the finger, then writes the answer. Exit code and errors.
-fn asked(finger: &Served, arguments: &[&str], first: &str, questions: &[[&str; 3]]) -> (Option<i32>, String) {
+/// Words of a question, what happens meanwhile, and the answer.
+type Question<'a> = (&'a str, &'a dyn Fn(), &'a str);
+
+/// Writes `first` to a command, and at each question its answer; without questions its input ends. Exit code and errors.
+fn asked(finger: &Served, arguments: &[&str], first: &str, questions: &[Question<'_>]) -> (Option<i32>, String) {
     let mut child = spawned(finger, arguments, Stdio::piped());
-    let mut input = child.stdin.take().expect("a pipe");
-    input.write_all(first.as_bytes()).expect("it reads");
+    let mut input = child.stdin.take();
+    input.as_ref().expect("a pipe").write_all(first.as_bytes()).expect("it reads");
+    input = input.filter(|_| !questions.is_empty());
     let mut said = String::new();
     for line in BufReader::new(child.stderr.take().expect("a pipe")).lines() {
         let line = line.expect("text");
-        for [_, meanwhile, answer] in questions.iter().filter(|[question, ..]| line.contains(question)) {
-            finger.command(meanwhile);
-            input.write_all(answer.as_bytes()).expect("it reads");
+        for (_, meanwhile, answer) in questions.iter().filter(|(question, ..)| line.contains(question)) {
+            meanwhile();
+            input.as_ref().expect("a pipe").write_all(answer.as_bytes()).expect("it reads");
         }
         said += &(line + "\n");
     }
@@ -281,7 +284,6 @@ fn asked(finger: &Served, arguments: &[&str], first: &str, questions: &[[&str; 3
 fn a_session_moves_and_writes_only_under_its_first_settings() {
     let finger = Served::patient("wall");
     let before = parameters(&finger);
-    let reboot = format!("raw {REBOOT}");
     let press = ["identify", "--pause-s", "0", "--within-s", "3600"];
     // A restart loses the radius that was not saved.
     for (arguments, talk) in [
@@ -289,7 +291,7 @@ fn a_session_moves_and_writes_only_under_its_first_settings() {
         (press.to_vec(), ["\n", "write these values", "yes\n"]),
     ] {
         finger.done(&["params", "set", "tip_radius_um=9600"]);
-        let (code, said) = asked(&finger, &arguments, talk[0], &[[talk[1], &reboot, talk[2]]]);
+        let (code, said) = asked(&finger, &arguments, talk[0], &[(talk[1], &|| finger.restart(), talk[2])]);
         assert!(code == Some(1) && said.contains("tip_radius_um changed since this session began"), "{talk:?}: {said}");
         assert_eq!(parameters(&finger), before, "{talk:?}");
     }
@@ -375,7 +377,7 @@ fn a_jog_that_is_repeated_repeats_the_strokes() {
     finger.done(&["params", "save"]);
     let (code, found, why) = output(&finger, &["commission", "--forward", "no", "--within-s", "3600"]);
     assert!(code == Some(1) && found["refused"][0].as_str().is_some_and(|why| why.contains("swap")), "{found}, {why}");
-    finger.command(&format!("raw {REBOOT}"));
+    finger.restart();
     assert_eq!(parameters(&finger)["direction_confirmed"], 0);
 }
 
@@ -406,11 +408,11 @@ fn answers_come_after_their_question_and_a_signal_ends_half_of_one() {
 #[test]
 fn a_press_on_a_silent_bus_names_the_fault() {
     let finger = Served::patient("wall");
-    finger.command("stall at Press: 0.5");
+    finger.line(|line| line.at.push(("Press:", 0.5, Told::stall)));
     let child = finger.start(&["identify", "--no-wait", "--pause-s", "0", "--within-s", "3600"]);
-    Served::wait_for(|| finger.command("stalled") == "true");
+    Served::wait_for(|| finger.line(|line| line.stalled.is_some()));
     finger.until_alone("Release:");
-    finger.command("go on");
+    finger.go_on();
     served::fails(&child.wait_with_output().expect("it ends"), &["fault 7"]);
 }
 
@@ -462,7 +464,7 @@ fn resumes(procedure: &[&str], end: End, packets: u64, reference: &Value) -> (bo
         finger.command("remove");
         finger.command("put");
     }
-    finger.command("deaf no more");
+    finger.deaf(0, 0);
     for command in ["recover", "stop"] {
         finger.fingertip(&[command]).output().expect("it starts");
     }

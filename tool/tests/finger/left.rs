@@ -1,8 +1,8 @@
 //! A commander of `fingertip share` leaves or is silent, or `share` ends: the fingers are stopped.
 
 use crate::served::Served;
-use crate::shared::{Asker, Shared, sync_write};
-use fingertip::link::packet::instruction;
+use crate::shared::{Asker, Shared};
+use fingertip::link::packet::{BROADCAST, instruction};
 use fingertip::shipped::address;
 use fingertip::state::Mode;
 use fingertip_cli::client::packet;
@@ -13,7 +13,7 @@ use std::time::Duration;
 fn reads_until_off(finger: &Served, reader: &mut Asker, packets: u64) {
     let begun = finger.heard();
     while !matches!(reader.once.number(address::PRESENT_MODE), Ok(mode) if mode == Mode::Off as i64) {
-        assert!(finger.heard() - begun < packets, "{}", finger.command("look"));
+        assert!(finger.heard() - begun < packets, "{}", finger.look());
     }
 }
 
@@ -38,41 +38,12 @@ fn error_at_its_end(mut shared: Shared) -> String {
 }
 
 #[test]
-fn a_killed_commander_is_stopped_though_others_read() {
+fn a_press_is_released_at_the_end_of_the_broker() {
     let shared = Shared::begin("wall");
-    let mut reader = shared.client();
-    for round in 0..2 {
-        let mut press = shared.press();
-        let signal = [rustix::process::Signal::KILL, rustix::process::Signal::STOP][round];
-        Served::signal(&press, signal);
-        shared.soon(|| reader.number(address::PRESENT_MODE).expect("it answers") == 0);
-        shared.until_released();
-        let _ = press.kill();
-        press.wait().expect("it ends");
-        let fault = reader.number(address::FAULT).expect("it answers");
-        assert_eq!(fault, 0, "{signal:?}: the broker stopped it, not the watchdog");
-    }
-    // The end of the broker, too.
     let mut press = shared.press();
     Served::interrupt(&shared.broker);
     shared.until_released();
     press.wait().expect("it ends");
-}
-
-#[test]
-fn a_finger_of_a_group_is_stopped_once_its_commander_has_left() {
-    let finger = Served::patient("grasp");
-    drop(finger.tared(1));
-    finger.tared(2).set(address::TORQUE_ENABLE, 1).expect("it obeys");
-    let shared = Shared::of(finger);
-    let mut commander = shared.client();
-    sync_write(&mut commander, address::TORQUE_ENABLE, 1, &[1, 1]);
-    while commander.number(address::TORQUE_ENABLE).expect("it answers") != 1 {}
-    drop(commander);
-    shared.until_released();
-    let mut client = shared.client();
-    client.once.id = 2;
-    assert_eq!(client.number(address::TORQUE_ENABLE).expect("it answers"), 1, "nobody commanded it");
 }
 
 /// Another client stops one of two fingers. The commander feeds the watchdog of the other one until it leaves.
@@ -89,19 +60,19 @@ fn the_other_fingers_of_a_stopped_commander_are_stopped_once_it_has_left() {
         first.set(address::TORQUE_ENABLE, 1).expect("it obeys");
     }
     first.set(address::BUS_WATCHDOG, 50).expect("it obeys");
-    sync_write(&mut second, address::GOAL_FORCE_MN, 4, &[1, 0, 0, 0, 0]);
+    second.set_each([1], address::GOAL_FORCE_MN, 0);
     second.number(address::TORQUE_ENABLE).expect("it answers");
     first.set(address::GOAL_FORCE_MN, 500).expect_err("it was stopped");
     first.once.id = 1;
     let begun_s = shared.finger.now_s();
     while shared.finger.now_s() < begun_s + 3.0 {
-        sync_write(&mut first, 0, 0, &[]);
+        first.once.pass(&packet(BROADCAST, instruction::SYNC_WRITE, &[0; 4]), None, 0).expect("it listens");
         first.ping().expect("it answers");
     }
     second.once.id = 2;
-    assert_eq!(second.number(address::TORQUE_ENABLE).expect("it answers"), 1, "{}", shared.finger.command("look"));
+    assert_eq!(second.number(address::TORQUE_ENABLE).expect("it answers"), 1, "{}", shared.finger.look());
     drop(first);
-    shared.soon(|| second.number(address::TORQUE_ENABLE).expect("it answers") == 0);
+    Served::wait_for(|| second.number(address::TORQUE_ENABLE).expect("it answers") == 0);
 }
 
 /// A script starts one program after the other.
@@ -121,10 +92,9 @@ fn once_a_commander_has_left_the_next_client_writes() {
 #[test]
 fn absent_fingers_of_who_left_keep_nobody_from_the_bus() {
     let shared = Shared::begin("wall");
-    assert!(shared.output(&["tare"]).status.success());
+    shared.finger.done(&["tare"]);
     let (mut first, mut press) = (shared.client(), shared.client());
-    let goals: Vec<u8> = (1..60).flat_map(|id| [id, 1, 0, 0, 0]).collect();
-    sync_write(&mut first, address::GOAL_FORCE_MN, 4, &goals);
+    first.set_each(1..60, address::GOAL_FORCE_MN, 1);
     first.ping().expect("it answers");
     press.once.timeout = Duration::from_millis(5_500);
     for (register, value) in [(address::TORQUE_ENABLE, 0), (address::TORQUE_ENABLE, 1), (address::GOAL_FORCE_MN, 1_000)]
@@ -136,7 +106,7 @@ fn absent_fingers_of_who_left_keep_nobody_from_the_bus() {
         press.set(address::GOAL_FORCE_MN, goal_mn).expect("it still commands");
     }
     // A stop of all fingers does not wait for the absent ones.
-    sync_write(&mut press, address::TORQUE_ENABLE, 1, &(1..60).flat_map(|id| [id, 0]).collect::<Vec<u8>>());
+    press.set_each(1..60, address::TORQUE_ENABLE, 0);
     while press.number(address::TORQUE_ENABLE).expect("it answers") != 0 {}
 }
 
@@ -146,8 +116,7 @@ fn the_end_feeds_all_fingers_and_asks_many_ids_by_one_ping() {
     for (last, packets) in [(9, 8..60), (9 + 80, 2..8)] {
         let mut shared = Shared::within(900, Served::patient("wall"));
         let mut client = shared.client();
-        let steps: Vec<u8> = (9..=last).flat_map(|id| [id, 25]).collect();
-        sync_write(&mut client, address::BUS_WATCHDOG, 1, &steps);
+        client.set_each(9..=last, address::BUS_WATCHDOG, 25);
         client.ping().expect("it answers");
         let sent = shared.packets_at_its_end();
         assert!(packets.contains(&sent), "{sent} packets, IDs 9 to {last}");
@@ -162,68 +131,41 @@ fn a_finger_is_stopped_once_the_line_is_back_unless_another_client_commands_it()
     presses(&mut commander);
     shared.finger.until_alone("Force:");
     let (mut reader, mut next) = (shared.client(), shared.client());
-    shared.finger.command("deaf after 0 for 12");
+    shared.finger.deaf(0, 12);
     drop(commander);
     reads_until_off(&shared.finger, &mut reader, 200);
     shared.until_released();
     next.set(address::TORQUE_ENABLE, 1).expect("it commands now");
-    shared.finger.command("deaf after 0 for 2");
+    shared.finger.deaf(0, 2);
     drop(next);
-    Served::wait_for(|| shared.finger.command("unheard") == "2");
+    Served::wait_for(|| shared.finger.missed() == 2);
     // A client that writes to it in a group packet commands it before the next try to stop it.
     let mut next = shared.client();
-    sync_write(&mut next, address::TORQUE_ENABLE, 1, &[1, 1]);
+    next.set_each([1], address::TORQUE_ENABLE, 1);
     next.ping().expect("it answers");
     for _ in 0..1_000 {
         assert_eq!(reader.number(address::TORQUE_ENABLE).expect("it answers"), 1, "it has a commander");
     }
 }
 
-sim::sizes!(
-    a_silent_commander_is_stopped_whoever_set_the_watchdog,
-    stopped(&[("before", true), ("later", false)]),
-    stopped(&[("before", false), ("since", false), ("indirect", false)])
-);
-
-/// Another program has set the bus watchdog, before `share` began or since, or the commander sets it in a packet that does not
-/// name its register; and the commander may write in group packets only.
-fn stopped(ways: &[(&str, bool)]) {
-    for &(way, groups) in ways {
+/// Another program has set the bus watchdog, so the broker asks the finger for it. One commander writes in group packets only.
+#[test]
+fn a_silent_commander_is_stopped_whoever_set_the_watchdog() {
+    for groups in [true, false] {
         let finger = Served::patient("wall");
-        if way == "before" {
-            finger.set(&[(address::BUS_WATCHDOG, 25)]);
-        }
+        finger.set(&[(address::BUS_WATCHDOG, 25)]);
         let shared = tared(finger, 1..=1);
-        if way == "since" {
-            shared.client().set(address::BUS_WATCHDOG, 25).expect("it obeys");
-        }
         let (mut commander, mut reader) = (shared.client(), shared.client());
         if groups {
-            sync_write(&mut commander, address::TORQUE_ENABLE, 1, &[1, 1]);
-            sync_write(&mut commander, address::GOAL_FORCE_MN, 4, &[1, 0xE8, 3, 0, 0]);
+            commander.set_each([1], address::TORQUE_ENABLE, 1);
+            commander.set_each([1], address::GOAL_FORCE_MN, 1_000);
         } else {
             presses(&mut commander);
-        }
-        let [low, high] = address::BUS_WATCHDOG.to_le_bytes();
-        if way == "later" {
-            let later = [(instruction::REG_WRITE, &[low, high, 25][..]), (instruction::ACTION, &[])];
-            // Both again where an answer was lost: an action without its write is refused.
-            let answers = std::iter::repeat_with(|| {
-                later.map(|(number, params)| {
-                    commander.once.pass(&packet(1, number, params), Some(1), 1).expect("it listens")
-                })
-            });
-            let mut answered = answers.skip_while(|answers| answers.iter().any(Vec::is_empty));
-            assert_eq!(answered.next().expect("an answer comes").map(|answer| answer[8]), [0; 2]);
-        }
-        if way == "indirect" {
-            commander.write(address::INDIRECT_ADDRESS_1, &[low, high]).expect("it obeys");
-            commander.write(address::INDIRECT_DATA_1, &[25]).expect("it obeys");
         }
         while reader.number(address::PRESENT_MODE).expect("it answers") == Mode::Off as i64 {}
         reads_until_off(&shared.finger, &mut reader, 20_000);
         let fault = reader.number(address::FAULT).expect("it answers");
-        assert_eq!(fault, 0, "{way}: the broker stopped it, not the watchdog");
+        assert_eq!(fault, 0, "the broker stopped it, not the watchdog");
     }
 }
 
@@ -232,19 +174,18 @@ fn stopped(ways: &[(&str, bool)]) {
 fn absent_fingers_of_who_left_do_not_feed_the_watchdog_of_a_silent_commander() {
     let shared = tared(Served::patient("wall"), 1..=1);
     let (mut first, mut second) = (shared.client(), shared.client());
-    let goals: Vec<u8> = (1..60).flat_map(|id| [id, 1, 0, 0, 0]).collect();
-    sync_write(&mut first, address::GOAL_FORCE_MN, 4, &goals);
+    first.set_each(1..60, address::GOAL_FORCE_MN, 1);
     first.ping().expect("it answers");
     second.set(address::TORQUE_ENABLE, 0).expect("anyone stops");
     second.set(address::BUS_WATCHDOG, 25).expect("it commands now");
     presses(&mut second);
     let begun = shared.finger.heard();
     drop(first);
-    while !["Off", "Fault"].iter().any(|mode| shared.finger.command("look").contains(mode)) {
-        let packets = shared.finger.heard() - begun;
-        assert!(packets < 60, "{packets} packets, {}", shared.finger.command("look"));
-        std::thread::sleep(Served::LOOK);
-    }
+    Served::wait_for(|| {
+        let (packets, state) = (shared.finger.heard() - begun, shared.finger.look());
+        assert!(packets < 60, "{packets} packets, {state}");
+        ["Off", "Fault"].iter().any(|mode| state.contains(mode))
+    });
 }
 
 #[test]
@@ -255,7 +196,7 @@ fn the_end_names_the_fingers_that_it_could_not_stop() {
         commander.once.id = id;
         commander.set(address::TORQUE_ENABLE, 1).expect("it obeys");
     }
-    shared.finger.command(&format!("deaf after 0 for {}", u64::MAX));
+    shared.finger.deaf(0, u64::MAX);
     let said = error_at_its_end(shared);
     assert!(said.contains("could not stop ID 1, 2:"), "{said}");
 }
@@ -273,8 +214,8 @@ fn a_finger_that_answers_nothing_is_stopped_and_a_client_cannot_make_it_so() {
     drop(client);
     let shared = Shared::within(300, finger);
     let mut commander = shared.client();
-    sync_write(&mut commander, address::TORQUE_ENABLE, 1, &[1, 1]);
-    sync_write(&mut commander, address::GOAL_FORCE_MN, 4, &[1, 0xE8, 3, 0, 0]);
+    commander.set_each([1], address::TORQUE_ENABLE, 1);
+    commander.set_each([1], address::GOAL_FORCE_MN, 1_000);
     shared.finger.until_alone("Force:");
     drop(commander);
     shared.until_released();
@@ -291,7 +232,7 @@ fn a_finger_that_answers_nothing_is_stopped_and_a_client_cannot_make_it_so() {
 fn an_absent_finger_keeps_the_other_one_neither_from_its_stop_nor_from_its_next_commander() {
     let shared = tared(Served::patient("wall"), 1..=1);
     let mut commander = shared.client();
-    sync_write(&mut commander, address::TORQUE_ENABLE, 1, &[0, 1, 1, 1]);
+    commander.set_each([0, 1], address::TORQUE_ENABLE, 1);
     commander.set(address::GOAL_FORCE_MN, 1_000).expect("it obeys");
     drop(commander);
     let mut next = shared.client();

@@ -198,10 +198,9 @@ fn a_backup_is_restored_whole() {
     assert!(text.contains(gains), "{text}");
     let with = |gain| text.replace(gains, &format!("row_3 = [16384, 16384, 16384, {gain}, "));
     fs::write(&file, with(21_000)).expect("a file");
-    let begun = finger.heard();
-    finger.done(&["params", "restore", &file]);
+    let packets = finger.packets(&["params", "restore", &file]);
     // A save that fails takes back neither gains nor parameters.
-    finger.command(&format!("deaf after {} for 3", finger.heard() - begun));
+    finger.deaf(packets, 3);
     fs::write(&file, with(20_000)).expect("a file");
     finger.refuses(&["--timeout-ms", "1000", "params", "restore", &file, "--save"], &["no answer"]);
     assert_eq!(finger.json(&["params", "diff"])["gains"]["now"][3][3], 20_000);

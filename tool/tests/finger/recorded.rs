@@ -1,27 +1,20 @@
 //! Recordings: their times, their owners, and the rest of one whose program was killed. Captures: taken, kept as files,
 //! replayed; and files that are not as they were written. And what the program shows on a screen.
 
-use crate::served::{Served, fails, program};
+use crate::served::{self, Served, fails, program};
 use fingertip::shipped::address;
 use fingertip_cli::commands::view::{Seen, draw};
 use fingertip_cli::recordings::{Topic, of_bytes, through_the_core};
-use fingertip_cli::state::{Stamp, State};
+use fingertip_cli::state::{Stamp, State, unix_ns};
 use fingertip_cli::{Error, recordings};
-use mcap::read::Options;
 use mcap::{MessageStream, Summary};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use rustix::process::Signal;
 use serde_json::Value;
-use sim::recording::{SCALARS, schemas};
+use sim::recording::schemas;
 use std::fs;
 use std::process::Stdio;
-use std::time::{SystemTime, UNIX_EPOCH};
-
-/// Host's time, s since 1970.
-fn unix_s() -> f64 {
-    SystemTime::now().duration_since(UNIX_EPOCH).expect("after 1970").as_secs_f64()
-}
 
 fn messages(bytes: &[u8]) -> Vec<mcap::Message<'_>> {
     MessageStream::new(bytes).expect("MCAP").map(|message| message.expect("whole")).collect()
@@ -31,6 +24,7 @@ fn messages(bytes: &[u8]) -> Vec<mcap::Message<'_>> {
 fn states_are_recorded_with_the_controllers_times() {
     let finger = Served::begin("wall");
     let file = finger.file("force.csv");
+    let unix_s = || unix_ns() as f64 * 1e-9;
     let begun_s = unix_s() - 1.0;
     let done = finger.json(&["record", "--seconds", "0.5", "--rate-hz", "200", "--pressures", &file]);
     let text = fs::read_to_string(&file).expect("it was written");
@@ -47,7 +41,7 @@ fn states_are_recorded_with_the_controllers_times() {
         assert!(pair[0][1] > begun_s && pair[1][1] >= pair[0][1], "{} {}", pair[0][1], pair[1][1]);
     }
     let mcap = finger.file("force.mcap");
-    let done = finger.json(&["record", "--seconds", "0.2", "--pressures", &mcap]);
+    let done = finger.json(&["record", "--seconds", "0.5", "--pressures", &mcap]);
     let bytes = fs::read(&mcap).expect("it was written");
     let messages = messages(&bytes);
     // The log has the host's time, the publishing the controller's intervals.
@@ -136,17 +130,7 @@ fn a_recording_tells_whose_it_is() {
     topics.dedup();
     assert_eq!(topics, ["/finger1/frame", "/finger1/scalars"]);
     assert_eq!(messages[0].channel.metadata["id"], "2");
-    assert!((messages[0].log_time as f64 * 1e-9 - unix_s()).abs() < 3_600.0, "{}", messages[0].log_time);
-}
-
-/// Messages of a file that was cut, by their numbers and bytes, and whether it ends with a whole record.
-fn readable(bytes: &[u8]) -> (Vec<(u32, Vec<u8>)>, bool) {
-    let mut whole = true;
-    let stream = MessageStream::new_with_options(bytes, Options::IgnoreEndMagic.into());
-    let Ok(stream) = stream else { return (Vec::new(), false) };
-    let messages = stream.map_while(|message| message.inspect_err(|_| whole = false).ok());
-    let messages = messages.map(|message| (message.sequence, message.data.into_owned())).collect();
-    (messages, whole)
+    assert!(messages[0].log_time.abs_diff(unix_ns()) < 3_600 * 1_000_000_000, "{}", messages[0].log_time);
 }
 
 #[test]
@@ -156,11 +140,15 @@ fn a_killed_recording_is_kept_and_can_be_read() {
         let (file, part) = (finger.file(name), finger.file(&format!("{name}.part")));
         let mut child = finger.start(&["record", "--rate-hz", "0", &file]);
         Served::wait_for(|| fs::metadata(&part).is_ok_and(|part| part.len() > 300_000));
-        Served::kill(&mut child);
+        served::kill(&mut child);
         let bytes = fs::read(&part).expect("it is there");
         if name.ends_with(".mcap") {
-            let messages = readable(&bytes).0;
-            assert!(messages.len() > 20, "{} messages", messages.len());
+            let shown: usize = messages(&bytes).iter().map(|message| message.data.len()).sum();
+            assert!(
+                shown > bytes.len() / 2,
+                "{shown} bytes of {}: a reader stops at an end amid the file",
+                bytes.len()
+            );
         } else {
             assert!(bytes.starts_with(b"time_s,") && bytes.iter().filter(|byte| **byte == b'\n').count() > 20);
         }
@@ -255,15 +243,6 @@ fn what_cannot_be_captured_is_told() {
     let file = finger.file("press.mcap");
     finger.done(&["params", "set", "direction_confirmed=0"]);
     finger.refuses(&["capture", "--press", "0.5", "--out", &file], &["`fingertip commission`"]);
-    finger.done(&["params", "set", "direction_confirmed=1"]);
-    finger.done(&["tare"]);
-    finger.set(&[(address::TORQUE_ENABLE, 1)]);
-    finger.refuses(&["capture", "--out", &file], &["torque is on"]);
-    finger.set(&[(address::TORQUE_ENABLE, 0)]);
-    finger.command("fault supply-low");
-    finger.set(&[(address::TORQUE_ENABLE, 1)]);
-    finger.command("state");
-    finger.refuses(&["capture", "--out", &file], &["fault 9", "`fingertip recover`"]);
     assert!(fs::metadata(&file).is_err(), "nothing was written");
 }
 
@@ -305,33 +284,24 @@ fn a_file_that_is_not_as_it_was_written_is_refused() {
     finger.refuses(&["replay", folder.to_str().expect("text")], &["no capture there"]);
 }
 
-/// A schema that both have: the scenes', and the own one, whose messages have its names.
-fn both(topic: Topic) -> [Value; 2] {
-    let name = topic.schema_name();
-    let scenes = schemas().into_iter().find(|(_, known, _)| *known == name);
-    let (kind, _, scenes) = scenes.unwrap_or_else(|| panic!("the scenes have no {name}"));
-    assert_eq!(topic.name(1), format!("/finger0/{kind}"));
-    let message = topic.message(&Stamp::default(), &State::default());
-    let [scenes, own, message] =
-        [scenes.into_bytes(), topic.schema(), message].map(|json| serde_json::from_slice(&json).expect("JSON"));
-    let message: Value = message;
-    assert_eq!(message.as_object().expect("a map").keys().collect::<Vec<_>>(), names(&own));
-    [scenes, own]
-}
-
 fn names(schema: &Value) -> Vec<&str> {
     schema["properties"].as_object().expect("a map").keys().map(String::as_str).collect()
 }
 
 #[test]
 fn the_messages_are_those_of_the_scenes_that_a_controller_knows() {
-    let [scenes, own] = both(Topic::Scalars);
-    let own = names(&own);
-    assert_eq!(names(&scenes), SCALARS.map(|(name, ..)| name));
-    let known: Vec<&str> = names(&scenes).into_iter().filter(|name| own.contains(name)).collect();
-    assert_eq!(known, own, "by the same names, in the same order");
-    let [scenes, own] = both(Topic::Image);
-    assert_eq!(scenes, own);
+    for topic in [Topic::Scalars, Topic::Image] {
+        let scenes = schemas().into_iter().find(|(_, name, _)| *name == topic.schema_name());
+        let (kind, _, scenes) = scenes.unwrap_or_else(|| panic!("the scenes have no {topic:?}"));
+        assert_eq!(topic.name(1), format!("/finger0/{kind}"));
+        let message = topic.message(&Stamp::default(), &State::default());
+        let [scenes, own, message] =
+            [scenes.into_bytes(), topic.schema(), message].map(|json| serde_json::from_slice(&json).expect("JSON"));
+        let (own, message): (_, Value) = (names(&own), message);
+        assert_eq!(message.as_object().expect("a map").keys().collect::<Vec<_>>(), own);
+        let known: Vec<&str> = names(&scenes).into_iter().filter(|name| own.contains(name)).collect();
+        assert_eq!(known, own, "by the same names, in the same order");
+    }
 }
 
 // What `view` shows, by the characters on a screen of 80 x 24.

@@ -6,53 +6,51 @@ use fingertip::shipped::address;
 use fingertip_cli::Client;
 use fingertip_cli::client::{Reach, packet};
 use rustix::process::{Pid, Signal};
-use serve::native::Native;
-use serve::{Finger as _, Place, Port, Stop};
+use serve::{Place, Port, Stop};
 use signal_hook::consts::SIGHUP;
 use sim::native::served::Bus;
-use std::cell::RefCell;
+use std::convert::Infallible;
 use std::io::{BufRead as _, BufReader, Read};
 use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// Patience on the slowest machine, where an answer is expected.
-const PATIENCE: &str = "600000";
+const PATIENCE: Duration = Duration::from_secs(600);
 
-type Asked = (String, Sender<Result<String, String>>);
+type Job = Box<dyn FnOnce(&mut Told) + Send>;
 
 pub struct Served {
     pub port: String,
     folder: PathBuf,
     stop: Stop,
-    commands: Sender<Asked>,
-    thread: RefCell<Option<JoinHandle<()>>>,
+    jobs: Sender<Job>,
 }
 
-/// A finger that executes commands between two polls.
-struct Told {
-    native: Native,
-    commands: Receiver<Asked>,
+/// A finger that executes jobs of the test between two polls.
+pub struct Told {
+    bus: Bus,
+    jobs: Receiver<Job>,
     line: Line,
 }
 
+/// A word of the finger's state, a force at its tip, N, and what happens once the state has the word and the force is reached.
+type At = (&'static str, f64, fn(&mut Told));
+
 /// What happens to packets before the finger hears them.
 #[derive(Default)]
-struct Line {
-    /// Packets until it stops receiving, packets that it misses then, and packets that came.
-    ears: Option<(u64, u64, u64)>,
-    /// An instruction to all that comes as soon as the finger's state has this word.
-    trap: Option<(String, u8)>,
-    /// A word of the finger's state and a force, N: the line stalls as soon as it has the word and presses so hard.
-    stall_at: Option<(String, f64)>,
-    stalled: Option<Vec<Vec<u8>>>,
+pub struct Line {
+    /// Packets until it stops receiving, packets that it misses then, and packets that it missed.
+    ears: (u64, u64, u64),
+    pub at: Vec<At>,
+    /// Packets that a stalled line holds.
+    pub stalled: Option<Vec<Vec<u8>>>,
     /// Number of packets before it restarts.
-    restart: Option<u64>,
-    /// Its clock goes on for `PATIENT_S` after each packet, so that no watchdog outruns a slow program under test.
-    patient: bool,
+    pub restart: Option<u64>,
+    /// Time that the finger's clock goes on after each packet, s, so that no watchdog outruns a slow program under test.
+    pub patience_s: Option<f64>,
     /// Time of the last packet, s, and the number of packets.
     heard_s: f64,
     heard: u64,
@@ -61,148 +59,120 @@ struct Line {
     waited_s: f64,
 }
 
-/// Simulated time that a patient finger goes on after a packet, s.
-const PATIENT_S: f64 = 0.1;
-
 impl Told {
-    /// Inputs that are not commands of a served finger.
-    fn told(&mut self, command: &str) -> Option<Result<String, String>> {
-        let words: Vec<&str> = command.split_whitespace().collect();
-        let number = |text: &str| text.parse().expect("a number");
-        let line = &mut self.line;
-        match words[..] {
-            // As another host on the bus would.
-            ["raw", instruction_number] => self.native.0.hear(&instruction(number(instruction_number) as u8)),
-            ["trap", word, instruction_number] => line.trap = Some((word.into(), number(instruction_number) as u8)),
-            ["restart", "after", packets] => line.restart = Some(number(packets)),
-            ["patient", patient] => line.patient = patient == "on",
-            ["deaf", "after", packets, "for", lost] => line.ears = Some((number(packets), number(lost), 0)),
-            ["deaf", "no", "more"] => line.ears = None,
-            ["stall"] => line.stalled = Some(Vec::new()),
-            ["stall", "at", word, force_n] => line.stall_at = Some((word.into(), force_n.parse().expect("a force"))),
-            ["go", "on"] => line.stalled.take().into_iter().flatten().for_each(|bytes| self.native.0.hear(&bytes)),
-            // These look on, and leave the finger's clock alone.
-            ["look"] => return Some(self.native.command("state")),
-            ["now"] => return Some(Ok(self.native.now_s().to_string())),
-            ["heard"] => return Some(Ok(line.heard.to_string())),
-            ["stalled"] => return Some(Ok(line.stalled.is_some().to_string())),
-            ["held"] => return Some(Ok(line.stalled.as_ref().map_or(0, Vec::len).to_string())),
-            ["restarted"] => return Some(Ok(line.restart.is_none().to_string())),
-            ["unheard"] => return Some(Ok(line.ears.map_or(0, |(.., unheard)| unheard).to_string())),
-            _ => return None,
-        }
-        Some(Ok(String::new()))
+    /// What was broken or mended acts on the next frames.
+    fn frames(&mut self) {
+        (0..20).for_each(|_| self.bus.frame());
+    }
+
+    pub fn restart(&mut self) {
+        self.bus.hear(&packet(BROADCAST, REBOOT, &[]));
+        self.frames();
+    }
+
+    fn state(&mut self) -> String {
+        self.bus.command("state").expect("a command")
+    }
+
+    pub fn stall(&mut self) {
+        self.line.stalled = Some(Vec::new());
     }
 }
 
 impl serve::Finger for Told {
-    type Error = std::convert::Infallible;
+    type Error = Infallible;
 
     fn now_s(&self) -> f64 {
-        self.native.now_s() + self.line.waited_s
+        self.bus.now_s() + self.line.waited_s
     }
 
-    fn run_until(&mut self, time_s: f64) -> Result<(), Self::Error> {
-        while let Ok((command, answer)) = self.commands.try_recv() {
-            let done = self.told(&command).unwrap_or_else(|| self.native.command(&command));
-            // What was broken or mended acts on the next frames; whoever asks then finds it so.
-            if !["look", "now", "heard", "stalled", "held"].contains(&command.as_str()) {
-                (0..20).for_each(|_| self.native.0.frame());
-            }
-            answer.send(done).expect("somebody waits for it");
+    fn run_until(&mut self, time_s: f64) -> Result<(), Infallible> {
+        while let Ok(job) = self.jobs.try_recv() {
+            job(self);
+        }
+        if !self.line.at.is_empty() {
+            let state = self.state();
+            let is_due = |(word, force_n, _): &mut At| state.contains(*word) && true_force_n(&state) >= *force_n;
+            let due: Vec<At> = self.line.at.extract_if(.., is_due).collect();
+            due.into_iter().for_each(|(.., happens)| happens(self));
         }
         let line = &mut self.line;
-        let mut reached = |word: &str, force_n: f64| {
-            self.native.command("state").is_ok_and(|state| state.contains(word) && true_force_n(&state) >= force_n)
-        };
-        if line.stall_at.take_if(|(word, force_n)| reached(word, *force_n)).is_some() {
-            line.stalled = Some(Vec::new());
-        }
-        if let Some((_, number)) = line.trap.take_if(|(word, _)| reached(word, f64::NEG_INFINITY)) {
-            self.native.0.hear(&instruction(number));
-        }
-        let last_s = if line.patient { line.heard_s + PATIENT_S } else { f64::INFINITY };
-        self.native.run_until(last_s.min(time_s - line.waited_s))?;
+        let last_s = line.heard_s + line.patience_s.unwrap_or(f64::INFINITY);
+        self.bus.run_until(last_s.min(time_s - line.waited_s))?;
         // While it waits it keeps up, so that its server sleeps.
         if time_s - line.waited_s > last_s {
-            line.waited_s = time_s - self.native.now_s();
+            line.waited_s = time_s - self.bus.now_s();
         }
         Ok(())
     }
 
-    fn hear(&mut self, bytes: &[u8]) -> Result<(), Self::Error> {
+    fn hear(&mut self, bytes: &[u8]) -> Result<(), Infallible> {
         let line = &mut self.line;
         if let Some(stalled) = &mut line.stalled {
             stalled.push(bytes.to_vec());
             return Ok(());
         }
-        line.heard_s = self.native.now_s();
+        line.heard_s = self.bus.now_s();
         line.heard += 1;
-        line.waited_s -= if line.patient { PATIENT_S } else { 0.0 };
-        if let Some((left, lost, unheard)) = &mut line.ears {
-            if *left > 0 {
-                *left -= 1;
-            } else if *unheard < *lost {
-                *unheard += 1;
-                return Ok(());
-            }
+        line.waited_s -= line.patience_s.unwrap_or(0.0);
+        let (left, lost, unheard) = &mut line.ears;
+        if *left > 0 {
+            *left -= 1;
+        } else if unheard < lost {
+            *unheard += 1;
+            return Ok(());
         }
-        if line.restart.take_if(|left| *left == 0).is_some() {
-            self.native.0.hear(&instruction(REBOOT));
-            (0..20).for_each(|_| self.native.0.frame());
-        }
+        let now = line.restart.take_if(|left| *left == 0).is_some();
         line.restart = line.restart.map(|left| left - 1);
-        self.native.hear(bytes)
+        if now {
+            self.restart();
+        }
+        self.bus.hear(bytes);
+        Ok(())
     }
 
-    fn answer(&mut self) -> Result<Vec<u8>, Self::Error> {
-        self.native.answer()
+    fn answer(&mut self) -> Result<Vec<u8>, Infallible> {
+        serve::Finger::answer(&mut self.bus)
     }
 
     fn due_s(&self) -> Option<f64> {
-        self.native.due_s().map(|due_s| due_s + self.line.waited_s)
+        self.bus.due_s().map(|due_s| due_s + self.line.waited_s)
     }
 
     fn baud(&self) -> Option<u32> {
-        self.native.baud()
-    }
-
-    fn command(&mut self, text: &str) -> Result<String, String> {
-        self.native.command(text)
+        Some(self.bus.baud())
     }
 }
 
 impl Served {
-    /// Pause between two looks at a finger that a program moves.
-    pub const LOOK: Duration = Duration::from_millis(2);
-
     pub fn begin(scene: &str) -> Self {
         // Under `nohup` the programs would ignore it too. A handler, which they do not inherit, ends that.
         signal_hook::flag::register(SIGHUP, Arc::default()).expect("a handler");
         let scene = sim::cli::load(scene, &[], None).expect("a scene");
         let mut port = Port::open(&Place::Pty(None)).expect("a pseudo-terminal");
         let (name, stop) = (port.name().to_owned(), port.stopper());
-        let (commands, commanded) = channel();
-        let thread = std::thread::spawn(move || {
-            let native = Native(Bus::new(&scene).expect("a world"));
-            let mut told = Told { native, commands: commanded, line: Line::default() };
+        let (jobs, told_jobs) = channel();
+        std::thread::spawn(move || {
+            let mut told = Told { bus: Bus::new(&scene).expect("a world"), jobs: told_jobs, line: Line::default() };
             let Ok(_) = serve::serve(&mut told, &mut port, Duration::from_secs(3600), false);
         });
         let folder =
             std::env::temp_dir().join(format!("fingertip-cli-{}-{}", std::process::id(), name.replace('/', "-")));
         std::fs::create_dir_all(&folder).expect("a folder");
-        Self { port: name, folder, stop, commands, thread: RefCell::new(Some(thread)) }
+        Self { port: name, folder, stop, jobs }
     }
 
     /// A finger that does not outrun its host on a loaded machine.
     pub fn patient(scene: &str) -> Self {
         let finger = Self::begin(scene);
-        finger.command("patient on");
+        finger.line(|line| line.patience_s = Some(0.1));
         finger
     }
 
+    /// A client whose answers come in the end.
     pub fn client(&self) -> Client {
-        client(&self.port)
+        let reach = Reach { port: Some(self.port.clone()), baud: 1_000_000, ids: vec![1], timeout_ms: 600_000 };
+        Client::open(&reach).expect("it listens")
     }
 
     /// A client of one finger of several, which is tared.
@@ -219,45 +189,82 @@ impl Served {
         values.iter().for_each(|(register, value)| client.set(*register, *value).expect("it obeys"));
     }
 
-    pub fn command(&self, text: &str) -> String {
+    /// Does this with the finger between two of its polls.
+    fn with<T: Send + 'static>(&self, job: impl FnOnce(&mut Told) -> T + Send + 'static) -> T {
         let (answer, answered) = channel();
-        self.commands.send((text.into(), answer)).expect("it is served");
-        answered.recv().expect("it is served").expect("a command")
+        let job = move |told: &mut Told| answer.send(job(told)).expect("somebody waits for it");
+        self.jobs.send(Box::new(job)).expect("it is served");
+        answered.recv().expect("it is served")
+    }
+
+    /// Looks at the line to the finger, or changes it.
+    pub fn line<T: Send + 'static>(&self, job: impl FnOnce(&mut Line) -> T + Send + 'static) -> T {
+        self.with(|told| job(&mut told.line))
+    }
+
+    /// Executes a command that a served finger has. The finger's clock goes on by some frames.
+    pub fn command(&self, text: &str) -> String {
+        let text = text.to_owned();
+        self.with(move |told| {
+            let done = told.bus.command(&text).expect("a command");
+            told.frames();
+            done
+        })
+    }
+
+    /// State of the finger, whose clock is left alone.
+    pub fn look(&self) -> String {
+        self.with(Told::state)
+    }
+
+    pub fn restart(&self) {
+        self.with(Told::restart);
+    }
+
+    /// The finger receives this number of packets, then misses `lost` packets.
+    pub fn deaf(&self, received: u64, lost: u64) {
+        self.line(move |line| line.ears = (received, lost, 0));
+    }
+
+    /// Packets that the deaf finger has missed.
+    pub fn missed(&self) -> u64 {
+        self.line(|line| line.ears.2)
+    }
+
+    /// Delivers what a stalled line holds.
+    pub fn go_on(&self) {
+        self.with(|told| {
+            told.line.stalled.take().into_iter().flatten().for_each(|bytes| told.bus.hear(&bytes));
+            told.frames();
+        });
     }
 
     pub fn end(&self) {
         self.stop.stop();
-        if let Some(thread) = self.thread.borrow_mut().take() {
-            thread.join().expect("it did not panic");
-        }
     }
 
     pub fn file(&self, name: &str) -> String {
         self.folder.join(name).display().to_string()
     }
 
-    /// Kills a command once the finger received `packets` of its packets; false if it ended before.
-    pub fn killed_after(&self, packets: u64, arguments: &[&str]) -> bool {
-        self.command(&format!("deaf after {packets} for {}", u64::MAX));
+    /// Sends a command this signal once the finger received `packets` of its packets; false if it ended before.
+    pub fn ended_after(&self, packets: u64, arguments: &[&str], signal: Signal) -> bool {
+        self.deaf(packets, u64::MAX);
         let mut child = self.start(arguments);
-        let killed = loop {
-            if self.command("unheard") != "0" {
-                break true;
-            }
-            if child.try_wait().expect("it was started").is_some() {
-                break false;
-            }
-            std::thread::sleep(Self::LOOK);
-        };
-        let _ = child.kill();
-        child.wait().expect("it ends");
-        self.command("deaf no more");
-        killed
-    }
-
-    pub fn kill(child: &mut Child) {
-        child.kill().expect("it runs");
-        child.wait().expect("it ends");
+        let mut ended = false;
+        Self::wait_for(|| {
+            ended = child.try_wait().expect("it was started").is_some();
+            ended || self.missed() > 0
+        });
+        if !ended {
+            Self::signal(&child, signal);
+        }
+        if signal != Signal::KILL {
+            self.deaf(0, 0);
+        }
+        child.wait_with_output().expect("it ends");
+        self.deaf(0, 0);
+        !ended
     }
 
     pub fn start(&self, arguments: &[&str]) -> Child {
@@ -271,9 +278,9 @@ impl Served {
 
     pub fn fingertip(&self, arguments: &[&str]) -> Command {
         let mut command = program(arguments);
-        command.env("FINGERTIP_PORT", &self.port);
+        command.env("FINGERTIP_PORT", &self.port).current_dir(&self.folder);
         if !arguments.contains(&"--timeout-ms") && !arguments.contains(&"scan") {
-            command.args(["--timeout-ms", PATIENCE]);
+            command.arg("--timeout-ms").arg(PATIENCE.as_millis().to_string());
         }
         command
     }
@@ -283,6 +290,13 @@ impl Served {
         let output = self.fingertip(arguments).output().expect("it starts");
         assert!(output.status.success(), "{output:?}");
         String::from_utf8_lossy(&output.stdout).into_owned()
+    }
+
+    /// Packets that a command sends from its beginning to its end.
+    pub fn packets(&self, arguments: &[&str]) -> u64 {
+        let begun = self.heard();
+        self.done(arguments);
+        self.heard() - begun
     }
 
     pub fn json(&self, arguments: &[&str]) -> serde_json::Value {
@@ -304,10 +318,13 @@ impl Served {
         assert!(code == Some(2) && err.contains(word), "{arguments:?}: {err}");
     }
 
-    /// Waits for what another program does, and leaves the core to it between two looks.
+    /// Waits for what a finger or another program does, and leaves the core to it between two looks.
+    #[track_caller]
     pub fn wait_for(mut happened: impl FnMut() -> bool) {
+        let begun = Instant::now();
         while !happened() {
-            std::thread::sleep(Self::LOOK);
+            assert!(begun.elapsed() < PATIENCE, "it did not happen");
+            std::thread::sleep(Duration::from_millis(2));
         }
     }
 
@@ -330,33 +347,25 @@ impl Served {
 
     /// Waits until the finger's state has this word, its mode for example. The finger's clock runs by itself.
     pub fn until(&self, word: &str) {
-        self.until_by("look", word);
+        Self::wait_for(|| self.look().contains(word));
     }
 
     /// The same for a patient finger without requests: each poll moves its clock on.
     pub fn until_alone(&self, word: &str) {
-        self.until_by("state", word);
-    }
-
-    fn until_by(&self, look: &str, word: &str) {
-        let begun = Instant::now();
-        while !self.command(look).contains(word) {
-            assert!(begun.elapsed() < Duration::from_secs(600), "no {word} in {}", self.command(look));
-            std::thread::sleep(Self::LOOK);
-        }
+        Self::wait_for(|| self.command("state").contains(word));
     }
 
     pub fn now_s(&self) -> f64 {
-        self.command("now").parse().expect("a time")
+        self.with(|told| told.bus.now_s())
     }
 
     pub fn heard(&self) -> u64 {
-        self.command("heard").parse().expect("a number")
+        self.line(|line| line.heard)
     }
 
     /// Force at the first finger's tip, N: the truth, not what the controller senses.
     pub fn true_force_n(&self) -> f64 {
-        true_force_n(&self.command("look"))
+        true_force_n(&self.look())
     }
 }
 
@@ -372,21 +381,15 @@ impl Drop for Served {
     }
 }
 
+pub fn kill(child: &mut Child) {
+    child.kill().expect("it runs");
+    child.wait().expect("it ends");
+}
+
 pub fn program(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_fingertip"));
     command.env_remove("FINGERTIP_PORT").args(arguments);
     command
-}
-
-/// A client of a port whose answers come in the end.
-pub fn client(port: &str) -> Client {
-    let reach = Reach { port: Some(port.into()), baud: 1_000_000, ids: vec![1], timeout_ms: 600_000 };
-    Client::open(&reach).expect("it listens")
-}
-
-/// An instruction to all devices without parameters; no device answers.
-fn instruction(number: u8) -> Vec<u8> {
-    packet(BROADCAST, number, &[]).to_vec()
 }
 
 /// Reads lines up to one with this text, which is returned; later ones are read and dropped, so that nothing blocks.

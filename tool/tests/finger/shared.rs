@@ -1,6 +1,6 @@
 //! `fingertip share`: one client commands, all read, anyone stops.
 
-use crate::served::{Served, client, ended, fails, line_with};
+use crate::served::{Served, ended, line_with};
 use crate::stopped::RESIDUAL_N;
 use fingertip::link::packet::{BROADCAST, StatusError, instruction};
 use fingertip::shipped::address;
@@ -9,17 +9,18 @@ use fingertip_cli::client::{Pong, packet};
 use fingertip_cli::{Client, Error};
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
-use std::process::{Child, Output, Stdio};
+use std::process::Child;
 use std::time::Duration;
 
 /// Time that a client of the broker waits by its `--timeout-ms`.
-const TIMEOUT: &str = "6000";
+const TIMEOUT_MS: u64 = 6_000;
 
-/// A served finger and a broker in front of it.
+/// A served finger and a broker in front of it, through which all programs and clients reach the finger.
 pub struct Shared {
     pub finger: Served,
     pub broker: Child,
-    pub address: String,
+    /// The finger's own port.
+    behind: String,
     /// Time after which it takes an answer for lost, where that is short.
     lost: Option<Duration>,
 }
@@ -56,21 +57,20 @@ impl Asker {
     pub fn ping(&mut self) -> Result<Pong, Error> {
         self.ask(Client::ping)
     }
+
+    /// Writes a register of several devices in group packets. No device answers.
+    pub fn set_each(&mut self, ids: impl IntoIterator<Item = u8>, register: u16, value: i64) {
+        self.once.set_each(&ids.into_iter().collect::<Vec<_>>(), register, value).expect("it listens");
+    }
 }
 
-/// Starts a broker; it and its address, once it listens. The address is in a line of JSON.
-fn broker(finger: &Served, listen: &str, timeout: &str) -> (Child, String) {
-    let mut broker = finger.start(&["share", "--listen", listen, "--timeout-ms", timeout, "--json"]);
+/// Starts a broker of a port; it and its own port, once it listens. That port is in a line of JSON.
+fn broker(finger: &Served, port: &str, listen: &str, timeout_ms: u64) -> (Child, String) {
+    let timeout = timeout_ms.to_string();
+    let mut broker = finger.start(&["--port", port, "share", "--listen", listen, "--timeout-ms", &timeout, "--json"]);
     let line = line_with("tcp:", broker.stdout.take().expect("a pipe"));
     let line: serde_json::Value = serde_json::from_str(&line).expect(&line);
-    let address = line["address"].as_str().and_then(|port| port.strip_prefix("tcp:")).expect("an address");
-    (broker, address.to_owned())
-}
-
-/// Writes `length` bytes of several devices: `values` has each ID and its bytes. No device answers.
-pub fn sync_write(client: &mut Asker, register: u16, length: u8, values: &[u8]) {
-    let params = [&register.to_le_bytes()[..], &[length, 0], values].concat();
-    client.once.pass(&packet(BROADCAST, instruction::SYNC_WRITE, &params), None, 0).expect("it listens");
+    (broker, line["address"].as_str().expect("a port").to_owned())
 }
 
 impl Shared {
@@ -79,38 +79,36 @@ impl Shared {
     }
 
     pub fn of(finger: Served) -> Self {
-        let (broker, address) = broker(&finger, "127.0.0.1:0", TIMEOUT);
-        Self { finger, broker, address, lost: None }
+        Self::behind(TIMEOUT_MS, None, finger)
+    }
+
+    fn behind(timeout_ms: u64, lost: Option<Duration>, mut finger: Served) -> Self {
+        let (broker, port) = broker(&finger, &finger.port, "127.0.0.1:0", timeout_ms);
+        let behind = std::mem::replace(&mut finger.port, port);
+        Self { finger, broker, behind, lost }
     }
 
     /// With a time-out that is short because fingers are absent or packets are lost.
     pub fn within(timeout_ms: u64, finger: Served) -> Self {
-        let (broker, address) = broker(&finger, "127.0.0.1:0", &timeout_ms.to_string());
-        Self { finger, broker, address, lost: Some(Duration::from_millis(timeout_ms / 3)) }
+        Self::behind(timeout_ms, Some(Duration::from_millis(timeout_ms / 3)), finger)
     }
 
     pub fn client(&self) -> Asker {
-        let mut once = client(&format!("tcp:{}", self.address));
+        let mut once = self.finger.client();
         if let Some(lost) = self.lost {
             once.timeout = 2 * lost;
         }
         Asker { once, again: self.lost.is_some() }
     }
 
-    fn start(&self, arguments: &[&str]) -> Child {
-        let mut command = self.finger.fingertip(arguments);
-        command.env("FINGERTIP_PORT", format!("tcp:{}", self.address)).stdout(Stdio::piped()).stderr(Stdio::piped());
-        command.spawn().expect("it starts")
-    }
-
-    pub fn output(&self, arguments: &[&str]) -> Output {
-        self.start(arguments).wait_with_output().expect("it ends")
+    fn address(&self) -> &str {
+        self.finger.port.strip_prefix("tcp:").expect("a TCP port")
     }
 
     /// Tares, and presses until the force is held.
     pub fn press(&self) -> Child {
-        assert!(self.output(&["tare"]).status.success());
-        let press = self.start(&["press", "1", "--seconds", "1000000", "--within-s", "3600"]);
+        self.finger.done(&["tare"]);
+        let press = self.finger.start(&["press", "1", "--seconds", "1000000", "--within-s", "3600"]);
         self.finger.until("Force:");
         press
     }
@@ -124,16 +122,7 @@ impl Shared {
     }
 
     pub fn until_released(&self) {
-        self.soon(|| self.finger.true_force_n() <= RESIDUAL_N && self.finger.command("look").contains(": Off"));
-    }
-
-    /// Waits for what the broker does, a minute at most.
-    pub fn soon(&self, mut happened: impl FnMut() -> bool) {
-        let begun = std::time::Instant::now();
-        while !happened() {
-            assert!(begun.elapsed().as_secs() < 60, "{}", self.finger.command("look"));
-            std::thread::sleep(Served::LOOK);
-        }
+        Served::wait_for(|| self.finger.true_force_n() <= RESIDUAL_N && self.finger.look().contains(": Off"));
     }
 }
 
@@ -148,7 +137,7 @@ impl Drop for Shared {
 fn a_press_is_watched_and_no_answer_reaches_another_client() {
     let shared = Shared::begin("wall");
     let mut press = shared.press();
-    let record = shared.start(&["record", "--seconds", "0.5", &shared.finger.file("watched.csv")]);
+    let record = shared.finger.start(&["record", "--seconds", "0.5", "watched.csv"]);
     let words = [(address::MODEL_NUMBER, 2), (address::GOAL_FORCE_MN, 4), (address::TORQUE_ENABLE, 1)];
     let readers = words.map(|(register, length)| {
         let mut client = shared.client();
@@ -169,8 +158,7 @@ fn a_press_is_watched_and_no_answer_reaches_another_client() {
     assert!(why.contains("error 7") && why.contains("`fingertip share`"), "{why}");
     assert!(press.try_wait().expect("it was started").is_none());
     // But it stops.
-    let stop = shared.output(&["stop"]);
-    assert!(stop.status.success(), "{stop:?}");
+    shared.finger.done(&["stop"]);
     shared.until_released();
     let (code, said) = ended(&press.wait_with_output().expect("it ends"));
     assert_eq!(code, Some(1));
@@ -186,7 +174,7 @@ fn a_stop_behind_reads_is_passed_though_its_client_has_left() {
     let [low, high] = address::TORQUE_ENABLE.to_le_bytes();
     let stop = |id| packet(id, instruction::WRITE, &[low, high, 0]);
     let send = |bytes: &[u8]| {
-        let mut stream = TcpStream::connect(&shared.address).expect("it listens");
+        let mut stream = TcpStream::connect(shared.address()).expect("it listens");
         stream.write_all(bytes).expect("it listens");
         stream
     };
@@ -213,17 +201,15 @@ fn a_press_that_measures_is_stopped_by_every_stop() {
     for register in [address::SHORT_GOAL_MN, address::MIRROR_GOAL_MN, address::MEASURE] {
         third.set(register, 0).expect("anyone stops");
     }
-    let stop = shared.output(&["stop"]);
-    assert!(stop.status.success(), "{stop:?}");
+    shared.finger.done(&["stop"]);
     shared.until_released();
 }
 
 #[test]
 fn clients_that_send_junk_or_read_nothing_block_nobody() {
     let shared = Shared::begin("wall");
-    let connect = || TcpStream::connect(&shared.address).expect("it listens");
+    let connect = || TcpStream::connect(shared.address()).expect("it listens");
     let mut client = shared.client();
-    client.once.timeout = Duration::from_secs(60);
     client.set(address::TARE, 1).expect("it obeys");
     let mut random = fastrand::Rng::with_seed(7);
     let mut half = connect();
@@ -268,7 +254,7 @@ fn a_stop_takes_the_command_except_to_clean_up_or_of_another_finger() {
     first.set(address::TORQUE_ENABLE, 0).expect("anyone stops");
     first.set(address::BUS_WATCHDOG, 25).expect_err("it was stopped");
     let mut third = shared.client();
-    sync_write(&mut third, address::TORQUE_ENABLE, 1, &[9, 0]);
+    third.set_each([9], address::TORQUE_ENABLE, 0);
     third.ping().expect("it answers");
     second.set(address::BUS_WATCHDOG, 0).expect("it still commands");
     second.set(address::BAUD_RATE, 4).expect_err("the broker would not follow");
@@ -286,7 +272,7 @@ fn a_stop_takes_the_command_except_to_clean_up_or_of_another_finger() {
 #[test]
 fn clients_that_ask_an_absent_id_do_not_starve_a_press() {
     let shared = Shared::begin("wall");
-    assert!(shared.output(&["tare"]).status.success());
+    shared.finger.done(&["tare"]);
     let mut press = shared.client();
     // What is left of `TIMEOUT` is for its own answer: a USB port may delay it.
     press.once.timeout = Duration::from_millis(5_500);
@@ -334,20 +320,19 @@ fn an_id_that_a_client_set_is_followed() {
 fn a_refused_parameter_does_not_keep_the_others_from_being_put_back() {
     let shared = Shared::begin("wall");
     let set = ["params", "set", "return_delay_time=100", "id=7", "baud_rate=1"];
-    fails(&shared.output(&set), &["nothing was changed", "the bus speed"]);
-    let info = shared.output(&["info", "--json"]);
-    let info: serde_json::Value = serde_json::from_slice(&info.stdout).expect("JSON");
+    shared.finger.refuses(&set, &["nothing was changed", "the bus speed"]);
+    let info = shared.finger.json(&["info"]);
     assert_eq!((&info["id"], &info["return_delay_us"]), (&1.into(), &500.into()));
 }
 
 #[test]
 fn a_scan_through_tcp_finds_each_finger_once() {
     let shared = Shared::within(900, Served::patient("wall"));
-    let scan = |more: &[&str]| shared.output(&[&["scan", "--speeds", "57600,9600"], more].concat()).stdout;
-    let found: serde_json::Value = serde_json::from_slice(&scan(&["--json"])).expect("JSON");
+    let scan = ["scan", "--speeds", "57600,9600"];
+    let found = shared.finger.json(&scan);
     let found = found.as_array().expect("a list");
     assert_eq!((found.len(), &found[0]["id"], &found[0]["baud"]), (1, &1.into(), &serde_json::Value::Null));
-    let text = String::from_utf8(scan(&[])).expect("text");
+    let text = shared.finger.done(&scan);
     assert!(text.lines().count() == 1 && !text.contains("baud"), "{text}");
 }
 
@@ -361,7 +346,7 @@ fn a_lost_port_is_opened_again_once_it_is_back() {
     shared.broker.wait().expect("it ends");
     assert!(matches!(client.ping(), Err(fingertip_cli::Error::Port(..))));
     assert!(client.once.reopen().is_err(), "it is not back");
-    (shared.broker, _) = broker(&shared.finger, &shared.address, TIMEOUT);
+    (shared.broker, _) = broker(&shared.finger, &shared.behind, shared.address(), TIMEOUT_MS);
     client.once.reopen().expect("it is back");
     client.ping().expect("it answers");
 }

@@ -76,7 +76,6 @@ fn foxglove_is_sent_the_numbers_and_the_picture() {
     }
     Served::interrupt(&child);
     assert!(child.wait().expect("it ends").success());
-    finger.end();
 }
 
 #[test]
@@ -85,5 +84,4 @@ fn a_port_that_is_taken_is_told() {
     let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
     let port = taken.local_addr().expect("an address").port().to_string();
     finger.refuses(&["stream", "--tcp", &port], &[&format!("127.0.0.1:{port}"), "in use"]);
-    finger.end();
 }

@@ -49,11 +49,7 @@ fn a_press_is_released_at_the_end_of_the_broker() {
 /// Another client stops one of two fingers. The commander feeds the watchdog of the other one until it leaves.
 #[test]
 fn the_other_fingers_of_a_stopped_commander_are_stopped_once_it_has_left() {
-    let finger = Served::patient("grasp");
-    for id in [1, 2] {
-        drop(finger.tared(id));
-    }
-    let shared = Shared::of(finger);
+    let shared = tared(Served::patient("grasp"), 1..=2);
     let (mut first, mut second) = (shared.client(), shared.client());
     for id in [1, 2] {
         first.once.id = id;

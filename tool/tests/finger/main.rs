@@ -55,10 +55,10 @@ fn who_is_not_there_is_told() {
 fn several_ids_are_asked_one_after_the_other() {
     let finger = Served::begin("grasp");
     Served::not_understood(&["--id", "1,2", "press", "1"], "takes one --id");
-    let infos = || finger.json(&["--id", "all", "--timeout-ms", "1000", "info"]).as_array().expect("a list").clone();
     let why = finger.refuses(&["--id", "9,2", "--timeout-ms", "1000", "tare"], &[]);
     assert!(why.contains("ID 9: ping: no answer") && !why.contains("ID 2"), "{why}");
-    let [first, second]: [serde_json::Value; 2] = Vec::try_into(infos()).expect("two fingers");
+    let infos = finger.json(&["--id", "all", "--timeout-ms", "1000", "info"]);
+    let (first, second) = (&infos[0], &infos[1]);
     assert_eq!((&first["id"], &second["id"]), (&1.into(), &2.into()));
     assert_eq!((first["limit_names"][0].as_str(), second["limit_names"][0].as_str()), (Some("not tared"), None));
     let stopped = finger.json(&["--id", "1,2", "stop"]);

@@ -50,10 +50,6 @@ impl Asker {
         self.ask(|client| client.number(register))
     }
 
-    pub fn write(&mut self, register: u16, data: &[u8]) -> Result<(), Error> {
-        self.ask(|client| client.write(register, data))
-    }
-
     pub fn ping(&mut self) -> Result<Pong, Error> {
         self.ask(Client::ping)
     }
@@ -258,7 +254,7 @@ fn a_stop_takes_the_command_except_to_clean_up_or_of_another_finger() {
     third.ping().expect("it answers");
     second.set(address::BUS_WATCHDOG, 0).expect("it still commands");
     second.set(address::BAUD_RATE, 4).expect_err("the broker would not follow");
-    second.write(address::ID, &[1, 4]).expect_err("the broker would not follow");
+    second.once.write(address::ID, &[1, 4]).expect_err("the broker would not follow");
     first.set(address::TORQUE_ENABLE, 0).expect("anyone stops");
     second.set(address::BUS_WATCHDOG, 0).expect_err("the first one did not only clean up");
     for client in [&mut first, &mut second] {

@@ -242,30 +242,28 @@ fn stop_says_that_a_port_is_busy() {
 fn one_packet_stops_all_fingers() {
     let finger = Served::patient("grasp");
     let both = |word: &str| finger.command("state").matches(word).count() == 2;
-    let press = || {
-        for id in [1, 2] {
-            finger.tared(id).set(address::TORQUE_ENABLE, 1).expect("it obeys");
+    let press = |goal_mn, mode| {
+        // Both are tared before one of them may push the object onto the other.
+        [1, 2].into_iter().for_each(|id| drop(finger.tared(id)));
+        let mut client = finger.client();
+        for (register, value) in [(address::TORQUE_ENABLE, 1), (address::GOAL_FORCE_MN, goal_mn)] {
+            client.set_each(&[1, 2], register, value).expect("it listens");
         }
-        while !both("Release:") {}
+        while !both(mode) {}
     };
-    press();
+    press(0, "Release:");
     let stopped = finger.json(&["--timeout-ms", "1000", "stop", "--all"]);
     let ids: Vec<_> = stopped.as_array().expect("a list").iter().map(|one| one["id"].as_u64()).collect();
     assert_eq!(ids, [Some(1), Some(2)], "{stopped}");
     assert!(both("Off:"), "{}", finger.command("state"));
     // The first packet is enough. What comes in with it is heard as well, nothing after that.
-    press();
+    press(0, "Release:");
     finger.deaf(1, u64::MAX);
     let why = finger.refuses(&["--timeout-ms", "50", "stop", "--all"], &[]);
     assert!(both("Off:"), "{why} {}", finger.command("state"));
     // So it is for listed ones: an absent ID before them does not keep them pressing.
     finger.deaf(0, 0);
-    let hold = |id| {
-        let mut client = finger.tared(id);
-        client.set(address::TORQUE_ENABLE, 1).and_then(|()| client.set(address::GOAL_FORCE_MN, 500)).expect("it obeys");
-    };
-    [1, 2].into_iter().for_each(hold);
-    while !both("Force:") {}
+    press(500, "Force:");
     finger.deaf(1, u64::MAX);
     let stop = finger.start(&["--id", "9,1,2", "--timeout-ms", "50", "stop", "--json"]).wait_with_output();
     let stop = stop.expect("it ends");

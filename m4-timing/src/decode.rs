@@ -44,9 +44,9 @@ pub fn decode(bytes: &[u8]) -> Result<Instruction, Unknown> {
 /// `0` and `1` are themselves and `x` is any bit. Core registers: `d` is written and not the program counter, `e` and `g`
 /// are written, `r` is not the program counter; `a` is the base of an address (the program counter makes none), written
 /// back if `w` is set, `A` one that is always written back, `B` and `C` are the same but not the program counter, `b` is an
-/// index; `l` is a list, `L` one that is written; `n` over `m` is a division. `z` is a size and not 3. FPU registers, four
-/// bits and a bit in small letters: `S` is written, `T` and `U` are read, `V` is both, of singles; `P` is written and `Q` is
-/// read, of doubles, or their half `h`; `c` is a number of words.
+/// index; `l` is a list, `L` one that is written; `n` over `m` is a division. FPU registers, four bits and a bit in small
+/// letters: `S` is written, `T` and `U` are read, `V` is both, of singles; `P` is written and `Q` is read, of doubles, or
+/// their half `h`; `c` is a number of words. [`fits`] has the letters that stand for some values only.
 type Row = (&'static str, Instruction);
 
 /// An instruction that touches no register.
@@ -60,7 +60,6 @@ const LOAD_PC: Instruction = of(Kind::LoadPc).writing(bit(PC));
 const BRANCH: Instruction = of(Kind::Branch { conditional: false }).writing(bit(PC));
 const BRANCH_IF: Instruction = of(Kind::Branch { conditional: true }).writing(bit(PC));
 const JUMP: Instruction = of(Kind::Jump).writing(bit(PC));
-const IF_THEN: Instruction = of(Kind::IfThen { state: 0 });
 const UNTIMED: Instruction = of(Kind::Untimed);
 
 const NARROW: &[Row] = &[
@@ -78,8 +77,7 @@ const NARROW: &[Row] = &[
     ("0100 0111 0xxx x000", JUMP),
     ("0100 0111 1xxx x000", JUMP.writing(bit(PC) | bit(LR))),
     ("0100 1ddd xxxx xxxx", LOAD),
-    ("0101 00xb bbaa axxx", of(Kind::StoreIndexed)),
-    ("0101 010b bbaa axxx", of(Kind::StoreIndexed)),
+    ("0101 yyyb bbaa axxx", of(Kind::StoreIndexed)),
     ("0101 xxxb bbaa addd", LOAD),
     ("011x 0xxx xxaa axxx", of(Kind::Store)),
     ("011x 1xxx xxaa addd", LOAD),
@@ -100,10 +98,7 @@ const NARROW: &[Row] = &[
     ("1011 1101 LLLL LLLL", of(Kind::Many(0)).writing(bit(SP) | bit(PC)).at(bit(SP))),
     ("1011 1110 xxxx xxxx", UNTIMED),
     // If-then, and hints: NOP and YIELD do nothing on this core; WFE, WFI and SEV have no time of their own.
-    ("1011 1111 xxxx xxx1", IF_THEN),
-    ("1011 1111 xxxx xx10", IF_THEN),
-    ("1011 1111 xxxx x100", IF_THEN),
-    ("1011 1111 xxxx 1000", IF_THEN),
+    ("1011 1111 xxxx MMMM", of(Kind::IfThen { state: 0 })),
     ("1011 1111 000x 0000", ALU),
     ("1011 1111 001x 0000", UNTIMED),
     ("1011 1111 0100 0000", UNTIMED),
@@ -116,10 +111,8 @@ const NARROW: &[Row] = &[
 
 const WIDE: &[Row] = &[
     // LDM and STM: increment after or decrement before; the others are for other profiles.
-    ("1110 1000 10w0 aaaa llll llll llll llll", of(Kind::Many(0))),
-    ("1110 1000 10w1 aaaa LLLL LLLL LLLL LLLL", of(Kind::Many(0))),
-    ("1110 1001 00w0 aaaa llll llll llll llll", of(Kind::Many(0))),
-    ("1110 1001 00w1 aaaa LLLL LLLL LLLL LLLL", of(Kind::Many(0))),
+    ("1110 100j j0w0 aaaa llll llll llll llll", of(Kind::Many(0))),
+    ("1110 100j j0w1 aaaa LLLL LLLL LLLL LLLL", of(Kind::Many(0))),
     // Two words, exclusives, and branches by a table.
     ("1110 1001 x1w1 aaaa eeee gggg xxxx xxxx", of(Kind::Many(2))),
     ("1110 1001 x1w0 aaaa xxxx xxxx xxxx xxxx", of(Kind::Many(2))),
@@ -131,39 +124,18 @@ const WIDE: &[Row] = &[
     ("1110 1000 1101 aaaa eeee xxxx 010x xxxx", LOAD),
     ("1110 1000 1101 aaaa xxxx xxxx 000x bbbb", of(Kind::Table).writing(bit(PC))),
     // Data processing with a shifted register. AND, EOR, ADD and SUB without a destination are TST, TEQ, CMN and CMP.
-    ("1110 1010 x001 xxxx 0xxx 1111 xxxx xxxx", ALU),
-    ("1110 1011 0001 xxxx 0xxx 1111 xxxx xxxx", ALU),
-    ("1110 1011 1011 xxxx 0xxx 1111 xxxx xxxx", ALU),
-    ("1110 1010 0xxx xxxx 0xxx dddd xxxx xxxx", ALU),
-    ("1110 1010 100x xxxx 0xxx dddd xxxx xxxx", ALU),
+    ("1110 101k kkk1 xxxx 0xxx 1111 xxxx xxxx", ALU),
+    ("1110 101o ooox xxxx 0xxx dddd xxxx xxxx", ALU),
     ("1110 1010 1100 xxxx 0xxx dddd xxx0 xxxx", ALU),
-    ("1110 1011 000x xxxx 0xxx dddd xxxx xxxx", ALU),
-    ("1110 1011 01xx xxxx 0xxx dddd xxxx xxxx", ALU),
-    ("1110 1011 101x xxxx 0xxx dddd xxxx xxxx", ALU),
-    ("1110 1011 110x xxxx 0xxx dddd xxxx xxxx", ALU),
     // The same with an immediate of eight bits, shifted or repeated.
-    ("1111 0x00 x001 xxxx 0xxx 1111 xxxx xxxx", ALU),
-    ("1111 0x01 0001 xxxx 0xxx 1111 xxxx xxxx", ALU),
-    ("1111 0x01 1011 xxxx 0xxx 1111 xxxx xxxx", ALU),
-    ("1111 0x00 0xxx xxxx 0xxx dddd xxxx xxxx", ALU),
-    ("1111 0x00 100x xxxx 0xxx dddd xxxx xxxx", ALU),
-    ("1111 0x01 000x xxxx 0xxx dddd xxxx xxxx", ALU),
-    ("1111 0x01 01xx xxxx 0xxx dddd xxxx xxxx", ALU),
-    ("1111 0x01 101x xxxx 0xxx dddd xxxx xxxx", ALU),
-    ("1111 0x01 110x xxxx 0xxx dddd xxxx xxxx", ALU),
+    ("1111 0x0k kkk1 xxxx 0xxx 1111 xxxx xxxx", ALU),
+    ("1111 0x0o ooox xxxx 0xxx dddd xxxx xxxx", ALU),
     // Additions and moves of wide immediates, saturation, bit fields.
-    ("1111 0x10 0x00 xxxx 0xxx dddd xxxx xxxx", ALU),
-    ("1111 0x10 1010 xxxx 0xxx dddd xxxx xxxx", ALU),
-    ("1111 0x10 1100 xxxx 0xxx dddd xxxx xxxx", ALU),
-    ("1111 0x11 0xx0 xxxx 0xxx dddd xxxx xxxx", ALU),
-    ("1111 0x11 10x0 xxxx 0xxx dddd xxxx xxxx", ALU),
-    ("1111 0x11 1100 xxxx 0xxx dddd xxxx xxxx", ALU),
+    ("1111 0x1i iiii xxxx 0xxx dddd xxxx xxxx", ALU),
     // Branches, special registers, hints and barriers; the others between them are not for this core.
     ("1111 0xxx xxxx xxxx 10x1 xxxx xxxx xxxx", BRANCH),
     ("1111 0xxx xxxx xxxx 11x1 xxxx xxxx xxxx", BRANCH.writing(bit(PC) | bit(LR))),
-    ("1111 0x0x xxxx xxxx 10x0 xxxx xxxx xxxx", BRANCH_IF),
-    ("1111 0x10 xxxx xxxx 10x0 xxxx xxxx xxxx", BRANCH_IF),
-    ("1111 0x11 0xxx xxxx 10x0 xxxx xxxx xxxx", BRANCH_IF),
+    ("1111 0xff ffxx xxxx 10x0 xxxx xxxx xxxx", BRANCH_IF),
     ("1111 0111 1111 xxxx 1x10 xxxx xxxx xxxx", UNTIMED),
     ("1111 0011 1000 xxxx 10x0 xxxx xxxx xxxx", of(Kind::Move(1))),
     ("1111 0011 1110 xxxx 10x0 dddd xxxx xxxx", of(Kind::Move(1))),
@@ -186,17 +158,12 @@ const WIDE: &[Row] = &[
     ("1111 1000 0101 aaaa 1111 11xw xxxx xxxx", LOAD_PC),
     ("1111 1000 0101 AAAA 1111 10x1 xxxx xxxx", LOAD_PC),
     ("1111 1000 0101 aaaa 1111 0000 00xx bbbb", LOAD_PC),
-    // Bytes, halfwords and words, then signed bytes and halfwords.
-    ("1111 1000 xzz1 1111 dddd xxxx xxxx xxxx", LOAD),
-    ("1111 1000 1zz1 aaaa dddd xxxx xxxx xxxx", LOAD),
-    ("1111 1000 0zz1 aaaa dddd 11xw xxxx xxxx", LOAD),
-    ("1111 1000 0zz1 AAAA dddd 10x1 xxxx xxxx", LOAD),
-    ("1111 1000 0zz1 aaaa dddd 0000 00xx bbbb", LOAD),
-    ("1111 1001 x0x1 1111 dddd xxxx xxxx xxxx", LOAD),
-    ("1111 1001 10x1 aaaa dddd xxxx xxxx xxxx", LOAD),
-    ("1111 1001 00x1 aaaa dddd 11xw xxxx xxxx", LOAD),
-    ("1111 1001 00x1 AAAA dddd 10x1 xxxx xxxx", LOAD),
-    ("1111 1001 00x1 aaaa dddd 0000 00xx bbbb", LOAD),
+    // Bytes, halfwords and words, signed bytes and halfwords.
+    ("1111 100z xzz1 1111 dddd xxxx xxxx xxxx", LOAD),
+    ("1111 100z 1zz1 aaaa dddd xxxx xxxx xxxx", LOAD),
+    ("1111 100z 0zz1 aaaa dddd 11xw xxxx xxxx", LOAD),
+    ("1111 100z 0zz1 AAAA dddd 10x1 xxxx xxxx", LOAD),
+    ("1111 100z 0zz1 aaaa dddd 0000 00xx bbbb", LOAD),
     ("1111 1000 1zz0 BBBB rrrr xxxx xxxx xxxx", of(Kind::Store)),
     ("1111 1000 0zz0 BBBB rrrr 11xw xxxx xxxx", of(Kind::Store)),
     ("1111 1000 0zz0 CCCC rrrr 10x1 xxxx xxxx", of(Kind::Store)),
@@ -205,10 +172,7 @@ const WIDE: &[Row] = &[
     ("1111 1010 0xxx xxxx 1111 dddd 0000 xxxx", ALU),
     ("1111 1010 00xx xxxx 1111 dddd 10xx xxxx", ALU),
     ("1111 1010 010x xxxx 1111 dddd 10xx xxxx", ALU),
-    ("1111 1010 1x0x xxxx 1111 dddd 0x0x xxxx", ALU),
-    ("1111 1010 1x0x xxxx 1111 dddd 0x10 xxxx", ALU),
-    ("1111 1010 1x10 xxxx 1111 dddd 0x0x xxxx", ALU),
-    ("1111 1010 1x10 xxxx 1111 dddd 0x10 xxxx", ALU),
+    ("1111 1010 1xyy xxxx 1111 dddd 0xzz xxxx", ALU),
     ("1111 1010 100x xxxx 1111 dddd 10xx xxxx", ALU),
     ("1111 1010 101x xxxx 1111 dddd 1000 xxxx", ALU),
     // Products of 32 bits, of 64 bits, and divisions.
@@ -228,19 +192,15 @@ const WIDE: &[Row] = &[
     ("1110 1100 0100 xxxx xxxx 1010 00s1 SSSS", of(Kind::Move(2))),
     ("1110 1100 0101 eeee gggg 1011 00q1 QQQQ", of(Kind::Move(2))),
     ("1110 1100 0100 xxxx xxxx 1011 00p1 PPPP", of(Kind::Move(2))),
-    // VLDR, VSTR; VLDM, VSTM, VPUSH, VPOP.
+    // VLDR, VSTR; all that is left of this form is VLDM, VSTM, VPUSH, VPOP.
     ("1110 1101 xs01 aaaa SSSS 1010 xxxx xxxx", of(Kind::FloatWord)),
     ("1110 1101 xp01 aaaa PPPP 1011 xxxx xxxx", of(Kind::Many(2))),
     ("1110 1101 xt00 aaaa TTTT 1010 xxxx xxxx", of(Kind::FloatWord)),
     ("1110 1101 xq00 aaaa QQQQ 1011 xxxx xxxx", of(Kind::Many(2))),
-    ("1110 1100 1sw1 aaaa SSSS 1010 cccc cccc", of(Kind::Many(0))),
-    ("1110 1100 1pw1 aaaa PPPP 1011 cccc cccc", of(Kind::Many(0))),
-    ("1110 1100 1tw0 aaaa TTTT 1010 cccc cccc", of(Kind::Many(0))),
-    ("1110 1100 1qw0 aaaa QQQQ 1011 cccc cccc", of(Kind::Many(0))),
-    ("1110 1101 0s11 AAAA SSSS 1010 cccc cccc", of(Kind::Many(0))),
-    ("1110 1101 0p11 AAAA PPPP 1011 cccc cccc", of(Kind::Many(0))),
-    ("1110 1101 0t10 AAAA TTTT 1010 cccc cccc", of(Kind::Many(0))),
-    ("1110 1101 0q10 AAAA QQQQ 1011 cccc cccc", of(Kind::Many(0))),
+    ("1110 110j jsw1 aaaa SSSS 1010 cccc cccc", of(Kind::Many(0))),
+    ("1110 110j jpw1 aaaa PPPP 1011 cccc cccc", of(Kind::Many(0))),
+    ("1110 110j jtw0 aaaa TTTT 1010 cccc cccc", of(Kind::Many(0))),
+    ("1110 110j jqw0 aaaa QQQQ 1011 cccc cccc", of(Kind::Many(0))),
     // VMOV of one word, VMRS, VMSR.
     ("1110 1110 0001 TTTT eeee 1010 txx1 xxxx", of(Kind::Move(1))),
     ("1110 1110 0000 SSSS xxxx 1010 sxx1 xxxx", of(Kind::Move(1))),
@@ -268,6 +228,26 @@ const WIDE: &[Row] = &[
     ("1110 1110 1v11 1x1x VVVV 1010 x1x0 xxxx", ALU),
 ];
 
+/// True if a letter can have a value.
+fn fits(letter: u8, value: u32) -> bool {
+    match letter {
+        b'd' | b'r' | b'B' | b'C' => value != u32::from(PC),
+        // A condition, and the mask of the instructions that it is for.
+        b'f' => value < 14,
+        b'M' => value != 0,
+        // A list is stored or loaded upwards, or downwards: the others are for other profiles.
+        b'j' => value == 1 || value == 2,
+        // Operations: all, those with a form that only compares, those with a wide immediate.
+        b'o' => [0, 1, 2, 3, 4, 8, 10, 11, 13, 14].contains(&value),
+        b'k' => [0, 4, 8, 13].contains(&value),
+        b'i' => [0, 4, 10, 12, 16, 18, 20, 22, 24, 26, 28].contains(&value),
+        // A size, with a sign before it where there is one.
+        b'z' => [0, 1, 2, 4, 5].contains(&value),
+        b'y' => value < 3,
+        _ => true,
+    }
+}
+
 /// The instruction of a row with the letters' values; `None` if the word does not fit.
 fn filled((pattern, row): &Row, word: u32) -> Option<Instruction> {
     let width = pattern.bytes().filter(|letter| *letter != b' ').count();
@@ -280,8 +260,7 @@ fn filled((pattern, row): &Row, word: u32) -> Option<Instruction> {
         found.fold(None, |value: Option<u32>, (_, bit)| Some(value.unwrap_or(0) << 1 | bit))
     };
     let core = |letter| value(letter).map_or(0, |register| bit(register as u8));
-    let not_pc = [b'd', b'r', b'B', b'C'].into_iter().all(|letter| width == 16 || value(letter) != Some(PC.into()));
-    if !not_pc || value(b'z') == Some(3) {
+    if !bits().all(|(letter, _)| value(letter).is_none_or(|value| fits(letter, value))) {
         return None;
     }
     let base = (core(b'a') | core(b'A') | core(b'B') | core(b'C')) & !bit(PC);

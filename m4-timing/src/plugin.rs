@@ -5,7 +5,7 @@
 
 use crate::core::Touched;
 use crate::decode::{decode, is_wide};
-use crate::meter::{self, Meter, MeterError, Registers, Site};
+use crate::meter::{self, Meter, Registers, Site};
 use std::collections::HashMap;
 use std::ffi::{CStr, c_char, c_int, c_uint, c_void};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -16,17 +16,10 @@ type Id = u64;
 type Block = c_void;
 type Insn = c_void;
 
-/// GLib's growing array of bytes.
+/// GLib's growing array, of bytes or of anything else.
 #[repr(C)]
-struct ByteArray {
-    data: *const u8,
-    len: c_uint,
-}
-
-/// GLib's growing array of anything.
-#[repr(C)]
-struct Array {
-    data: *const RegisterDescriptor,
+struct Array<T> {
+    data: *const T,
     len: c_uint,
 }
 
@@ -61,11 +54,11 @@ unsafe extern "C" {
     );
     fn qemu_plugin_mem_size_shift(info: u32) -> c_uint;
     fn qemu_plugin_mem_is_store(info: u32) -> bool;
-    fn qemu_plugin_get_registers() -> *mut Array;
-    fn qemu_plugin_read_register(handle: *mut c_void, bytes: *mut ByteArray) -> c_int;
+    fn qemu_plugin_get_registers() -> *mut Array<RegisterDescriptor>;
+    fn qemu_plugin_read_register(handle: *mut c_void, bytes: *mut Array<u8>) -> c_int;
     fn _exit(status: c_int) -> !;
-    fn g_byte_array_new() -> *mut ByteArray;
-    fn g_byte_array_set_size(array: *mut ByteArray, length: c_uint) -> *mut ByteArray;
+    fn g_byte_array_new() -> *mut Array<u8>;
+    fn g_byte_array_set_size(array: *mut Array<u8>, length: c_uint) -> *mut Array<u8>;
 }
 
 /// The interface that this plugin speaks.
@@ -95,7 +88,7 @@ struct Plugin {
 struct Handles {
     core: [*mut c_void; 15],
     xpsr: *mut c_void,
-    bytes: *mut ByteArray,
+    bytes: *mut Array<u8>,
 }
 
 // SAFETY: QEMU's handles name registers and belong to no thread; the lock around the plugin guards the array.
@@ -234,7 +227,7 @@ extern "C" fn executed(_: c_uint, data: *mut c_void) {
     with(|plugin| {
         let Some(registers) = &plugin.registers else { fail("QEMU started no CPU") };
         if let Err(refusal) = plugin.meter.execute(site, &mut &*registers) {
-            refuse(&refusal);
+            fail(&format!("not measured: {refusal}"));
         }
         RUNNING.store(plugin.meter.running(), Ordering::Relaxed);
     });
@@ -253,7 +246,7 @@ extern "C" fn ended(_: Id, _: *mut c_void) {
     with(|plugin| {
         let regions = match plugin.meter.finish() {
             Ok(regions) => regions,
-            Err(refusal) => refuse(&refusal),
+            Err(refusal) => fail(&format!("not measured: {refusal}")),
         };
         if let Some(path) = &plugin.out
             && let Err(error) = fs::write(path, meter::json_lines(&meter::measured(regions)))
@@ -266,10 +259,6 @@ extern "C" fn ended(_: Id, _: *mut c_void) {
 fn with<T>(work: impl FnOnce(&mut Plugin) -> T) -> T {
     let Some(plugin) = PLUGIN.get() else { fail("QEMU did not install the plugin") };
     work(&mut plugin.lock().unwrap_or_else(PoisonError::into_inner))
-}
-
-fn refuse(refusal: &MeterError) -> ! {
-    fail(&format!("not measured: {refusal}"))
 }
 
 /// Ends QEMU at once, without its own farewells: they would come back here.

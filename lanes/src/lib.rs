@@ -129,47 +129,28 @@ pub use portable::{near_root, root_and_product};
 mod dsp {
     use core::arch::asm;
 
-    /// a - b in each lane, wrapping (SSUB16).
-    #[inline(always)]
-    pub fn sub(a: u32, b: u32) -> u32 {
-        let difference;
-        // SAFETY: reads and writes registers only. The flags that it sets (GE) are read by no other instruction here.
-        unsafe {
-            asm!("ssub16 {}, {}, {}", lateout(reg) difference, in(reg) a, in(reg) b, options(pure, nomem, nostack))
-        }
-        difference
+    /// Makes a function of an instruction.
+    macro_rules! instruction {
+        ($doc:literal $name:ident($($operand:ident: $number:ty),+) -> $result:ty, $code:literal) => {
+            #[doc = $doc]
+            #[inline(always)]
+            pub fn $name($($operand: $number),+) -> $result {
+                let result;
+                // SAFETY: reads and writes registers only. The flags that it can set (GE, and Q, which is sticky) are
+                // read by no other instruction here.
+                unsafe { asm!($code, lateout(reg) result, $(in(reg) $operand),+, options(pure, nomem, nostack)) }
+                result
+            }
+        };
     }
 
-    /// a - b in each lane, both unsigned, and 0 where b is larger (UQSUB16).
-    #[inline(always)]
-    pub fn excess(a: u32, b: u32) -> u32 {
-        let above;
-        // SAFETY: reads and writes registers only.
-        unsafe { asm!("uqsub16 {}, {}, {}", lateout(reg) above, in(reg) a, in(reg) b, options(pure, nomem, nostack)) }
-        above
-    }
-
-    /// sum + a.low b.low + a.high b.high, wrapping (SMLAD).
-    #[inline(always)]
-    pub fn dot(a: u32, b: u32, sum: i32) -> i32 {
-        let result;
-        // SAFETY: reads and writes registers only. The flag that it can set (Q) is sticky and read nowhere.
-        unsafe {
-            asm!("smlad {}, {}, {}, {}", lateout(reg) result, in(reg) a, in(reg) b, in(reg) sum, options(pure, nomem, nostack));
-        }
-        result
-    }
-
-    /// sum + the upper half of a b, wrapping (SMMLA).
-    #[inline(always)]
-    pub fn add_high(sum: i32, a: i32, b: i32) -> i32 {
-        let result;
-        // SAFETY: reads and writes registers only.
-        unsafe {
-            asm!("smmla {}, {}, {}, {}", lateout(reg) result, in(reg) a, in(reg) b, in(reg) sum, options(pure, nomem, nostack));
-        }
-        result
-    }
+    instruction!("a - b in each lane, wrapping (SSUB16)." sub(a: u32, b: u32) -> u32, "ssub16 {}, {}, {}");
+    instruction!("a - b in each lane, both unsigned, and 0 where b is larger (UQSUB16)."
+        excess(a: u32, b: u32) -> u32, "uqsub16 {}, {}, {}");
+    instruction!("sum + a.low b.low + a.high b.high, wrapping (SMLAD)."
+        dot(a: u32, b: u32, sum: i32) -> i32, "smlad {}, {}, {}, {}");
+    instruction!("sum + the upper half of a b, wrapping (SMMLA)."
+        add_high(sum: i32, a: i32, b: i32) -> i32, "smmla {0}, {2}, {3}, {1}");
 }
 
 #[cfg(fpu)]

@@ -40,25 +40,15 @@ global_asm!(
 type Words = *mut u32;
 type Kernel = unsafe extern "C" fn(Words, Words, Words, usize);
 
-unsafe extern "C" {
-    fn AES_128_keyschedule(key: Words, keys: Words, _: Words, _: usize);
-    fn AES_128_encrypt(keys: Words, from: Words, to: Words, _: usize);
-    fn AES_128_encrypt_ctr(state: Words, from: Words, to: Words, bytes: usize);
-    fn AES_192_keyschedule(key: Words, keys: Words, _: Words, _: usize);
-    fn AES_192_encrypt_ctr(state: Words, from: Words, to: Words, bytes: usize);
-    fn AES_256_keyschedule(key: Words, keys: Words, _: Words, _: usize);
-    fn AES_256_encrypt_ctr(state: Words, from: Words, to: Words, bytes: usize);
-    fn CM3_1T_AES128_keyschedule_enc(keys: Words, key: Words, _: Words, _: usize);
-    fn CM3_1T_AES256_keyschedule_enc(keys: Words, key: Words, _: Words, _: usize);
-    fn CM3_1T_AES_keyschedule_dec(keys: Words, rounds: Words, _: Words, _: usize);
-    fn CM3_1T_AES_encrypt(keys: Words, from: Words, to: Words, rounds: usize);
-    fn CM3_1T_AES_decrypt(keys: Words, from: Words, to: Words, rounds: usize);
-    fn CM3_1T_AES128_encrypt_unrolled(keys: Words, from: Words, to: Words, _: usize);
-    fn CM3_1T_AES256_encrypt_unrolled(keys: Words, from: Words, to: Words, _: usize);
-    fn CM3_1T_AES128_decrypt_unrolled(keys: Words, from: Words, to: Words, _: usize);
-    fn CM3_1T_AES256_decrypt_unrolled(keys: Words, from: Words, to: Words, _: usize);
-    fn CM4_DSPsBOX_AES_encrypt(keys: Words, from: Words, to: Words, rounds: usize);
-    fn CM4_DSPsBOX_AES_decrypt(keys: Words, from: Words, to: Words, rounds: usize);
+/// Declares kernels, which take a state or keys, two buffers, and the bytes or rounds.
+macro_rules! kernels {
+    ($($name:ident)*) => { unsafe extern "C" { $(fn $name(_: Words, _: Words, _: Words, _: usize);)* } };
+}
+kernels! {
+    AES_128_keyschedule AES_128_encrypt AES_128_encrypt_ctr AES_192_keyschedule AES_192_encrypt_ctr AES_256_keyschedule
+    AES_256_encrypt_ctr CM3_1T_AES128_keyschedule_enc CM3_1T_AES256_keyschedule_enc CM3_1T_AES_keyschedule_dec
+    CM3_1T_AES_encrypt CM3_1T_AES_decrypt CM3_1T_AES128_encrypt_unrolled CM3_1T_AES256_encrypt_unrolled
+    CM3_1T_AES128_decrypt_unrolled CM3_1T_AES256_decrypt_unrolled CM4_DSPsBOX_AES_encrypt CM4_DSPsBOX_AES_decrypt
 }
 
 /// Bytes that the kernels for many blocks get.

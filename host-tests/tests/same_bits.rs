@@ -8,7 +8,7 @@ use images::same_bits::Comparison;
 #[test]
 fn a_digest_is_that_of_its_inputs() {
     let digests = |inputs: u32| {
-        let mut comparison = Comparison::new();
+        let mut comparison = Comparison::default();
         (0..inputs).for_each(|_| comparison.take());
         comparison.digests().collect::<Vec<_>>()
     };

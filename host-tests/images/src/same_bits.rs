@@ -135,12 +135,14 @@ pub struct Comparison {
     mixes: [Mix; FUNCTIONS.len()],
 }
 
-impl Comparison {
+impl Default for Comparison {
     /// Comparison before the first input.
-    pub const fn new() -> Self {
+    fn default() -> Self {
         Self { source: Source(2003), taken: 0, mixes: [Mix(0); FUNCTIONS.len()] }
     }
+}
 
+impl Comparison {
     /// Gives the next input to every function.
     pub fn take(&mut self) {
         for ((_, every, function), mix) in FUNCTIONS.iter().zip(&mut self.mixes) {
@@ -154,11 +156,5 @@ impl Comparison {
     /// Each function's name and digest.
     pub fn digests(&self) -> impl Iterator<Item = (&'static str, u64)> + '_ {
         FUNCTIONS.iter().zip(&self.mixes).map(|((name, ..), mix)| (*name, mix.0))
-    }
-}
-
-impl Default for Comparison {
-    fn default() -> Self {
-        Self::new()
     }
 }

@@ -48,7 +48,7 @@ fn compare(image: &Path, folder: &Path, failure: &[String]) -> Result<(), Box<dy
     if figure("steps")? != records.len().to_string() || emulated != host {
         return Err("FAILED: the emulated core and this machine differ".into());
     }
-    let mut comparison = Comparison::new();
+    let mut comparison = Comparison::default();
     (0..INPUTS).for_each(|_| comparison.take());
     for (name, digest) in comparison.digests() {
         if figure(name)? != format!("{digest:016x}") {

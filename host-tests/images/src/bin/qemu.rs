@@ -54,7 +54,7 @@ fn main() -> ! {
 
 /// Gives random inputs to every function.
 fn compare(syst: &mut SYST) {
-    let mut comparison = Comparison::new();
+    let mut comparison = Comparison::default();
     for index in 0..INPUTS {
         if index % INPUTS_A_WATCH == 0 {
             syst.clear_current();

@@ -47,7 +47,7 @@ pub fn start(timing: &ScanTiming) {
     slice.top().write(|top| top.set_top((timing.slot.0 - 1) as u16));
     PWM.inte().modify(|enabled| enabled.set_ch7(true));
     TIMER.inte().modify(|enabled| enabled.set_alarm(ALARM, true));
-    let scan = Scan {
+    let mut scan = Scan {
         scanned: Scanned { frame: Frame::EMPTY, supply_mv: 0 },
         slot: 0,
         whole: None,
@@ -55,13 +55,8 @@ pub fn start(timing: &ScanTiming) {
         frame_us: timing.frame_ns / 1_000,
         settle_cycles: timing.settle.0,
     };
-    free(|section| {
-        let mut scan = Some(scan);
-        if let Some(scan) = &mut scan {
-            scan.await_frame();
-        }
-        *SCAN.borrow(section).borrow_mut() = scan;
-    });
+    scan.await_frame();
+    free(|section| *SCAN.borrow(section).borrow_mut() = Some(scan));
     // SAFETY: the handlers below share the scan through a critical section only.
     unsafe {
         NVIC::unmask(Interrupt::TIMER_IRQ_0);

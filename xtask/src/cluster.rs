@@ -31,27 +31,21 @@ pub fn run() -> Result<()> {
     host::emptied(&folder)?;
     let examples = host::root().join("examples/cluster");
     let scene = host::root().join(SCENE);
-    let given = |command: &mut Command, out: &Path| {
-        command.arg(&scene).args(["--seeds", SEEDS, "--out"]).arg(out).env("SWEEP", &sweep);
+    let swept = |what: &str, command: &mut Command, out: &Path| {
+        tried(what, command.arg(&scene).args(["--seeds", SEEDS, "--out"]).arg(out).env("SWEEP", &sweep))
     };
 
     let whole = folder.join("whole");
-    let mut command = Command::new(&sweep);
-    given(&mut command, &whole);
-    tried("one sweep", &mut command)?;
+    swept("one sweep", &mut Command::new(&sweep), &whole)?;
 
     let shared = folder.join("slurm");
     for task in 1..=SHARES {
-        let mut command = slurm_task([task, 1, SHARES, SHARES]);
-        given(&mut command, &shared);
-        tried("a task of a Slurm array", &mut command)?;
+        swept("a task of a Slurm array", &mut slurm_task([task, 1, SHARES, SHARES]), &shared)?;
     }
     same(&sweep, &whole, &shared)?;
 
     let parallel = folder.join("parallel");
-    let mut command = Command::new(examples.join("parallel.sh"));
-    given(command.arg(SHARES.to_string()), &parallel);
-    tried("GNU parallel", &mut command)?;
+    swept("GNU parallel", Command::new(examples.join("parallel.sh")).arg(SHARES.to_string()), &parallel)?;
     same(&sweep, &whole, &parallel)?;
 
     // The job's folder has the program and the scene in it.

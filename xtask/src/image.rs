@@ -90,21 +90,18 @@ fn lay_out(segments: &[(u32, &[u8])]) -> Result<(u32, Vec<u8>)> {
 }
 
 pub fn firmware() -> Result<Image> {
-    let mut command = toolchain::cargo("build");
-    command.args(["--package", "fingertip", "--bin", "firmware", "--features", "firmware"]);
-    with_bytes(&mut command, "firmware")
+    with_bytes("firmware", &["--package", "fingertip", "--features", "firmware"])
 }
 
 /// Builds an image that checks a board.
 pub fn checking(name: &str) -> Result<Image> {
-    let mut command = toolchain::cargo("build");
-    command.args(["--package", name, "--bin", name, "--no-default-features", "--features", "image"]);
-    with_bytes(&mut command, name)
+    with_bytes(name, &["--package", name, "--no-default-features", "--features", "image"])
 }
 
 /// Builds an image, with the flashable bytes beside it.
-fn with_bytes(command: &mut Command, name: &str) -> Result<Image> {
-    let image = Image::read(&built(command.arg("--release"), name)?)?;
+fn with_bytes(name: &str, words: &[&str]) -> Result<Image> {
+    let mut command = toolchain::cargo("build");
+    let image = Image::read(&built(command.args(["--release", "--bin", name]).args(words), name)?)?;
     host::write(&image.bin, &image.bytes)?;
     Ok(image)
 }

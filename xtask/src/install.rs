@@ -29,89 +29,64 @@ pub fn packages(names: &[&str], why: &str) -> Result<()> {
 
 fn add(names: &[&str], why: &str) -> Result<()> {
     let missing: Vec<&str> = names.iter().copied().filter(|name| !installed(name)).collect();
-    if missing.is_empty() {
-        return Ok(());
-    }
-    let list = missing.join(" ");
+    if missing.is_empty() { Ok(()) } else { install(&missing, None, why) }
+}
+
+/// Installs the newest version of packages that Debian has for this release, its backports included.
+pub fn newest(packages: &[&str], why: &str) -> Result<()> {
+    let release = fs::read_to_string("/etc/os-release").unwrap_or_default();
+    let field = |name| release.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix('='));
+    let Some(codename) = field("VERSION_CODENAME").filter(|_| field("ID") == Some("debian")) else {
+        bail!("{why} needs a recent `{}`, and this is no Debian: install it by hand", packages.join(" "));
+    };
+    let _alone = alone()?;
+    install(packages, Some(&format!("{codename}-backports")), why)
+}
+
+/// Installs packages by apt-get. A suite, where one is given, is a source of this call alone: apt does not know of it
+/// afterwards.
+fn install(packages: &[&str], suite: Option<&str>, why: &str) -> Result<()> {
+    let words: Vec<_> = suite.iter().flat_map(|suite| ["-t", suite]).chain(packages.iter().copied()).collect();
+    let list = words.join(" ");
     if host::find_program("apt-get").is_none() {
         bail!("{why} needs the Debian packages `{list}`, and there is no apt-get here: install their like by hand");
     }
     if !is_root() {
         bail!("{why} needs the Debian packages `{list}`: run `sudo apt-get install {list}` and try again");
     }
-    console::say(&format!("Installing the Debian packages `{list}`: {why} needs them."));
-    Apt::new(None)?.install(&missing, why)
-}
-
-/// Installs the newest version of packages that Debian has for this release, its backports included. Backports are a
-/// source of this call alone: apt does not know of them afterwards.
-pub fn newest(packages: &[&str], why: &str) -> Result<()> {
-    let list = packages.join(" ");
-    let release = fs::read_to_string("/etc/os-release").unwrap_or_default();
-    let field = |name| release.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix('='));
-    let codename = field("VERSION_CODENAME").filter(|_| field("ID") == Some("debian"));
-    let Some(codename) = codename.filter(|_| host::find_program("apt-get").is_some()) else {
-        bail!("{why} needs a recent `{list}`, and this is no Debian: install it by hand");
-    };
-    let suite = format!("{codename}-backports");
-    if !is_root() {
-        bail!("{why} needs a recent `{list}`: run `sudo apt-get install -t {suite} {list}` and try again");
-    }
-    let _alone = alone()?;
     console::say(&format!(
-        "Installing the newest `{list}`, from {suite} where {codename} has an older one: {why} needs it. \
-         Apt's sources stay as they are."
+        "Installing the Debian packages `{list}`: {why} needs them. Apt's sources stay as they are."
     ));
-    Apt::new(Some(&suite))?.install(&[&["-t", &suite], packages].concat(), why)
-}
-
-/// apt-get with lists, downloads and, where a suite is added, sources of its own.
-struct Apt {
-    folder: PathBuf,
-    sources: Option<PathBuf>,
-}
-
-impl Apt {
-    fn new(suite: Option<&str>) -> Result<Self> {
-        let folder = host::target().join("apt");
-        host::made("apt/lists/partial").and_then(|_| host::made("apt/cache/archives/partial"))?;
-        let sources = suite.map(|suite| {
-            let file = folder.join(format!("{suite}.list"));
-            // It replaces the system's own list, which it repeats.
-            let own = fs::read_to_string("/etc/apt/sources.list").unwrap_or_default();
-            let line = format!("deb [signed-by={KEYRING}] {} {suite} main\n", mirror());
-            host::write(&file, own + "\n" + &line)?;
-            anyhow::Ok(file)
-        });
-        Ok(Self { folder, sources: sources.transpose()? })
-    }
-
-    fn install(&self, words: &[&str], why: &str) -> Result<()> {
-        console::prepare(&mut self.command("update"))?;
-        let installed = console::prepare(self.command("install").args(words));
-        let list = words.join(" ");
-        installed.with_context(|| format!("apt-get cannot install `{list}`, which {why} needs: is a mirror in reach?"))
-    }
-
-    fn command(&self, subcommand: &str) -> Command {
+    host::made("apt/lists/partial").and_then(|_| host::made("apt/cache/archives/partial"))?;
+    let folder = host::target().join("apt");
+    let sources = suite.map(|suite| {
+        let file = folder.join(format!("{suite}.list"));
+        // It replaces the system's own list, which it repeats.
+        let own = fs::read_to_string("/etc/apt/sources.list").unwrap_or_default();
+        host::write(&file, format!("{own}\ndeb [signed-by={KEYRING}] {} {suite} main\n", mirror()))?;
+        anyhow::Ok(file)
+    });
+    let sources = sources.transpose()?;
+    // With lists, downloads and sources of its own.
+    let apt_get = |subcommand: &str| {
         let mut command = Command::new("apt-get");
         command.env("DEBIAN_FRONTEND", "noninteractive").arg(subcommand).arg("-qq");
         let mut option = |name: &str, value: &Path| {
             command.arg("-o").arg(format!("{name}={}", value.display()));
         };
-        option("Dir::State::Lists", &self.folder.join("lists"));
-        option("Dir::Cache", &self.folder.join("cache"));
-        if let Some(file) = &self.sources {
-            option("Dir::Etc::SourceList", file);
-        }
+        option("Dir::State::Lists", &folder.join("lists"));
+        option("Dir::Cache", &folder.join("cache"));
+        sources.iter().for_each(|file| option("Dir::Etc::SourceList", file));
         // Downloads go to a folder that apt's own user may not see.
         command.args(["-o", "APT::Sandbox::User=root"]);
-        if subcommand == "install" {
-            // Takes nothing away, and waits for another installation under way.
-            command.args(["-y", "--no-install-recommends", "--no-remove", "-o", "DPkg::Lock::Timeout=600"]);
-        }
         command
-    }
+    };
+    console::prepare(&mut apt_get("update"))?;
+    let mut command = apt_get("install");
+    // Takes nothing away, and waits for another installation under way.
+    command.args(["-y", "--no-install-recommends", "--no-remove", "-o", "DPkg::Lock::Timeout=600"]);
+    let installed = console::prepare(command.args(&words));
+    installed.with_context(|| format!("apt-get cannot install `{list}`, which {why} needs: is a mirror in reach?"))
 }
 
 /// The mirror that apt takes this release from.

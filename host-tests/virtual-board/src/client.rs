@@ -4,11 +4,10 @@
 //! that the board leaves unanswered costs virtual time, no more.
 
 use crate::Error;
-use crate::rig::{Rig, Stand};
+use crate::rig::Rig;
 use crate::wire::TimedByte;
 use fingertip::link::Reply;
 use fingertip::link::packet::{Event, Receiver, Sender, instruction};
-use std::sync::mpsc;
 
 /// The board's ID on the bus.
 pub const ID: u8 = 1;
@@ -36,21 +35,18 @@ impl Rig {
     pub fn transact(&mut self, packet: &[u8]) -> Result<Option<Vec<u8>>, Error> {
         self.take_received()?;
         self.send(packet)?;
-        let (mut receiver, mut quiet_since_ns, wait_ns) = (Receiver::new(), self.now_ns(), self.wait_ns);
-        let (answer, answered) = mpsc::channel();
-        let look = move |stand: &mut Stand<'_>| {
-            let (now_ns, received) = (stand.bench.next_ns, std::mem::take(&mut stand.bench.received));
-            if !received.is_empty() || stand.session.board_mut().wire().pending() > 0 {
-                quiet_since_ns = now_ns;
+        let (mut receiver, mut quiet_since_ns) = (Receiver::new(), self.now_ns());
+        while self.now_ns() < quiet_since_ns + self.wait_ns {
+            self.run_until_ns(self.now_ns() + LOOK_NS)?;
+            let received = self.take_received()?;
+            if received.iter().any(|timed| receiver.push(timed.byte) == Some(Event::Packet)) {
+                return Ok(Some(receiver.packet().params.to_vec()));
             }
-            let whole = received.iter().any(|timed| receiver.push(timed.byte) == Some(Event::Packet));
-            let goes_on = !whole && now_ns < quiet_since_ns + wait_ns;
-            // An error means that nobody waits for the answer any more.
-            let _ = goes_on || answer.send(whole.then(|| receiver.packet().params.to_vec())).is_ok();
-            goes_on
-        };
-        self.run_while(LOOK_NS, Box::new(look))?;
-        self.answer(&answered)
+            if !received.is_empty() || self.with(|stand| stand.session.board_mut().wire().pending() > 0)? {
+                quiet_since_ns = self.now_ns();
+            }
+        }
+        Ok(None)
     }
 
     /// Sends an instruction to the board, which must answer; returns the answer's parameters.

@@ -22,14 +22,14 @@ use std::path::Path;
 use std::sync::mpsc;
 use std::thread::JoinHandle;
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Options {
     /// First bytes of the parameter sector.
     pub stored: Vec<u8>,
     /// Bits 3:2 of the option bytes: 0 is level 3, as `cargo xtask flash` leaves them; 3 is off, as the factory does.
     pub brown_out_bits: u8,
-    /// Factory codes of the reference and of the temperature sensor.
-    pub factory: Factory,
+    /// Factory codes of the reference and of the temperature sensor, if they are not those of a sound part.
+    pub factory: Option<Factory>,
 }
 
 impl Options {
@@ -44,19 +44,13 @@ impl Options {
     }
 }
 
-impl Default for Options {
-    fn default() -> Self {
-        Self { stored: Vec::new(), brown_out_bits: 0, factory: converter::factory() }
-    }
-}
-
 /// The image, the factory's calibration, and the parameter sector.
 fn images(image: &Firmware, options: &Options) -> Result<Vec<Image>, Error> {
     let read = |path: &Path, bytes: Vec<u8>, at| {
         Image::new(path, bytes, at).map_err(|why| Error::NotAnImage(path.into(), why.to_string()))
     };
     let mut images = vec![read(&image.path, image.elf.clone(), None)?];
-    let Factory { reference, sensor: [cold, hot] } = options.factory;
+    let Factory { reference, sensor: [cold, hot] } = options.factory.unwrap_or_else(converter::factory);
     let codes = [reference, cold, hot].map(u16::to_le_bytes);
     let factory = [&converter::UNIQUE_ID[..], codes.as_flattened()].concat();
     images.push(read(Path::new("factory"), factory, Some(converter::FACTORY_AT))?);
@@ -66,15 +60,11 @@ fn images(image: &Firmware, options: &Options) -> Result<Vec<Image>, Error> {
     Ok(images)
 }
 
-type Job = Box<dyn FnOnce(&mut Stand<'_>) + Send>;
-/// A look at the run; returns true while the run goes on.
-pub type Look = Box<dyn FnMut(&mut Stand<'_>) -> bool + Send>;
-
 enum Order {
-    /// Run to an instant of the grid, then on in steps of this many ns as long as a look behind each wants.
-    Run(u64, u64, Look),
+    /// Run to an instant of the grid, ns.
+    Run(u64),
     /// Do this at the present halt.
-    Do(Job),
+    Do(Box<dyn FnOnce(&mut Stand<'_>) + Send>),
 }
 
 /// A run. After the emulator has stopped, every method that returns a `Result` returns why.
@@ -103,8 +93,7 @@ impl Rig {
         let bench = Bench::new(front_end, &image);
         let (orders, ordered) = mpsc::channel();
         let (reaching, reached) = mpsc::channel();
-        let (until_ns, look): (_, Look) = (bench.next_ns, Box::new(|_| false));
-        let hall = Hall { until_ns, step_ns: 0, look, bench, orders: ordered, reached: reaching };
+        let hall = Hall { until_ns: bench.next_ns, bench, orders: ordered, reached: reaching };
         let thread = std::thread::Builder::new()
             .name("board".into())
             .spawn(move || emulator::run(session, &Start::new(&images), hall).map(drop).map_err(failure))?;
@@ -134,17 +123,11 @@ impl Rig {
     /// Sets out for an instant still to come, and does not wait: boards that share a world run side by side. What is
     /// posted or asked behind it happens there; [`Rig::await_reached`] is to be called once for each.
     pub fn set_out(&mut self, until_ns: u64) -> Result<(), Error> {
-        self.order(Order::Run(until_ns.next_multiple_of(STEP_NS), 0, Box::new(|_| false)))
+        self.order(Order::Run(until_ns.next_multiple_of(STEP_NS)))
     }
 
     pub fn run_ms(&mut self, ms: u64) -> Result<(), Error> {
         self.run_until_ns(self.now_ns + ms * 1_000_000)
-    }
-
-    /// Runs in steps of `step_ns` until `look`, called on the emulator's thread after each step, returns false.
-    pub fn run_while(&mut self, step_ns: u64, look: Look) -> Result<(), Error> {
-        self.order(Order::Run(self.now_ns + step_ns, step_ns, look))?;
-        self.await_reached()
     }
 
     /// Executes a job at the present halt, between two instructions.
@@ -244,25 +227,19 @@ struct Hall {
     orders: mpsc::Receiver<Order>,
     reached: mpsc::Sender<u64>,
     until_ns: u64,
-    step_ns: u64,
-    look: Look,
 }
 
 impl Hall {
     /// Executes orders until one continues the run; returns false after the last order.
     fn halt(&mut self, session: &mut Session<Part>, stop: Stop, host: &mut dyn Host) -> bool {
-        let Self { bench, orders, reached, until_ns, step_ns, look } = self;
-        if look(&mut Stand { session, host, stop, bench }) {
-            *until_ns += *step_ns;
-            return true;
-        }
+        let Self { bench, orders, reached, until_ns } = self;
         if reached.send(bench.next_ns).is_err() {
             return false;
         }
         while let Ok(order) = orders.recv() {
             match order {
-                Order::Run(until, step, while_true) => {
-                    (*until_ns, *step_ns, *look) = (until, step, while_true);
+                Order::Run(until) => {
+                    *until_ns = until;
                     return true;
                 }
                 Order::Do(job) => job(&mut Stand { session, host, stop, bench }),

@@ -103,10 +103,6 @@ impl Device for PwmTimer {
         Device::on_clock(&mut self.timer, hz, registers, context);
     }
 
-    fn reset(&mut self) {
-        Device::reset(&mut self.timer);
-    }
-
     fn reset_line(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         Device::reset_line(&mut self.timer, registers, context);
     }
@@ -286,11 +282,6 @@ impl Device for ScanTimer {
         self.updates.clock(hz, context.now().0);
         Device::on_clock(&mut self.timer, hz, registers, context);
         self.announce(registers, context);
-    }
-
-    fn reset(&mut self) {
-        Device::reset(&mut self.timer);
-        self.forget();
     }
 
     fn reset_line(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {

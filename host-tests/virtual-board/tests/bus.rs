@@ -2,10 +2,8 @@
 
 use crate::common::*;
 use fingertip::link::packet::{BROADCAST, instruction};
-use fingertip::params::Params;
-use fingertip::shipped::{CLOCKS, Config, REGISTERS, TAXELS, address};
+use fingertip::shipped::TAXELS;
 use rigless::soc::stm32f427::generated::USART2;
-use virtual_board::Rig;
 use virtual_board::client::packet;
 
 sim::sizes!(a_host_finds_what_it_expects_on_the_bus_of_a_board_at_1_n, a_fast_bus(20_000), a_fast_bus(1_000_000));
@@ -66,11 +64,11 @@ fn the_line_is_given_back_right_after_the_last_stop_bit(rig: &mut Rig) {
     for turn in 0..40 {
         rig.run_until_ns(rig.now_ns() + 10_000 * (turn % 10)).expect("it runs");
         rig.take_received().expect("it runs");
-        rig.with(|stand| stand.bench.transmit_edges.clear()).expect("it runs");
+        with(rig, |stand| stand.bench.transmit_edges.clear());
         rig.send(&PING).expect("it runs");
         rig.run_ms(2).expect("it runs");
         let end_ns = rig.take_received().expect("it runs").last().expect("it answers").at_ns;
-        let edges = rig.with(|stand| std::mem::take(&mut stand.bench.transmit_edges)).expect("it runs");
+        let edges = with(rig, |stand| std::mem::take(&mut stand.bench.transmit_edges));
         assert_eq!(edges.iter().map(|edge| edge.on).collect::<Vec<_>>(), [true, false]);
         assert!(edges[1].at_ns >= end_ns, "{} ns before the last stop bit's end", end_ns - edges[1].at_ns);
         late_ns.push(edges[1].at_ns - end_ns);
@@ -96,14 +94,14 @@ const TURNS: u64 = 10;
 fn turning_the_bridge_on_keeps_the_phase_of_the_pwm(rig: &mut Rig) {
     let_go(rig);
     rig.run_ms(100).expect("it runs");
-    let counts = |rig: &mut Rig| rig.with(|stand| stand.session.board_mut().pwm_timer().0.counts);
-    let before = counts(rig).expect("it runs");
+    let counts = |rig: &mut Rig| with(rig, |stand| stand.session.board_mut().pwm_timer().0.counts);
+    let before = counts(rig);
     for _ in 0..TURNS {
         for (torque, ms) in [(1, 1), (0, 40)] {
             write_and_run_ms(rig, address::TORQUE_ENABLE, torque, ms);
         }
     }
-    let after = counts(rig).expect("it runs");
+    let after = counts(rig);
     let (turned_on, restarted) = (after.turned_on - before.turned_on, after.restarted - before.restarted);
     println!("turned on {turned_on} times, a period begun out of turn {restarted} times");
     assert_eq!((turned_on, restarted), (TURNS, 0));
@@ -133,16 +131,14 @@ fn no_byte_of_a_fast_bus_is_lost(rig: &mut Rig) {
     for (baud, divider) in [(4_200_000, 0x12), (3_000_000, 0xe)] {
         poke(rig, USART2.base + 8, divider);
         let before = read_u32(rig, address::GOOD_PACKETS);
-        let end_ns = rig
-            .with(move |stand| {
-                let packet = packet(BROADCAST, instruction::READ, &[0, 0, 4, 0]);
-                let packet_ns = packet.len() as u64 * 10 * 1_000_000_000 / baud;
-                (0..PACKETS).fold(stand.bench.next_ns, |at_ns, nth| {
-                    stand.session.board_mut().wire().send(at_ns, &packet);
-                    at_ns + packet_ns + 10_000 + nth * 7_919 % 100_000
-                })
+        let end_ns = with(rig, move |stand| {
+            let packet = packet(BROADCAST, instruction::READ, &[0, 0, 4, 0]);
+            let packet_ns = packet.len() as u64 * 10 * 1_000_000_000 / baud;
+            (0..PACKETS).fold(stand.bench.next_ns, |at_ns, nth| {
+                stand.session.board_mut().wire().send(at_ns, &packet);
+                at_ns + packet_ns + 10_000 + nth * 7_919 % 100_000
             })
-            .expect("it runs");
+        });
         rig.run_until_ns(end_ns + 1_000_000).expect("it runs");
         let good = u64::from(read_u32(rig, address::GOOD_PACKETS) - before - 1);
         println!("{baud} baud: {} of {PACKETS} packets lost", PACKETS - good);
@@ -180,7 +176,7 @@ fn noise_moves_nothing(rig: &mut Rig, bytes: usize) {
         rig.send(part).expect("it runs");
         // 10 bits each.
         rig.run_ms(69).expect("it runs");
-        assert_eq!(rig.with(|stand| stand.session.board_mut().wire().pending()).expect("it runs"), 0);
+        assert_eq!(with(rig, |stand| stand.session.board_mut().wire().pending()), 0);
         rig.take_received().expect("it runs");
         worst_mm = worst_mm.max((travel_mm(rig) - before_mm).abs());
     }

@@ -1,15 +1,16 @@
 //! What the tests of the flash image share.
 
 use fingertip::link::packet::instruction;
-use fingertip::params::Params;
-use fingertip::shipped::{REGISTERS, Record, address};
+pub use fingertip::params::Params;
+pub use fingertip::shipped::{CLOCKS, COLUMNS, Config, REGISTERS, ROWS, Record, address};
+pub use fingertip::state::{Limits, Mode};
 use fingertip::store::BAUD_RATES;
 use rigless::emulator::{Access, AccessKind};
-use rigless::soc::Width;
-use sim::plant::{Plant, Setup};
+pub use rigless::soc::Width;
+pub use sim::plant::{Plant, Setup};
 use std::path::PathBuf;
-pub use virtual_board::rig::WAIT_NS;
-use virtual_board::{Error, Options, Rig};
+pub use virtual_board::rig::{Stand, WAIT_NS};
+pub use virtual_board::{Error, Fault, Options, Rig};
 
 /// An instruction packet that asks ID 1 whether it is there.
 pub const PING: [u8; 10] = [0xff, 0xff, 0xfd, 0x00, 0x01, 0x03, 0x00, 0x01, 0x19, 0x4e];
@@ -126,13 +127,17 @@ pub fn register(name: &str) -> u16 {
     REGISTERS.iter().find(|register| register.name == name).expect("there is such a register").address
 }
 
+/// Looks at the run, or changes it, between two instructions.
+pub fn with<T: Send + 'static>(rig: &mut Rig, job: impl FnOnce(&mut Stand<'_>) -> T + Send + 'static) -> T {
+    rig.with(job).expect("it runs")
+}
+
 /// Writes to a peripheral's register as the core does.
 pub fn poke(rig: &mut Rig, register: u64, bits: u64) {
-    rig.with(move |stand| {
+    with(rig, move |stand| {
         let access = Access::new(AccessKind::Write, register, Width::W32, bits);
         stand.session.access(access.at(stand.stop.instruction_count, stand.stop.at), stand.host);
-    })
-    .expect("it runs");
+    });
 }
 
 /// A board that has run for 20 ms, so that it is up.

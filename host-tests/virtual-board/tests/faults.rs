@@ -1,15 +1,10 @@
 //! Defects of the microcontroller: what the rig injects is what it says, and what the image makes of it.
 
 use crate::common::*;
-use fingertip::params::Params;
-use fingertip::shipped::address;
-use fingertip::state::{Fault as Number, Mode};
+use fingertip::state::Fault as Number;
 use rigless::mcu::Operate;
-use rigless::soc::Width;
 use sim::mechanics::Bridge;
-use sim::plant::{Faults, Plant, Row, Taxel};
-use sim::setup::Setup;
-use virtual_board::{Fault, Options, Rig};
+use sim::plant::{Faults, Row, Taxel};
 
 sim::sizes!(a_defect_of_the_microcontroller_ends_without_torque, ends_without_torque(false), ends_without_torque(true));
 
@@ -31,13 +26,11 @@ fn the_timer_counts_every_edge_of_the_encoder_also_when_it_turns_impossibly_fast
     for travel_mm in [1.0, 0.3, 0.301] {
         rig.world(move |world| world.place(travel_mm)).expect("it runs");
         rig.run_ms(3).expect("it runs");
-        let (counted, turned) = rig
-            .with(|stand| {
-                const TIM3_CNT: u64 = 0x4000_0424;
-                let counted = stand.session.mcu().peek(stand.stop.at, TIM3_CNT, Width::W32).expect("TIM3 counts");
-                (counted as u16, stand.bench.front_end.lock().world.encoder_counts(stand.stop.at.0) as u16)
-            })
-            .expect("it runs");
+        let (counted, turned) = with(rig, |stand| {
+            const TIM3_CNT: u64 = 0x4000_0424;
+            let counted = stand.session.mcu().peek(stand.stop.at, TIM3_CNT, Width::W32).expect("TIM3 counts");
+            (counted as u16, stand.bench.front_end.lock().world.encoder_counts(stand.stop.at.0) as u16)
+        });
         assert_ne!(turned, 0);
         assert_eq!(counted, turned, "at {travel_mm} mm");
     }
@@ -220,10 +213,8 @@ fn a_store_below_ram_or_to_the_image_is_a_hard_fault_there_and_then(rig: &mut Ri
     }
     // The patch outlives the reset, so the board cannot come up to be asked: its record says where it was.
     let record = rig.image().item("crash", "RECORD").expect("the image has a crash record");
-    let words = move |stand: &mut virtual_board::rig::Stand<'_>| {
-        [4, 12].map(|offset| stand.host.read(record + offset, Width::W32).unwrap_or(0))
-    };
-    let [cause, pc] = rig.with(words).expect("it runs");
+    let word = move |stand: &mut Stand<'_>, offset| stand.host.read(record + offset, Width::W32).unwrap_or(0);
+    let [cause, pc] = with(rig, move |stand| [4, 12].map(|offset| word(stand, offset)));
     assert_eq!((cause, pc), (2, 0x0803_f008), "a hard fault at the store");
 }
 
@@ -251,7 +242,7 @@ pub fn until_off_us(rig: &mut Rig, limit_ms: u64) -> f64 {
 }
 
 fn bridge(rig: &mut Rig) -> Bridge {
-    rig.with(|stand| stand.session.board_mut().bridge()).expect("it runs")
+    with(rig, |stand| stand.session.board_mut().bridge())
 }
 
 /// Checks that after a fault that brakes the tip springs back by at most the indentation, the clearance and 1 mm together.
@@ -273,7 +264,7 @@ fn mend(rig: &mut Rig) {
     for fault in [Fault::ConvertersStall, Fault::BridgeFault] {
         rig.mend(fault).expect("it runs");
     }
-    world(rig, |world| world.faults = Faults::default());
+    spoil(|world| world.faults = Faults::default())(rig);
     // A frame or two of a sound board.
     rig.run_ms(2).expect("it runs");
     write_u8(rig, address::CLEAR_FAULT, 1);
@@ -307,8 +298,14 @@ fn break_and_time(rig: &mut Rig, name: &str, every: usize, faults: &[Number], li
     println!("{name}: bridge off after {worst_us:.1} us at most (limit {limit_us})");
 }
 
-fn world(rig: &mut Rig, change: impl FnOnce(&mut Plant) + Send + 'static) {
-    rig.world(change).expect("it runs");
+/// Injects a fault.
+fn inject(fault: Fault) -> impl Fn(&mut Rig) {
+    move |rig| rig.inject(fault).expect("it runs")
+}
+
+/// Breaks something in the world.
+fn spoil(change: impl FnOnce(&mut Plant) + Copy + Send + 'static) -> impl Fn(&mut Rig) {
+    move |rig| rig.world(change).expect("it runs")
 }
 
 sim::sizes!(each_fault_stops_the_motor_in_time_and_the_mended_board_goes_on, stops_in_time(4), stops_in_time(1));
@@ -316,45 +313,36 @@ sim::sizes!(each_fault_stops_the_motor_in_time_and_the_mended_board_goes_on, sto
 /// Where the scan or the array breaks, each slot matters; the usual size has one in so many.
 fn stops_in_time(every: usize) {
     let rig = &mut holding(&Options::confirmed());
-    break_and_time(rig, "converters stall", every, &[Number::LostFrames], TWO_FRAMES_US, |rig| {
-        rig.inject(Fault::ConvertersStall).expect("it runs");
-    });
-    break_and_time(rig, "a trigger missed by a bank", every, &[Number::LostFrames], TWO_FRAMES_US, |rig| {
-        rig.inject(Fault::TriggerMissed).expect("it runs");
-    });
+    let lost = [Number::LostFrames];
+    break_and_time(rig, "converters stall", every, &lost, TWO_FRAMES_US, inject(Fault::ConvertersStall));
+    break_and_time(rig, "a trigger missed by a bank", every, &lost, TWO_FRAMES_US, inject(Fault::TriggerMissed));
     assert!(read_u16(rig, address::OUT_OF_STEP) > 0);
     let of_array = [Number::ArrayBroken, Number::RowStuck];
     for state in [Row::StuckLow, Row::StuckHigh] {
-        break_and_time(rig, &format!("row {state:?}"), every, &of_array, TWO_FRAMES_US, |rig| {
-            world(rig, move |world| world.faults.array.rows[4] = state);
-        });
+        let stuck = spoil(move |world| world.faults.array.rows[4] = state);
+        break_and_time(rig, &format!("row {state:?}"), every, &of_array, TWO_FRAMES_US, stuck);
     }
-    break_and_time(rig, "saturated", every, &of_array, TWO_FRAMES_US, |rig| {
-        world(rig, |world| world.faults.array.saturated = true);
-    });
+    let saturated = spoil(|world| world.faults.array.saturated = true);
+    break_and_time(rig, "saturated", every, &of_array, TWO_FRAMES_US, saturated);
     // All over the array, or as near to each other as they can be: read first, last or in the middle of a frame.
     for (state, first, apart) in
         [(Taxel::Dead, 0, 7), (Taxel::Shorted, 0, 7), (Taxel::Dead, 0, 1), (Taxel::Dead, 40, 1), (Taxel::Dead, 88, 1)]
     {
         let name = format!("12 taxels {state:?} from {first}, {apart} apart");
-        break_and_time(rig, &name, every, &[Number::ArrayBroken], TWO_FRAMES_US, |rig| {
-            world(rig, move |world| {
-                for place in (0..12).map(|taxel| first + taxel * apart) {
-                    world.faults.array.taxels[place / 10][place % 10] = state;
-                }
-            });
+        let taxels = spoil(move |world| {
+            for place in (0..12).map(|taxel| first + taxel * apart) {
+                world.faults.array.taxels[place / 10][place % 10] = state;
+            }
         });
+        break_and_time(rig, &name, every, &[Number::ArrayBroken], TWO_FRAMES_US, taxels);
     }
     break_and_time(rig, "encoder frozen, goal to 4 N", PHASES, &[Number::EncoderFrozen], 20_000.0, |rig| {
-        world(rig, |world| world.faults.encoder_frozen = true);
+        spoil(|world| world.faults.encoder_frozen = true)(rig);
         write_goal(rig, 4_000);
     });
-    break_and_time(rig, "supply", PHASES, &[Number::SupplyLow], 1_000.0, |rig| {
-        world(rig, |world| world.faults.supply_drop_v = 2.0);
-    });
-    break_and_time(rig, "nFAULT", PHASES, &[Number::Bridge], TWO_FRAMES_US, |rig| {
-        rig.inject(Fault::BridgeFault).expect("it runs");
-    });
+    let low = spoil(|world| world.faults.supply_drop_v = 2.0);
+    break_and_time(rig, "supply", PHASES, &[Number::SupplyLow], 1_000.0, low);
+    break_and_time(rig, "nFAULT", PHASES, &[Number::Bridge], TWO_FRAMES_US, inject(Fault::BridgeFault));
     a_silent_bus_releases_the_object_and_one_write_recovers(rig);
 }
 

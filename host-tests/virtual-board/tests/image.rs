@@ -3,13 +3,10 @@
 
 use crate::common::*;
 use bringup::judge::{Board, Verdict};
-use fingertip::params::Params;
-use fingertip::shipped::{Config, address};
-use sim::plant::Plant;
 use std::collections::HashMap;
 use std::time::Duration;
+use virtual_board::bringup as emulated;
 use virtual_board::report::Edge;
-use virtual_board::{Fault, Options, Rig, bringup as emulated};
 
 sim::sizes!(the_image_boots_repeats_scans_and_tells_how_the_board_is, boots(false), boots(true));
 
@@ -130,9 +127,9 @@ const SLOT_NS: u64 = 1_524 * 1_000 / 168;
 
 /// Runs on for some ms and takes the edges of these pins.
 fn edges(rig: &mut Rig, ms: u64) -> Vec<(usize, Edge)> {
-    rig.with(|stand| stand.bench.front_end.lock().pin_edges = Some(Vec::new())).expect("it runs");
+    with(rig, |stand| stand.bench.front_end.lock().pin_edges = Some(Vec::new()));
     rig.run_ms(ms).expect("it runs");
-    rig.with(|stand| stand.bench.front_end.lock().pin_edges.take()).expect("it runs").expect("they were asked for")
+    with(rig, |stand| stand.bench.front_end.lock().pin_edges.take()).expect("they were asked for")
 }
 
 /// Times from each rise of a pin to its fall, and to the next rise, ns.
@@ -181,12 +178,10 @@ fn the_bridge_keeps_step_with_the_scan(rig: &mut Rig) {
         write_param(rig, "settle_ns", settle_ns);
         let params = Params { settle_ns: settle_ns as i32, ..Params::DEFAULT };
         let frame = Config::shipped(&params).expect("a scan").timing.frame().0;
-        let period = rig
-            .with(|stand| {
-                let (timer, registers) = stand.session.board_mut().pwm_timer();
-                timer.period_ticks(registers) as u32
-            })
-            .expect("it runs");
+        let period = with(rig, |stand| {
+            let (timer, registers) = stand.session.board_mut().pwm_timer();
+            timer.period_ticks(registers) as u32
+        });
         let fits = frame.is_multiple_of(period) && (4_200..=8_400).contains(&period);
         assert!(fits, "{period} ticks in a frame of {frame}");
     }
@@ -213,7 +208,7 @@ fn two_runs_have_one_trace_also_on_a_slow_machine(quick: &mut Rig, twice: bool) 
     assert!((0.9..1.1).contains(&force_n), "{force_n} N: the tip holds what was asked for");
     let duties = quick.latency().expect("it runs").frames;
     assert!(duties > 1_000, "{duties} duties");
-    let records = quick.with(|stand| stand.bench.trace.records).expect("it runs");
+    let records = with(quick, |stand| stand.bench.trace.records);
     assert!(records > 2 * duties, "{records} records");
     if twice {
         let slow = &mut eventful(Duration::from_secs(4));

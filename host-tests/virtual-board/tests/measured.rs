@@ -4,12 +4,9 @@
 use crate::common::*;
 use fingertip::capture::{CaptureState, Ended, Head};
 use fingertip::measure::{MeasureState, Task};
-use fingertip::params::Params;
-use fingertip::shipped::{CAPTURE_BYTES, CLOCKS, COLUMNS, ROWS, address};
-use fingertip::state::Mode;
+use fingertip::shipped::CAPTURE_BYTES;
 use replay::{Replayed, replay};
 use solve::record::{self, Reason};
-use virtual_board::Rig;
 
 const LONGEST_MS: u64 = 20_000;
 

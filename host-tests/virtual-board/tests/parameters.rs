@@ -1,16 +1,10 @@
 //! Parameters in the flash of the emulated board: sectors that take turns, and words that take as long as they may.
 
 use crate::common::*;
-use fingertip::link::table::address;
-use fingertip::shipped::Record;
-use fingertip::state::{Fault, Mode};
+use fingertip::state::Fault;
 use fingertip::store::SLOT_BYTES;
-use rigless::soc::Width;
 use sim::encode;
-use sim::plant::Setup;
 use virtual_board::flash::{ERASE_NS, OTHER_SECTOR, SECTOR};
-use virtual_board::rig::Stand;
-use virtual_board::{Options, Rig};
 
 const SECTOR_BYTES: usize = 128 << 10;
 const ERASED: u8 = 0xff;
@@ -35,13 +29,13 @@ fn filled(count: usize, first_sequence: u32) -> Vec<u8> {
 /// A board that needs the longest time for each word.
 fn start() -> Rig {
     let mut rig = running(&Setup::default(), &Options::default());
-    rig.with(|stand| stand.bench.flash.word_ns = WORD_MAX_NS).expect("it runs");
+    with(&mut rig, |stand| stand.bench.flash.word_ns = WORD_MAX_NS);
     rig
 }
 
 /// Puts bytes at the begin of both sectors, and lets the board start with them.
 fn start_with(rig: &mut Rig, first: Vec<u8>, other: Vec<u8>) {
-    rig.with(|stand| {
+    with(rig, |stand| {
         for (sector, mut bytes) in [(SECTOR, first), (OTHER_SECTOR, other)] {
             bytes.resize(SECTOR_BYTES, ERASED);
             for (address, word) in sector.step_by(8).zip(bytes.as_chunks().0) {
@@ -51,8 +45,7 @@ fn start_with(rig: &mut Rig, first: Vec<u8>, other: Vec<u8>) {
                 }
             }
         }
-    })
-    .expect("it runs");
+    });
     reboot(rig, 0);
 }
 
@@ -69,7 +62,7 @@ fn pitch_um(rig: &mut Rig) -> u32 {
 }
 
 fn words_and_erases(rig: &mut Rig) -> (u64, u64) {
-    rig.with(|stand| (stand.bench.flash.words, stand.bench.flash.erases)).expect("it runs")
+    with(rig, |stand| (stand.bench.flash.words, stand.bench.flash.erases))
 }
 
 sim::sizes!(stored_parameters_outlive_long_times_full_sectors_and_damage, outlive(false), outlive(true));
@@ -140,8 +133,8 @@ fn nearly_full_sectors_take_turns(rig: &mut Rig) {
     set_and_save(rig, 2_001);
     set_and_save(rig, 2_002);
     assert_eq!(read_u8(rig, address::SAVED_STATE), 0, "the same as the flash");
-    let begins = |stand: &mut Stand<'_>| stand.host.read(OTHER_SECTOR.start, Width::W32).unwrap_or(0) as u32;
-    assert_eq!(rig.with(begins).expect("it runs").to_le_bytes(), *b"FTPR");
+    let begin = with(rig, |stand| stand.host.read(OTHER_SECTOR.start, Width::W32).unwrap_or(0) as u32);
+    assert_eq!(begin.to_le_bytes(), *b"FTPR");
     reboot(rig, START_MS);
     assert_eq!((pitch_um(rig), read_u8(rig, address::FAULT)), (2_002, 0));
     assert_eq!(words_and_erases(rig).1, erases_before + 1, "the sector with room is not erased");
@@ -176,7 +169,7 @@ fn messages_of_a_start(rig: &mut Rig, stored: Vec<u8>) -> usize {
         stand.bench.log.messages
     };
     start_with(rig, stored, Vec::new());
-    let before = rig.with(messages).expect("it runs");
+    let before = with(rig, messages);
     rig.run_ms(START_MS).expect("it runs");
-    rig.with(messages).expect("it runs") - before
+    with(rig, messages) - before
 }

@@ -1,11 +1,8 @@
 //! Temperature and analogue supply as the board measures them, and the drift that it computes from them.
 
-use crate::common::{drive, image, poke, read_u16, read_u32, write_and_run_ms, write_param, write_u8};
+use crate::common::*;
 use fingertip::chip::Factory;
-use fingertip::params::Params;
-use fingertip::shipped::{Record, address};
 use virtual_board::scene::finger::{Clock, Finger};
-use virtual_board::{Error, Options, Rig, converter};
 
 const GAIN_PPM_PER_K: i32 = 3_600;
 const ZERO_PA_PER_K: i32 = 10;
@@ -27,7 +24,7 @@ fn drift_mn(rig: &mut Rig) -> i32 {
 }
 
 /// A finger whose array and microcontroller warm by 20 K: an hour in the hot in seconds.
-fn warming(factory: Factory) -> Rig {
+fn warming(factory: Option<Factory>) -> Rig {
     let params = Params {
         direction_confirmed: 1,
         array_gain_ppm_per_k: GAIN_PPM_PER_K,
@@ -49,12 +46,12 @@ fn warming(factory: Factory) -> Rig {
 
 fn true_c(rig: &mut Rig) -> f64 {
     let now_ns = rig.now_ns();
-    rig.with(move |stand| stand.bench.front_end.lock().world.chip_c(now_ns)).expect("it runs")
+    with(rig, move |stand| stand.bench.front_end.lock().world.chip_c(now_ns))
 }
 
 #[test]
 fn the_board_measures_its_temperature_and_the_force_s_drift() {
-    let mut rig = warming(converter::factory());
+    let mut rig = warming(None);
     assert!(matches!(rig.world(|world| world.force_n()), Err(Error::OtherWorld)));
     codes_that_stay_away_are_no_temperature_and_the_finger_holds_on(&mut rig);
     the_means_go_on_where_the_scan_starts_again(&mut rig);
@@ -112,7 +109,7 @@ fn the_bus_tells_the_chip_s_temperature_and_the_drift(rig: &mut Rig) {
 
 #[test]
 fn without_the_factory_s_codes_there_is_no_temperature_and_no_term() {
-    let rig = &mut warming(Factory { reference: 0xffff, sensor: [0xffff; 2] });
+    let rig = &mut warming(Some(Factory { reference: 0xffff, sensor: [0xffff; 2] }));
     rig.run_ms(200).expect("it runs");
     assert_eq!((chip_mc(rig), drift_mn(rig)), (UNMEASURED_MC, 0));
     assert_eq!(read_u16(rig, address::ANALOGUE_SUPPLY_MV), 0);

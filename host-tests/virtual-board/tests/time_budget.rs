@@ -3,10 +3,6 @@
 use crate::common::*;
 use fingertip::capture::CaptureState;
 use fingertip::contact::FitLevel;
-use fingertip::params::Params;
-use fingertip::shipped::{Record, address};
-use fingertip::state::{Limits, Mode};
-use virtual_board::{Options, Rig};
 
 /// Curve, creep and gain over temperature, as of a sensor that was measured. The winding's estimate is on by default.
 const CORRECTED: Params = Params {
@@ -135,6 +131,6 @@ fn a_change_of_the_fit_level_does_not_stop_the_scan(rig: &mut Rig) {
     let (to_ns, to) = (rig.now_ns(), read_u32(rig, address::FRAME_COUNTER));
     let (scanned, stepped) = ((to_ns - from_ns) / frame_ns, u64::from(to - from));
     assert!(stepped > 20 && scanned.abs_diff(stepped) <= 12, "{stepped} of {scanned} frames");
-    assert_eq!(read_u8(rig, address::PRESENT_MODE), fingertip::state::Mode::Force as u8);
+    assert_eq!(read_u8(rig, address::PRESENT_MODE), Mode::Force as u8);
     said(rig);
 }

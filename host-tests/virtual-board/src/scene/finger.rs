@@ -381,18 +381,14 @@ impl SharedWorld {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sim::effects::Parts;
-    use sim::world::Surroundings;
 
     const DRIVEN: fn(f64) -> Bridge = |duty| Bridge::Driven { duty };
 
     fn two() -> Vec<Joint> {
         let text = "about = \"two\"\nduration_s = 1.0\n[hand]\nfingers = 2\n";
         let scene = sim::scene::read("test.toml", text).unwrap_or_else(|errors| panic!("{errors}"));
-        let effects = (0..2).map(|finger| Parts::of(&scene, finger));
-        let effects = effects.map(|Parts { drive, contact, .. }| (drive, contact)).collect();
-        let world = World::new(&scene.setup(), &Surroundings::of(&scene), effects);
-        Joint::all(&scene, world, 0.0).expect("the world is sound")
+        let fingers = Finger::all(&scene, Clock::new(0), 0.0).expect("the world is sound");
+        fingers.into_iter().map(|finger| finger.joint).collect()
     }
 
     #[test]

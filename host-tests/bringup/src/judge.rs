@@ -1,12 +1,14 @@
 //! The report of a board, judged.
 
+use crate::FRAMES;
 use crate::checks::{self, Check};
-use crate::listen::Report;
+use crate::listen::{Report, listen};
+use output::{kept, say};
 use serde::Serialize;
 use std::collections::HashMap;
 use std::fs;
-use std::io::Error;
-use std::path::Path;
+use std::io::{Error, Read, Write};
+use std::path::{Path, PathBuf};
 
 /// Version of the JSON file's fields.
 const SCHEMA_VERSION: u32 = 1;
@@ -79,8 +81,46 @@ pub struct Judgement {
     pub kernels: Vec<Kernel>,
 }
 
+/// Number of frames for which the rows of the emulated board are read back.
+const FRAMES_EMULATED: u32 = 1_000;
+
+/// Options of a program that judges a board.
+#[derive(Debug, Default, clap::Args)]
+pub struct Options {
+    /// Number of frames for which the rows are read back; by default a million on a NUCLEO, a thousand emulated.
+    #[arg(long)]
+    pub frames: Option<u32>,
+    /// Estimated cycles, a line `CYCLES KERNEL` each.
+    #[arg(long, value_name = "FILE")]
+    pub estimates: Option<PathBuf>,
+    /// Writes the figures to this file.
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+}
+
+impl Options {
+    /// Takes the report of a board at a port, judges it, writes the figures, and prints the table.
+    pub fn judge(&self, port: &mut (impl Read + Write), board: Board, sha256: String) -> Result<Judgement, Error> {
+        let estimates = self.estimates.as_deref().map(estimates).transpose()?.unwrap_or_default();
+        let frames = if board == Board::Emulated { FRAMES_EMULATED } else { FRAMES };
+        let report = listen(port, self.frames.unwrap_or(frames), &mut |said| say::line(said))?;
+        let judgement = judge(&report, board, sha256, &estimates);
+        // First, as the reader of the output may close the pipe.
+        self.json.iter().try_for_each(|path| write(path, &judgement))?;
+        say::text(judgement.text());
+        Ok(judgement)
+    }
+}
+
+/// Writes figures as JSON.
+pub fn write(path: &Path, figures: &impl Serialize) -> Result<(), Error> {
+    let written = serde_json::to_string_pretty(figures).map_err(Error::from);
+    let written = written.and_then(|text| kept::write(path, text + "\n"));
+    written.map_err(|why| Error::new(why.kind(), format!("cannot write {}: {why}", path.display())))
+}
+
 /// Estimated cycles by kernel, of a file with a line `CYCLES KERNEL` each.
-pub fn estimates(path: &Path) -> Result<HashMap<String, f64>, Error> {
+fn estimates(path: &Path) -> Result<HashMap<String, f64>, Error> {
     let wrong = |why: &str| Error::other(format!("{}: {why}", path.display()));
     let text = fs::read_to_string(path).map_err(|error| wrong(&error.to_string()))?;
     let line = |line: &str| {

@@ -41,21 +41,12 @@ pub fn listen(port: &mut (impl Read + Write), frames: u32, progress: &mut dyn Fn
                     None => Err(Error::other("the report has no beginning: try again")),
                 };
             }
-            let begins = taken.strip_prefix("bringup ");
-            if begins.is_some() {
-                (report, check) = (Some(Report::default()), CHECK);
+            if let Some(begins) = taken.strip_prefix("bringup ") {
+                (report, check) = (Some(Report { uid: uid(begins)?, ..Report::default() }), CHECK);
+            } else if !report.as_mut().is_some_and(|report| report.take(&taken)) {
+                continue;
             }
-            let Some(report) = &mut report else { continue };
-            let known = match begins {
-                Some(begins) => {
-                    report.uid = uid(begins)?;
-                    true
-                }
-                None => report.take(&taken),
-            };
-            if known {
-                check = taken.bytes().chain([b'\n']).fold(check, checked);
-            }
+            check = taken.bytes().chain([b'\n']).fold(check, checked);
         }
     }
 }

@@ -1,11 +1,10 @@
 //! The image of `cargo xtask bringup` on the emulated board, listened to as on a NUCLEO's virtual COM port.
 
-use crate::image::Flashable;
+use crate::image::hex;
 use crate::{Error, Options, Rig};
-use bringup::judge::{Board, Judgement, judge};
-use bringup::listen::listen;
+use bringup::judge::{self, Board, Judgement};
 use sim::plant::{Plant, Setup};
-use std::collections::{HashMap, VecDeque};
+use std::collections::VecDeque;
 use std::io::{self, Read, Write};
 use std::path::Path;
 
@@ -13,27 +12,21 @@ use std::path::Path;
 const SILENT_MS: u64 = 60_000;
 
 /// Runs the image to the end of its report and judges that.
-pub fn run(
-    image: &Path,
-    options: &Options,
-    frames: u32,
-    estimates: &HashMap<String, f64>,
-    progress: &mut dyn FnMut(&str),
-) -> Result<(Judgement, Rig), Error> {
-    let mut rig = Rig::new(image, Plant::new(&Setup::default()), options)?;
-    let flash = Flashable::of(rig.image())?;
-    flash.check_loaded(&mut rig)?;
-    let report = listen(&mut Port { rig: &mut rig, heard: VecDeque::new() }, frames, progress)?;
-    Ok((judge(&report, Board::Emulated, flash.sha256(), estimates), rig))
+pub fn run(image: &Path, options: &judge::Options) -> Result<(Judgement, Rig), Error> {
+    let mut rig = Rig::new(image, Plant::new(&Setup::default()), &Options::default())?;
+    let sha256 = hex(&rigless::snapshot::digest(&rig.flashed()?));
+    let mut port = Port { rig, heard: VecDeque::new() };
+    let judgement = options.judge(&mut port, Board::Emulated, sha256)?;
+    Ok((judgement, port.rig))
 }
 
 /// The far end of the port; to read runs the board.
-struct Port<'a> {
-    rig: &'a mut Rig,
+struct Port {
+    rig: Rig,
     heard: VecDeque<u8>,
 }
 
-impl Read for Port<'_> {
+impl Read for Port {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         for _ in 0..SILENT_MS {
             if !self.heard.is_empty() {
@@ -47,7 +40,7 @@ impl Read for Port<'_> {
     }
 }
 
-impl Write for Port<'_> {
+impl Write for Port {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.rig.send(bytes).map_err(io::Error::other)?;
         Ok(bytes.len())

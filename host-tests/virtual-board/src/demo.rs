@@ -3,15 +3,13 @@
 //! The host sees the board only over its bus; the figures are of the simulated world's true force. A second run of the
 //! same scene must leave the same trace.
 
-use crate::front_end::ScanCounts;
-use crate::image::Flashable;
+use crate::image::hex;
 use crate::scene::{Boards, simulate};
 use crate::{Error, Rig};
 use fingertip::shipped::address;
 use output::say;
 use serde::Serialize;
 use sim::demo::{self, Check, Forces, Run, Trace};
-use sim::watch::Summary;
 use std::path::Path;
 use std::thread::JoinHandle;
 use std::time::Instant;
@@ -26,44 +24,62 @@ pub fn run(image: &Path, quick: bool) -> Result<(Figures, Run), Error> {
     });
 
     let mut boards = Boards::power_on(image, &scene)?;
-    let flash = Flashable::of(boards.rigs[0].image())?;
-    flash.check_loaded(&mut boards.rigs[0])?;
+    let flash = boards.rigs[0].flashed()?;
     let from = Counts::of(&mut boards.rigs[0])?;
     let mut trace = Trace::new(&scene);
     let summary = boards.run(&scene, &mut trace)?;
-    let rig: &mut Rig = &mut boards.rigs[0];
+    let rig = &mut boards.rigs[0];
     let to = Counts::of(rig)?;
     let awaited = |repeat: JoinHandle<_>| {
         say::line("waiting for the same run once more, to compare the traces");
         repeat.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     };
-    let repeated = repeat.map(awaited).transpose()?;
+    let repeated_trace_sha256 = repeat.map(awaited).transpose()?;
     let run = trace.finish()?;
-    let mut figures = Figures::of(&run, [&from, &to], rig, &flash, summary, repeated)?;
-    figures.wall_time_s = begun.elapsed().as_secs_f64();
+    let frames = to.frames - from.frames;
+    let latency = rig.latency()?;
+    // The last request of the scene's host is answered after this time.
+    rig.run_ms(QUIET_MS)?;
+    rig.take_received()?;
+    let loop_time = rig.read(address::LOOP_TIME_MAX_US, 2)?;
+    let mut figures = Figures {
+        image_sha256: hex(&rigless::snapshot::digest(&flash)),
+        image_bytes: flash.len(),
+        virtual_time_s: summary.virtual_s,
+        wall_time_s: begun.elapsed().as_secs_f64(),
+        frames,
+        frame_rate_hz: frames as f64 / ((to.at_ns - from.at_ns) as f64 * 1e-9),
+        missed_frames: run.missed_frames,
+        latency_us: Range { least: latency.min_ns as f64 * 1e-3, largest: latency.max_ns as f64 * 1e-3 },
+        loop_time_max_us: u16::from_le_bytes([loop_time[0], loop_time[1]]),
+        instructions_a_frame: (to.instructions - from.instructions) as f64 / frames as f64,
+        forces: Forces::of(&run)?,
+        trace_sha256: summary.digest,
+        repeated_trace_sha256,
+        checks: Vec::new(),
+    };
+    // The last frame may be under way at either instant.
+    let unanswered = (frames + from.duties).abs_diff(to.duties).saturating_sub(2);
+    figures.checks = figures.checked(unanswered, rig.gaps()?.len());
     Ok((figures, run))
 }
 
 /// Pause of the line after the last request, ms.
 const QUIET_MS: u64 = 2;
 
-#[derive(Clone, Copy, Debug)]
-pub struct Counts {
+/// Counts of a board since power-on.
+struct Counts {
     at_ns: u64,
-    scans: ScanCounts,
-    instructions: u64,
+    frames: u64,
     duties: u64,
+    instructions: u64,
 }
 
 impl Counts {
-    pub fn of(rig: &mut Rig) -> Result<Self, Error> {
-        let (at_ns, duties) = (rig.now_ns(), rig.latency()?.frames);
-        Ok(Self {
-            at_ns,
-            scans: rig.scan_counts()?,
-            instructions: rig.with(|stand| stand.stop.instruction_count)?,
-            duties,
-        })
+    fn of(rig: &mut Rig) -> Result<Self, Error> {
+        let instructions = rig.with(|stand| stand.stop.instruction_count)?;
+        let (frames, duties) = (rig.scan_counts()?.frames, rig.latency()?.frames);
+        Ok(Self { at_ns: rig.now_ns(), frames, duties, instructions })
     }
 }
 
@@ -102,45 +118,6 @@ pub struct Range {
 }
 
 impl Figures {
-    /// Computes the figures of a run between two instants, each against its bound.
-    pub fn of(
-        run: &Run,
-        [from, to]: [&Counts; 2],
-        rig: &mut Rig,
-        flash: &Flashable,
-        summary: Summary,
-        repeated_trace_sha256: Option<String>,
-    ) -> Result<Self, Error> {
-        let forces = Forces::of(run)?;
-        let frames = to.scans.frames - from.scans.frames;
-        let latency = rig.latency()?;
-        // The last request of the scene's host is answered after this time.
-        rig.run_ms(QUIET_MS)?;
-        rig.take_received()?;
-        let loop_time = rig.read(address::LOOP_TIME_MAX_US, 2)?;
-        let mut figures = Self {
-            image_sha256: flash.sha256(),
-            image_bytes: flash.bytes.len(),
-            virtual_time_s: summary.virtual_s,
-            wall_time_s: 0.0,
-            frames,
-            frame_rate_hz: frames as f64 / ((to.at_ns - from.at_ns) as f64 * 1e-9),
-            missed_frames: run.missed_frames,
-            latency_us: Range { least: latency.min_ns as f64 * 1e-3, largest: latency.max_ns as f64 * 1e-3 },
-            loop_time_max_us: u16::from_le_bytes([loop_time[0], loop_time[1]]),
-            instructions_a_frame: (to.instructions - from.instructions) as f64 / frames as f64,
-            forces,
-            trace_sha256: summary.digest,
-            repeated_trace_sha256,
-            checks: Vec::new(),
-        };
-        // The last frame may be under way at either instant.
-        let unanswered = (frames + from.duties).abs_diff(to.duties).saturating_sub(2);
-        let unknown_gaps = rig.gaps()?.len();
-        figures.checks = figures.checked(unanswered, unknown_gaps);
-        Ok(figures)
-    }
-
     fn checked(&self, unanswered: u64, unknown_gaps: usize) -> Vec<Check> {
         let at_most = |most: f64| [None, Some(most)];
         let within = |least: f64, most: f64| [Some(least), Some(most)];

@@ -34,40 +34,27 @@ impl Firmware {
     }
 }
 
-// Bytes of the flash: those that the emulated board runs, and that a probe would write.
-
 /// Address of the first byte of flash.
 const FLASH: u64 = 0x0800_0000;
 
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Flashable {
-    /// Bytes from the first address of the flash on.
-    pub bytes: Vec<u8>,
+/// Bytes in hexadecimal.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-impl Flashable {
-    /// Reads the bytes that `cargo xtask build` writes beside an image.
-    pub fn of(image: &Firmware) -> Result<Self, Error> {
-        let path = image.path.with_extension("bin");
+impl Rig {
+    /// Bytes from the first address of the flash on, which `cargo xtask build` writes beside an image. Fails if the
+    /// emulated flash does not hold exactly these.
+    pub fn flashed(&mut self) -> Result<Vec<u8>, Error> {
+        let path = self.image().path.with_extension("bin");
         let bytes = std::fs::read(&path).map_err(|why| Error::ReadImage(path, why))?;
-        Ok(Self { bytes })
-    }
-
-    pub fn sha256(&self) -> String {
-        rigless::snapshot::digest(&self.bytes).iter().map(|byte| format!("{byte:02x}")).collect()
-    }
-
-    /// Checks that the emulated flash holds exactly these bytes.
-    pub fn check_loaded(&self, rig: &mut Rig) -> Result<(), Error> {
-        let bytes = self.bytes.clone();
-        let path = rig.image().path.clone();
-        let differs = rig.with(move |stand| {
-            let mut places = (FLASH..).zip(bytes);
+        let mut places = (FLASH..).zip(bytes.clone());
+        let differs = self.with(move |stand| {
             places.find(|(at, byte)| stand.host.read(*at, Width::W8).ok() != Some(u64::from(*byte)))
         })?;
-        match differs {
-            None => Ok(()),
-            Some((at, _)) => Err(Error::NotAnImage(path, format!("the emulated flash differs from it at {at:#010x}"))),
-        }
+        differs.map_or(Ok(bytes), |(at, _)| {
+            let why = format!("the emulated flash differs from it at {at:#010x}");
+            Err(Error::NotAnImage(self.image().path.clone(), why))
+        })
     }
 }

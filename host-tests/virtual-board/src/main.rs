@@ -1,7 +1,8 @@
 //! `virtual-board`: the flash image on the emulated board.
 
+use ::bringup::judge;
 use clap::{Parser, Subcommand};
-use output::{kept, say};
+use output::say;
 use serve::{Place, Port};
 use sim::demo::{draw, missed, table};
 use sim::plant::{Plant, Setup};
@@ -29,17 +30,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Runs the image of `cargo xtask bringup` and judges its report.
-    Bringup {
-        /// Number of frames for which the rows are read back.
-        #[arg(long, default_value_t = 1_000)]
-        frames: u32,
-        /// Estimated cycles, a line `CYCLES KERNEL` each.
-        #[arg(long, value_name = "FILE")]
-        estimates: Option<PathBuf>,
-        /// Writes the figures to this file.
-        #[arg(long, value_name = "FILE")]
-        json: Option<PathBuf>,
-    },
+    Bringup(judge::Options),
     /// Touches an object, holds forces, releases it; checks the figures and draws pictures.
     Demo {
         /// Writes the figures to this file.
@@ -75,7 +66,7 @@ enum Command {
 fn main() -> ExitCode {
     let Arguments { image, command } = Arguments::parse();
     let result = match command {
-        Command::Bringup { frames, estimates, json } => bringup(&image, frames, estimates.as_deref(), json.as_deref()),
+        Command::Bringup(options) => bringup(&image, &options),
         Command::Demo { json, out, quick } => demo(&image, json.as_deref(), &out, quick),
         Command::Serve { pty, tcp, distance_mm } => {
             serve(&image, &tcp.map_or_else(|| Place::Pty(pty), Place::Tcp), distance_mm)
@@ -108,20 +99,9 @@ fn main() -> ExitCode {
 /// Time after which an answer is reported as late: the shortest time-out of the known clients.
 const LATE: Duration = Duration::from_millis(10);
 
-fn bringup(image: &Path, frames: u32, estimates: Option<&Path>, json: Option<&Path>) -> Result<(), Error> {
-    let estimates = estimates.map(::bringup::judge::estimates).transpose()?.unwrap_or_default();
-    let told = &mut |said: &str| say::line(said);
-    let (judgement, _) = virtual_board::bringup::run(image, &Options::default(), frames, &estimates, told)?;
-    json.map_or(Ok(()), |path| write(path, &judgement))?;
-    say::text(judgement.text());
+fn bringup(image: &Path, options: &judge::Options) -> Result<(), Error> {
+    let (judgement, _) = virtual_board::bringup::run(image, options)?;
     if judgement.failed == 0 { Ok(()) } else { Err(Error::Failed(judgement.failed)) }
-}
-
-/// Writes figures as JSON.
-fn write(path: &Path, figures: &impl serde::Serialize) -> Result<(), std::io::Error> {
-    let written = serde_json::to_string_pretty(figures).map_err(std::io::Error::from);
-    let written = written.and_then(|text| kept::write(path, text + "\n"));
-    written.map_err(|why| std::io::Error::new(why.kind(), format!("cannot write {}: {why}", path.display())))
 }
 
 /// Runs it, prints the table, writes figures and pictures.
@@ -129,7 +109,7 @@ fn demo(image: &Path, json: Option<&Path>, out: &Path, quick: bool) -> Result<()
     let (figures, run) = demo::run(image, quick)?;
     // The files first: the reader of the output may close the pipe.
     let drawn = draw(&run, &figures.forces, out);
-    json.map_or(Ok(()), |path| write(path, &figures))?;
+    json.map_or(Ok(()), |path| judge::write(path, &figures))?;
     say::line(format_args!("sha-256  {} ({} bytes, as flashed)\n", figures.image_sha256, figures.image_bytes));
     say::text(table(&figures.checks));
     say::line(format_args!("\ntrace    {}", figures.trace_sha256));

@@ -2,8 +2,7 @@
 //! The image of `cargo xtask bringup`: what the board can show passes, and all else is told.
 
 use crate::common::*;
-use bringup::judge::{Board, Verdict};
-use std::collections::HashMap;
+use bringup::judge::{self, Board, Verdict};
 use std::time::Duration;
 use virtual_board::bringup as emulated;
 use virtual_board::report::Edge;
@@ -227,10 +226,8 @@ const NOT_SHOWN: &str = "hse_mhz lsi_khz flash_word_us flash_erase_ms noise_pref
 #[ignore = "long: cargo xtask test --long"]
 fn long_what_the_emulated_board_can_show_passes() {
     let image = named("FINGERTIP_BRINGUP");
-    let told = &mut |said: &str| println!("{said}");
-    let options = Options::default();
-    let (judgement, mut rig) = emulated::run(&image, &options, 200, &HashMap::new(), told).expect("it reports");
-    println!("{}", judgement.text());
+    let options = judge::Options { frames: Some(200), ..judge::Options::default() };
+    let (judgement, mut rig) = emulated::run(&image, &options).expect("it reports");
     assert_eq!((judgement.board, judgement.failed), (Board::Emulated, 0));
     let unshown = judgement.checks.iter().filter(|check| check.verdict == Verdict::NotShown);
     assert_eq!(unshown.map(|check| check.name.as_str()).collect::<Vec<_>>().join(" "), NOT_SHOWN);

@@ -70,8 +70,7 @@ fn main() -> ! {
             boot.crash.cause as u8, boot.crash.line, boot.crash.pc
         )),
         Stage::Waits => {}
-        Stage::Window => stages::window(kept, p.IWDG, p.WWDG, config.timing),
-        Stage::Independent => stages::independent(kept, p.IWDG, p.WWDG, config.timing),
+        Stage::Window | Stage::Independent => stages::bite(kept, p.IWDG, p.WWDG, config.timing),
         Stage::Foot => stages::foot(kept),
         Stage::Rest => {}
     }
@@ -136,4 +135,15 @@ fn count_cycles() {
 /// True once the given number of cycles passed since then.
 fn passed(since: u32, cycles: u32) -> bool {
     DWT::cycle_count().wrapping_sub(since) >= cycles
+}
+
+/// Looks until there is something, at most this many milliseconds long.
+fn wait_for<T>(ms: u32, mut look: impl FnMut() -> Option<T>) -> Option<T> {
+    let since = DWT::cycle_count();
+    loop {
+        let found = look();
+        if found.is_some() || passed(since, ms * 1_000 * CYCLES_PER_US) {
+            return found;
+        }
+    }
 }

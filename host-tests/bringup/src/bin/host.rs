@@ -1,12 +1,11 @@
 //! `bringup-host`: takes the report of a board at a serial port and judges it.
 
-use bringup::judge::{Board, estimates, judge};
-use bringup::listen::listen;
-use bringup::{BAUD, FRAMES};
+use bringup::BAUD;
+use bringup::judge::{Board, Options};
 use clap::Parser;
+use output::say;
 use serial2::SerialPort;
-use std::error::Error;
-use std::fs;
+use std::io::Error;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -23,40 +22,25 @@ struct Arguments {
     /// SHA-256 of the flashed image.
     #[arg(long, value_name = "SHA-256")]
     sha256: String,
-    /// Number of frames for which the rows are read back.
-    #[arg(long, default_value_t = FRAMES)]
-    frames: u32,
-    /// Estimated cycles, a line `CYCLES KERNEL` each.
-    #[arg(long, value_name = "FILE")]
-    estimates: Option<PathBuf>,
-    /// Writes the figures to this file.
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    options: Options,
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
+    match run(Arguments::parse()) {
+        Ok(0) if say::end() => ExitCode::SUCCESS,
+        Ok(_) => ExitCode::FAILURE,
         Err(error) => {
-            eprintln!("error: {error}");
+            say::aside(format_args!("error: {error}"));
             ExitCode::from(2)
         }
     }
 }
 
-/// True if nothing fails.
-fn run(arguments: &Arguments) -> Result<bool, Box<dyn Error>> {
-    let Arguments { port, sha256, frames, estimates: path, json } = arguments;
-    let mut port = SerialPort::open(port, BAUD).map_err(|error| format!("{}: {error}", port.display()))?;
+/// Returns the number of failed checks.
+fn run(Arguments { port, sha256, options }: Arguments) -> Result<usize, Error> {
+    let named = |error: Error| Error::new(error.kind(), format!("{}: {error}", port.display()));
+    let mut port = SerialPort::open(&port, BAUD).map_err(named)?;
     port.set_read_timeout(SILENT)?;
-    let report = listen(&mut port, *frames, &mut |said| println!("{said}"))?;
-    let estimates = path.as_deref().map(estimates).transpose()?.unwrap_or_default();
-    let judgement = judge(&report, Board::Silicon, sha256.clone(), &estimates);
-    print!("{}", judgement.text());
-    if let Some(path) = json {
-        let text = serde_json::to_string_pretty(&judgement)? + "\n";
-        fs::write(path, text).map_err(|error| format!("{}: {error}", path.display()))?;
-    }
-    Ok(judgement.failed == 0)
+    Ok(options.judge(&mut port, Board::Silicon, sha256)?.failed)
 }

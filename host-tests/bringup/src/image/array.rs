@@ -4,7 +4,7 @@
 
 use crate::board::analogue::Analogue;
 use crate::board::{health, scan};
-use crate::{CYCLES_PER_US, passed, report};
+use crate::{CYCLES_PER_US, passed, report, wait_for};
 use bringup::script::Bench;
 use cortex_m::peripheral::DWT;
 use embassy_stm32::interrupt::{self, InterruptExt};
@@ -148,11 +148,11 @@ fn deviation(scan: &mut scan::Scan, bench: &mut Bench, pipeline: &mut Pipeline) 
     let mut frame = Frame::EMPTY;
     for _ in 0..SAMPLES {
         let before = scan::newest();
-        wait_until(|| {
+        let newest = wait_for(1, || {
             bench.record(pipeline);
-            scan::newest() != before
+            Some(scan::newest()).filter(|newest| *newest != before)
         })?;
-        if scan.copy(scan::newest(), &mut frame) {
+        if scan.copy(newest, &mut frame) {
             let code = u64::from(frame.code(ROWS, COLUMN));
             (count, sum, squares) = (count + 1, sum + code, squares + code * code);
         }
@@ -190,31 +190,18 @@ pub fn sample_instant(scan: &mut scan::Scan, timing: ScanTiming) {
 fn step_at(scan: &mut scan::Scan, at: u16) -> Option<(u16, u16)> {
     let set = |code: u16| pac::DAC1.dhr12r(0).write(|w| w.set_dhr(code));
     let stepped = cortex_m::interrupt::free(|_| {
+        let in_slot = |is: bool| ((pac::GPIOB.odr().read().0 & ALL == 1 << SLOT) == is).then_some(());
         set(0);
-        wait_until(|| pac::GPIOB.odr().read().0 & ((1 << ROWS) - 1) == 1 << SLOT)?;
-        let mut now = 0;
-        wait_until(|| {
-            now = pac::TIM8.cnt().read().cnt();
-            now >= at
-        })?;
+        wait_for(1, || in_slot(true))?;
+        let now = wait_for(1, || Some(pac::TIM8.cnt().read().cnt()).filter(|now| *now >= at))?;
         set(STEP);
-        wait_until(|| pac::GPIOB.odr().read().0 & ((1 << ROWS) - 1) != 1 << SLOT)?;
+        wait_for(1, || in_slot(false))?;
         set(0);
         Some(now)
     })?;
     // What waited for the interrupts is counted by now: the frame with the step is the next to be complete.
     let before = scan::newest();
     let mut frame = Frame::EMPTY;
-    wait_until(|| scan::newest() != before)?;
-    scan.copy(scan::newest(), &mut frame).then(|| (stepped, frame.code(SLOT, COLUMN)))
-}
-
-fn wait_until(mut holds: impl FnMut() -> bool) -> Option<()> {
-    let since = DWT::cycle_count();
-    while !holds() {
-        if passed(since, 1_000 * CYCLES_PER_US) {
-            return None;
-        }
-    }
-    Some(())
+    let newest = wait_for(1, || Some(scan::newest()).filter(|newest| *newest != before))?;
+    scan.copy(newest, &mut frame).then(|| (stepped, frame.code(SLOT, COLUMN)))
 }

@@ -6,7 +6,7 @@ use fingertip::shipped::Pipeline;
 
 use crate::board::guard::Stopwatch;
 use crate::board::{scan, trace};
-use crate::{CYCLES_PER_US, passed, report};
+use crate::{CYCLES_PER_US, report, wait_for};
 
 /// Runs the script. The scan's own codes are left where they are.
 pub fn run(bench: &mut Bench, pipeline: &mut Pipeline) {
@@ -19,16 +19,8 @@ pub fn run(bench: &mut Bench, pipeline: &mut Pipeline) {
     let mut answer = Stopwatch::default();
     let mut answers = heapless::Vec::<_, 8>::new();
     while !bench.done() {
-        let since = DWT::cycle_count();
-        let newest = loop {
-            let newest = scan::newest();
-            if newest.sequence != seen {
-                break newest;
-            }
-            if passed(since, 10_000 * CYCLES_PER_US) {
-                return report::say(format_args!("the scan has stopped"));
-            }
-        };
+        let next = || Some(scan::newest()).filter(|newest| newest.sequence != seen);
+        let Some(newest) = wait_for(10, next) else { return report::say(format_args!("the scan has stopped")) };
         // The first may have waited.
         missed += if steps == 0 { 0 } else { newest.sequence.wrapping_sub(seen) - 1 };
         seen = newest.sequence;

@@ -5,7 +5,7 @@
 
 use crate::board::flash::Chip;
 use crate::board::guard;
-use crate::{CYCLES_PER_US, passed, report};
+use crate::{CYCLES_PER_US, passed, report, wait_for};
 use bringup::BAUD;
 use cortex_m::peripheral::DWT;
 use embassy_stm32::pac::gpio::vals::Pupdr;
@@ -157,19 +157,8 @@ fn at(baud: u32) -> u32 {
         // All of them, in an order in which neighbours differ in many bits.
         let byte = (byte * 151) as u8;
         report::send(byte);
-        let since = DWT::cycle_count();
-        let came = loop {
-            if let Some(came) = report::received() {
-                break Some(came);
-            }
-            if passed(since, 1_000 * CYCLES_PER_US) {
-                break None;
-            }
-        };
-        wrong += u32::from(came != Some(byte));
-        if came.is_none() {
-            return BYTES;
-        }
+        let Some(came) = wait_for(1, report::received) else { return BYTES };
+        wrong += u32::from(came != byte);
     }
     wrong
 }

@@ -23,6 +23,7 @@ pub enum Stage {
 }
 
 const MAGIC: u32 = 0x4252_5550;
+/// All stages, each at the place of its number.
 const STAGES: [Stage; 5] = [Stage::Waits, Stage::Window, Stage::Independent, Stage::Foot, Stage::Rest];
 /// Time after which a reset by a watchdog is no longer expected: twice the longest time of the independent one.
 const BITES_BY: u32 = 50_000 * CYCLES_PER_US;
@@ -30,14 +31,8 @@ const BITES_BY: u32 = 50_000 * CYCLES_PER_US;
 const TAKES_BY: u32 = 1_000 * CYCLES_PER_US;
 const BELOW_RAM: *mut u32 = 0x1FFF_FFFC as *mut u32;
 
-#[derive(Clone, Copy)]
-#[repr(C)]
-struct Words {
-    magic: u32,
-    stage: u32,
-    frames: u32,
-    cycles: [u32; 2],
-}
+/// The magic number, the stage, the frames, and the cycles of both watchdogs.
+type Words = [u32; 5];
 
 #[unsafe(link_section = ".uninit.bringup")]
 static mut KEPT: MaybeUninit<Words> = MaybeUninit::uninit();
@@ -58,17 +53,17 @@ impl Kept {
     /// Returns the kept state; `None` after a power-on.
     pub fn load(reset: ResetCause) -> Self {
         // SAFETY: any bit pattern is valid, and nothing else runs.
-        let Words { magic, stage, frames, cycles } = unsafe { (&raw const KEPT).cast::<Words>().read_volatile() };
+        let [magic, stage, frames, cycles @ ..] = unsafe { (&raw const KEPT).cast::<Words>().read_volatile() };
         let stage = STAGES.get(stage as usize).filter(|_| magic == MAGIC && reset != ResetCause::PowerOn);
         stage.map_or(Self::NOTHING, |stage| Self { stage: *stage, frames, cycles })
     }
 
     pub fn store(self) {
-        let Self { stage, frames, cycles } = self;
-        let stage = STAGES.iter().position(|known| *known == stage).unwrap_or(0) as u32;
-        let words = Words { magic: MAGIC, stage, frames, cycles };
+        let Self { stage, frames, cycles: [window, independent] } = self;
         // SAFETY: as for `load`.
-        unsafe { (&raw mut KEPT).cast::<Words>().write_volatile(words) }
+        unsafe {
+            (&raw mut KEPT).cast::<Words>().write_volatile([MAGIC, stage as u32, frames, window, independent]);
+        }
     }
 }
 
@@ -79,27 +74,19 @@ pub fn wait(kept: Kept) -> ! {
     SCB::sys_reset()
 }
 
-/// Lets the window watchdog bite, as it waits while frames are expected.
-pub fn window(kept: Kept, independent: Peri<'static, IWDG>, window: Peri<'static, WWDG>, timing: ScanTiming) -> ! {
+/// Records the time until a watchdog resets: the window watchdog, as it waits while frames are expected, or the
+/// independent one, with the longest time for the other.
+pub fn bite(mut kept: Kept, independent: Peri<'static, IWDG>, window: Peri<'static, WWDG>, timing: ScanTiming) -> ! {
     let mut dogs = Watchdogs::new(independent, window);
     dogs.start();
     dogs.expect_frames(timing);
-    bitten(Kept { stage: Stage::Independent, ..kept }, 0)
-}
-
-/// Waits for a reset by the independent watchdog, with the longest time for the other one.
-pub fn independent(kept: Kept, independent: Peri<'static, IWDG>, window: Peri<'static, WWDG>, timing: ScanTiming) -> ! {
-    let mut dogs = Watchdogs::new(independent, window);
-    dogs.start();
-    dogs.expect_frames(timing);
-    dogs.allow_long();
-    cortex_m::asm::delay(TAKES_BY);
-    dogs.pet();
-    bitten(Kept { stage: Stage::Foot, ..kept }, 1)
-}
-
-/// Records the time until the reset.
-fn bitten(mut kept: Kept, dog: usize) -> ! {
+    let dog = usize::from(kept.stage == Stage::Independent);
+    kept.stage = [Stage::Independent, Stage::Foot][dog];
+    if kept.stage == Stage::Foot {
+        dogs.allow_long();
+        cortex_m::asm::delay(TAKES_BY);
+        dogs.pet();
+    }
     let since = DWT::cycle_count();
     while !passed(since, BITES_BY) {
         kept.cycles[dog] = DWT::cycle_count().wrapping_sub(since);

@@ -203,13 +203,9 @@ pub struct Summary {
 impl Summary {
     fn of(mut values: Vec<u64>) -> Self {
         values.sort_unstable();
-        let at = |place: Option<usize>| place.and_then(|place| values.get(place)).copied().unwrap_or(0);
-        Self {
-            total: values.iter().sum(),
-            min: at(Some(0)),
-            median: at(values.len().checked_sub(1).map(|last| last / 2)),
-            max: at(values.len().checked_sub(1)),
-        }
+        let at = |place: usize| values.get(place).copied().unwrap_or(0);
+        let last = values.len().saturating_sub(1);
+        Self { total: values.iter().sum(), min: at(0), median: at(last / 2), max: at(last) }
     }
 }
 

@@ -47,10 +47,7 @@ pub fn external_by_internal() -> Option<f32> {
     timer.cr1().modify(|w| w.set_cen(true));
     let capture = || (0..LOOKS).any(|_| timer.sr().read().ccif(0)).then(|| timer.ccr(0).read().ccr());
     let first = capture()?;
-    let mut last = first;
-    for _ in 0..CAPTURES {
-        last = capture()?;
-    }
+    let last = (0..CAPTURES).try_fold(first, |_, _| capture())?;
     pac::RCC.apb2enr().modify(|w| w.set_tim11en(false));
     let ticks = f32::from(last.wrapping_sub(first));
     // 400 x 8 us are 51,200 ticks: less than the timer's wrap.
@@ -72,13 +69,10 @@ pub fn low_speed() -> Option<f32> {
     });
     timer.ccer().modify(|w| w.set_cce(3, true));
     let capture = || (0..LOOKS).any(|_| timer.sr().read().ccif(3)).then(|| timer.ccr(3).read());
-    let mut ends = [capture(), None];
-    for _ in 0..SLOW_CAPTURES {
-        ends[1] = capture();
-    }
+    let first = capture();
+    let last = first.and_then(|first| (0..SLOW_CAPTURES).try_fold(first, |_, _| capture()));
     timer.ccer().modify(|w| w.set_cce(3, false));
-    let [first, last] = [ends[0]?, ends[1]?];
-    Some(guard::HZ as f32 * EACH * SLOW_CAPTURES as f32 / last.wrapping_sub(first) as f32)
+    Some(guard::HZ as f32 * EACH * SLOW_CAPTURES as f32 / last?.wrapping_sub(first?) as f32)
 }
 
 /// Cycles of the core in a tick of the stopwatch, over a millisecond.

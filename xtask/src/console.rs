@@ -1,7 +1,7 @@
 //! Running programs and saying what goes on.
 
 use crate::host;
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, ensure};
 use std::ffi::OsStr;
 use std::io::{self, Write as _};
 use std::process::{Command, Stdio};
@@ -50,16 +50,15 @@ pub fn run(command: &mut Command) -> Result<()> {
 
 fn finish(command: &mut Command) -> Result<()> {
     let status = command.current_dir(host::root()).status().with_context(|| missing(command))?;
-    if status.success() { Ok(()) } else { bail!("{status}: {}", show(command)) }
+    ensure!(status.success(), "{status}: {}", show(command));
+    Ok(())
 }
 
 /// Returns a program's standard output; its errors go to the terminal.
 pub fn output(command: &mut Command) -> Result<String> {
     let output =
         command.current_dir(host::root()).stderr(Stdio::inherit()).output().with_context(|| missing(command))?;
-    if !output.status.success() {
-        bail!("{}: {}", output.status, show(command));
-    }
+    ensure!(output.status.success(), "{}: {}", output.status, show(command));
     String::from_utf8(output.stdout).with_context(|| format!("{} wrote no UTF-8", show(command)))
 }
 

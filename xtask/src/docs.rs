@@ -4,7 +4,7 @@ use crate::console;
 use crate::host::{self, Program};
 use crate::install::{self, Environment};
 use crate::{cores, image};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, ensure};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -53,9 +53,7 @@ pub fn run(args: &Args) -> Result<()> {
     console::run(&mut command)?;
     renew(README.0, &print(README.1, Some(&json))?, args.check, &mut stale)?;
 
-    if !stale.is_empty() {
-        bail!("stale: {}; renew them with `cargo xtask docs`", stale.join(", "));
-    }
+    ensure!(stale.is_empty(), "stale: {}; renew them with `cargo xtask docs`", stale.join(", "));
     Ok(())
 }
 
@@ -140,9 +138,7 @@ pub fn deny() -> Result<PathBuf> {
         return Ok(compiled);
     }
     let packed = install::environment(&DENY_PACKAGE).map(|python| python.with_file_name(name));
-    if let Ok(program) = packed
-        && program.is_file()
-    {
+    if let Some(program) = packed.ok().filter(|program| program.is_file()) {
         return Ok(program);
     }
     console::say(&format!("Installing {name} {version} to {}: it checks the licences.", host::shown(&folder)));

@@ -6,7 +6,6 @@ use crate::host::{self, Program};
 use crate::image::{self, Image};
 use crate::{sim, timing};
 use anyhow::{Context, Result, bail, ensure};
-use clap::ValueEnum;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -33,14 +32,13 @@ pub fn run(args: &Args) -> Result<()> {
 
 /// Looks for probe-rs before a build, so that nobody waits for an image that cannot be written.
 pub fn need_probe_rs() -> Result<()> {
-    if host::find_program("probe-rs").is_some() {
-        return Ok(());
-    }
-    bail!(
+    ensure!(
+        host::find_program("probe-rs").is_some(),
         "probe-rs writes the image to the board, and is not in PATH.\n\
          Install it (`cargo install probe-rs-tools --locked`, or a package from https://probe.rs), or let any \
          other tool write the .bin file beside the image that `cargo xtask build` names, to the address printed there."
     );
+    Ok(())
 }
 
 /// Sees to the option bytes, writes and verifies an image, and starts it.
@@ -113,12 +111,11 @@ fn set_brown_out_level(read: impl Fn(u32) -> Result<u32>, write: impl FnOnce(u32
 
 /// Writes brown-out level 3 by OpenOCD to the device that has these option bytes.
 fn write_options(options: u32, probe: Option<&str>) -> Result<()> {
-    if host::find_program("openocd").is_none() {
-        bail!(
-            "the board needs brown-out level 3 once, which OpenOCD programs, and it is not in PATH.\n\
-             Install it (`apt install openocd`), or set BOR level 3 with STM32CubeProgrammer; then try again."
-        );
-    }
+    ensure!(
+        host::find_program("openocd").is_some(),
+        "the board needs brown-out level 3 once, which OpenOCD programs, and it is not in PATH.\n\
+         Install it (`apt install openocd`), or set BOR level 3 with STM32CubeProgrammer; then try again."
+    );
     let serial = match probe.map(|probe| probe.splitn(3, ':').nth(2)) {
         Some(None) => bail!("give --probe as VID:PID:serial: by that OpenOCD finds the same board"),
         serial => serial.flatten(),
@@ -164,8 +161,8 @@ const ST_LINK: &str = "STLINK";
     docs/bringup.md goes on from there. `cargo xtask flash` puts the firmware back.")]
 pub struct BringupArgs {
     /// A NUCLEO-F446RE with nothing attached, or the emulated board
-    #[arg(long, value_enum, default_value_t = Board::Nucleo)]
-    board: Board,
+    #[arg(long, value_parser = ["nucleo", "virtual"], default_value = "nucleo")]
+    board: String,
     /// Number of frames for which the rows are read back; a million on a NUCLEO, which takes 100 s, a thousand emulated
     #[arg(long)]
     frames: Option<u32>,
@@ -186,18 +183,10 @@ pub struct BringupArgs {
     without_estimates: bool,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Board {
-    /// The board on the desk
-    Nucleo,
-    /// The emulated board
-    Virtual,
-}
-
 /// Builds the image, runs it and judges what it reports. This process ends as the judge does.
 pub fn bringup(args: &BringupArgs) -> Result<()> {
     // First, as it takes no time: without a board there is no wait for a build.
-    let port = (args.board == Board::Nucleo).then(|| args.port.clone().map_or_else(find_port, Ok)).transpose()?;
+    let port = (args.board == "nucleo").then(|| args.port.clone().map_or_else(find_port, Ok)).transpose()?;
     if port.is_some() && !args.flashed {
         need_probe_rs()?;
     }

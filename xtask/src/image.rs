@@ -3,7 +3,7 @@
 use crate::console;
 use crate::host;
 use crate::toolchain;
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, ensure};
 use object::elf::{FileHeader32, PT_LOAD, SHF_ALLOC};
 use object::read::elf::{ElfFile, ProgramHeader};
 use object::{LittleEndian, Object, ObjectSection, ObjectSymbol, SectionFlags};
@@ -54,9 +54,8 @@ impl Image {
         // With its subfolder: that of a checkout in `/src` alone is part of most paths.
         for folder in toolchain::sources().into_iter().chain([host::root().join("src")]) {
             let name = folder.as_os_str().as_encoded_bytes();
-            if self.bytes.windows(name.len()).any(|bytes| bytes == name) {
-                bail!("{} names {}: it would be other bytes elsewhere", host::shown(&self.elf), folder.display());
-            }
+            let named = self.bytes.windows(name.len()).any(|bytes| bytes == name);
+            ensure!(!named, "{} names {}: it would be other bytes elsewhere", host::shown(&self.elf), folder.display());
         }
         Ok(())
     }
@@ -80,9 +79,7 @@ fn lay_out(segments: &[(u32, &[u8])]) -> Result<(u32, Vec<u8>)> {
     for (start, segment) in segments {
         let start = (start - base) as usize;
         let end = start + segment.len();
-        if end > SPAN_MAX {
-            bail!("the image loads to addresses {end:#x} bytes apart: no flash is that large");
-        }
+        ensure!(end <= SPAN_MAX, "the image loads to addresses {end:#x} bytes apart: no flash is that large");
         bytes.resize(bytes.len().max(end), ERASED);
         bytes[start..end].copy_from_slice(segment);
     }
@@ -157,9 +154,7 @@ pub fn sizes(image: &Image) -> Result<String> {
 }
 
 fn share(what: &str, bytes: u64, limit: u64) -> Result<String> {
-    if bytes > limit {
-        bail!("{what}: {bytes} bytes are {} more than the limit of {limit}", bytes - limit);
-    }
+    ensure!(bytes <= limit, "{what}: {bytes} bytes are {} more than the limit of {limit}", bytes - limit);
     Ok(format!("{what:<12}{bytes:6} of {limit} bytes ({:.0} %)", 100.0 * bytes as f64 / limit as f64))
 }
 
@@ -176,21 +171,17 @@ pub fn prove_panic_free() -> Result<()> {
         .with_context(|| format!("the proof does not link; if {UNDEFINED} is missing above, the step can panic"))?;
     console::print("The control step links without a panic handler: no panic is reachable.");
     let calls = float_calls(&elf)?;
-    if !calls.is_empty() {
-        bail!("the control step calls floating-point routines: {}", calls.join(", "));
-    }
+    ensure!(calls.is_empty(), "the control step calls floating-point routines: {}", calls.join(", "));
     console::print("It calls no floating-point routine.");
     // Shows that the proof can fail.
     let mut control = emulated(NAME, "proof-control-panic");
     let output = control.arg("--release").current_dir(host::root()).output().context("cannot start cargo")?;
     let errors = String::from_utf8_lossy(&output.stderr);
-    if output.status.success() || !errors.contains(UNDEFINED) {
-        bail!("the control that panics links, or fails for another reason:\n{errors}");
-    }
+    let caught = !output.status.success() && errors.contains(UNDEFINED);
+    ensure!(caught, "the control that panics links, or fails for another reason:\n{errors}");
     let elf = build(NAME, "proof-control-float")?;
-    if float_calls(&elf)?.is_empty() {
-        bail!("the control that computes in f64 shows no floating-point routine in {}", host::shown(&elf));
-    }
+    let calls = float_calls(&elf)?;
+    ensure!(!calls.is_empty(), "the control that computes in f64 shows no such routine in {}", host::shown(&elf));
     console::print("The controls, a step that can panic and one that computes in f64, are caught.");
     Ok(())
 }

@@ -48,12 +48,10 @@ pub fn newest(packages: &[&str], why: &str) -> Result<()> {
 fn install(packages: &[&str], suite: Option<&str>, why: &str) -> Result<()> {
     let words: Vec<_> = suite.iter().flat_map(|suite| ["-t", suite]).chain(packages.iter().copied()).collect();
     let list = words.join(" ");
-    if host::find_program("apt-get").is_none() {
-        bail!("{why} needs the Debian packages `{list}`, and there is no apt-get here: install their like by hand");
-    }
-    if !is_root() {
-        bail!("{why} needs the Debian packages `{list}`: run `sudo apt-get install {list}` and try again");
-    }
+    let needed = format!("{why} needs the Debian packages `{list}`");
+    let is_there = host::find_program("apt-get").is_some();
+    ensure!(is_there, "{needed}, and there is no apt-get here: install their like by hand");
+    ensure!(is_root(), "{needed}: run `sudo apt-get install {list}` and try again");
     console::say(&format!(
         "Installing the Debian packages `{list}`: {why} needs them. Apt's sources stay as they are."
     ));

@@ -3,7 +3,7 @@
 use crate::console;
 use crate::toolchain;
 use crate::{cores, docs, flash, host, image, install, timing};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, ensure};
 use std::process::Command;
 use std::time::Instant;
 
@@ -172,9 +172,7 @@ impl Stages {
         let [compiling_s, running_s] = console::cpu_s();
         println!("\n{}", self.lines.join("\n"));
         println!("CPU time: {compiling_s:.0} s of compiling and installing, {running_s:.0} s of running");
-        if !self.failed.is_empty() {
-            bail!("{} failed: {}", what, self.failed.join("; "));
-        }
+        ensure!(self.failed.is_empty(), "{what} failed: {}", self.failed.join("; "));
         println!("{what}: all passed");
         Ok(())
     }

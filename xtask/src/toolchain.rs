@@ -2,7 +2,7 @@
 
 use crate::console;
 use crate::{host, install};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, ensure};
 use std::path::PathBuf;
 use std::process::Command;
 use std::{env, iter};
@@ -61,25 +61,19 @@ pub fn ensure() -> Result<()> {
 
 /// Installs the targets that are missing.
 pub fn ensure_for(targets: &[&str], why: &str) -> Result<()> {
-    if targets.iter().all(|target| has_target(target)) {
-        return Ok(());
-    }
-    if host::find_program("rustup").is_none() {
-        bail!("there is no rustup in PATH: the target {} is needed, because {why}", targets.join(", "));
-    }
-    // Another command may have added them meanwhile.
-    let _alone = install::alone()?;
-    let targets: Vec<_> = targets.iter().copied().filter(|target| !has_target(target)).collect();
-    if targets.is_empty() {
+    let missing = || targets.iter().copied().filter(|target| !has_target(target)).collect::<Vec<_>>();
+    if missing().is_empty() {
         return Ok(());
     }
     let list = targets.join(", ");
+    let is_there = host::find_program("rustup").is_some();
+    ensure!(is_there, "there is no rustup in PATH: the target {list} is needed, because {why}");
+    // Another command may add them meanwhile; those that are there do no harm.
+    let _alone = install::alone()?;
     console::say(&format!("Adding rustup's target {list}: {why}."));
-    let added = console::prepare(Command::new("rustup").args(["target", "add"]).args(&targets));
+    let added = console::prepare(Command::new("rustup").args(["target", "add"]).args(targets));
     added.context("the Rust distribution server (static.rust-lang.org) gave no target")?;
-    if !targets.iter().all(|target| has_target(target)) {
-        bail!("rustup added {list} to another toolchain than the one that cargo takes");
-    }
+    ensure!(missing().is_empty(), "rustup added {list} to another toolchain than the one that cargo takes");
     Ok(())
 }
 

@@ -12,7 +12,7 @@ use rigless::snapshot::Store;
 use rigless::soc::stm32f427::peripherals::gpio::{Gpio, Pin};
 use rigless::soc::stm32f427::peripherals::tim::Channel;
 use sim::mechanics::Bridge;
-use sim::plant::Plant;
+use sim::plant::{Plant, Setup};
 use std::num::{NonZeroU32, NonZeroU64};
 
 const CORE_HZ: NonZeroU64 = NonZeroU64::new(168_000_000).expect("the core is clocked");
@@ -100,19 +100,11 @@ pub enum Surroundings {
     Scene(Box<Finger>),
 }
 
-impl From<Plant> for Surroundings {
-    fn from(world: Plant) -> Self {
-        Self::Plant(Box::new(world))
-    }
-}
-
-impl From<Finger> for Surroundings {
-    fn from(finger: Finger) -> Self {
-        Self::Scene(Box::new(finger))
-    }
-}
-
 impl Surroundings {
+    pub fn plant(setup: &Setup) -> Self {
+        Self::Plant(Box::new(Plant::new(setup)))
+    }
+
     /// Goes from one instant of the board to another with the bridge held.
     pub fn advance(&mut self, from_ns: u64, to_ns: u64, bridge: Bridge) {
         let dt_s = (to_ns - from_ns) as f64 * 1e-9;

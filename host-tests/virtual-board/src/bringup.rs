@@ -1,9 +1,10 @@
 //! The image of `cargo xtask bringup` on the emulated board, listened to as on a NUCLEO's virtual COM port.
 
+use crate::board::Surroundings;
 use crate::image::hex;
 use crate::{Error, Options, Rig};
 use bringup::judge::{self, Board, Judgement};
-use sim::plant::{Plant, Setup};
+use sim::plant::Setup;
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
 use std::path::Path;
@@ -13,7 +14,7 @@ const SILENT_MS: u64 = 60_000;
 
 /// Runs the image to the end of its report and judges that.
 pub fn run(image: &Path, options: &judge::Options) -> Result<(Judgement, Rig), Error> {
-    let mut rig = Rig::new(image, Plant::new(&Setup::default()), &Options::default())?;
+    let mut rig = Rig::new(image, Surroundings::plant(&Setup::default()), &Options::default())?;
     let sha256 = hex(&rigless::snapshot::digest(&rig.flashed()?));
     let mut port = Port { rig, heard: VecDeque::new() };
     let judgement = options.judge(&mut port, Board::Emulated, sha256)?;

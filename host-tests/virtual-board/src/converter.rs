@@ -32,11 +32,7 @@ struct Running {
 }
 
 /// Inputs with the instants at which they are sampled, and the end of the last conversion, ns.
-#[derive(Clone, Debug)]
-struct Sequence {
-    samples: Vec<(usize, u64)>,
-    done_ns: u64,
-}
+type Sequence = (Vec<(usize, u64)>, u64);
 
 /// ADC1, ADC2 or ADC3.
 #[derive(Debug)]
@@ -66,7 +62,7 @@ impl Converter {
             (input, after(sampled))
         };
         let samples = inputs.into_iter().map(sample).collect();
-        Sequence { samples, done_ns: after(cycles) }
+        (samples, after(cycles))
     }
 
     /// Begins the next slot of a scene: the sequence of the slot before has ended, and the new one starts at the
@@ -99,14 +95,14 @@ impl Converter {
         }
         let begun_ns = slot.map_or(context.now().0, |slot| slot.begun_ns);
         let sequence = self.sequence(begun_ns, (0..length).map(|rank| input(registers, rank)), registers);
-        let done = VirtualNanos(sequence.done_ns);
+        let done = VirtualNanos(sequence.1);
         let event = slot.is_none_or(|slot| slot.rows == LAST_ROW).then(|| context.schedule(done));
         self.status = sr::STRT.set(self.status, 1);
         self.running = Some(Running { event, sequence, slot });
     }
 
     fn finish(&mut self, running: Running, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
-        let Sequence { samples, done_ns } = running.sequence;
+        let (samples, done_ns) = running.sequence;
         let by_dma = cr2::DMA.is_set(registers.get(Register::Cr2));
         let mut front_end = self.front_end.lock();
         if !by_dma {
@@ -138,7 +134,7 @@ impl Converter {
         if inputs.iter().any(|input| *input >= REFERENCE_INPUT && too_short(*input)) {
             context.tell("SMPR1", "reference and sensor are sampled for less than 10 us");
         }
-        let Sequence { samples, done_ns } = self.sequence(begun_ns, inputs, registers);
+        let (samples, done_ns) = self.sequence(begun_ns, inputs, registers);
         let front_end = self.front_end.lock();
         let word = |(input, at_ns)| front_end.word(self.nth, input, self.inside_on, at_ns);
         self.injected = Injected { words: samples.into_iter().map(word).collect(), done_ns };

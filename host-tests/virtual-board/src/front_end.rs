@@ -19,14 +19,8 @@ const SUPPLY_INPUT: usize = 0;
 const SUPPLY_RATIO: f64 = 11.0;
 const CODES: f64 = 4096.0;
 
-/// Rows driven, and the time since which they are.
-#[derive(Clone, Copy, Debug, Default)]
-struct RowDrive {
-    rows: u16,
-    since_ns: u64,
-}
-
-/// Slot of a scene's scan. The update that moves the rows begins it; the trigger follows a fixed time later.
+/// A drive of rows. In a scene it is a slot of the scan: the update that moves the rows begins it, and the trigger follows a
+/// fixed time later.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Slot {
     pub begun_ns: u64,
@@ -104,7 +98,7 @@ pub struct FrontEnd {
     /// Words of each converter that are not fetched yet.
     pub waiting: [VecDeque<u16>; 3],
     /// Row drives, newest first: a sample just before an edge still sees the earlier one.
-    drives: [RowDrive; 3],
+    drives: [Slot; 3],
 }
 
 /// The front end as the board and the stepping hold it.
@@ -124,7 +118,7 @@ impl Shared {
             pin_edges: None,
             dac: None,
             waiting: Default::default(),
-            drives: [RowDrive::default(); 3],
+            drives: [Slot::default(); 3],
         })))
     }
 
@@ -143,10 +137,10 @@ impl FrontEnd {
     pub fn drive_row(&mut self, row: usize, high: bool, at_ns: u64) {
         let bit = 1 << row;
         let rows = if high { self.drives[0].rows | bit } else { self.drives[0].rows & !bit };
-        if self.drives[0].since_ns != at_ns {
+        if self.drives[0].begun_ns != at_ns {
             self.drives.rotate_right(1);
         }
-        self.drives[0] = RowDrive { rows, since_ns: at_ns };
+        self.drives[0] = Slot { rows, begun_ns: at_ns };
     }
 
     pub fn write_dac(&mut self, offset: u64, value: u64, at_ns: u64) {
@@ -228,7 +222,7 @@ impl FrontEnd {
                         self.waiting[converter].push_back(held.map_or(0, |(code, _)| *code));
                         continue;
                     }
-                    let newest = self.drives.iter().position(|drive| drive.since_ns <= at_ns).unwrap_or(0);
+                    let newest = self.drives.iter().position(|drive| drive.begun_ns <= at_ns).unwrap_or(0);
                     match &mut self.world {
                         Surroundings::Plant(world) => {
                             let drives = [self.drives[newest], self.drives[(newest + 1).min(2)]];
@@ -270,14 +264,14 @@ impl FrontEnd {
 }
 
 /// A column's voltage under the drive of a place.
-fn column_volts(world: &mut Plant, drives: [RowDrive; 2], column: usize, at_ns: u64, settled: &mut Settled) -> f64 {
+fn column_volts(world: &mut Plant, drives: [Slot; 2], column: usize, at_ns: u64, settled: &mut Settled) -> f64 {
     let [drive, before] = drives;
-    let mut settles = |drive: RowDrive| world.settled_volts(&std::array::from_fn(|row| drive.rows >> row & 1 == 1));
+    let mut settles = |drive: Slot| world.settled_volts(&std::array::from_fn(|row| drive.rows >> row & 1 == 1));
     let (_, end, start) = *match settled {
-        Some(known) if known.0 == drive.since_ns => known,
-        _ => settled.insert((drive.since_ns, settles(drive), settles(before))),
+        Some(known) if known.0 == drive.begun_ns => known,
+        _ => settled.insert((drive.begun_ns, settles(drive), settles(before))),
     };
-    let since_s = (at_ns - drive.since_ns.min(at_ns)) as f64 * 1e-9;
+    let since_s = (at_ns - drive.begun_ns.min(at_ns)) as f64 * 1e-9;
     let left = decay(since_s / world.finger().setup.array.settle_tau_s);
     end[column] + left * (start[column] - end[column])
 }

@@ -5,11 +5,12 @@ use clap::{Parser, Subcommand};
 use output::say;
 use serve::{Place, Port};
 use sim::demo::{draw, missed, table};
-use sim::plant::{Plant, Setup};
+use sim::plant::Setup;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
+use virtual_board::board::Surroundings;
 use virtual_board::demo;
 #[cfg(feature = "scenes")]
 use virtual_board::scene::simulate;
@@ -129,7 +130,7 @@ fn demo(image: &Path, json: Option<&Path>, out: &Path, quick: bool) -> Result<()
 fn serve(image: &Path, place: &Place, distance_mm: f64) -> Result<(), Error> {
     let mut setup = Setup::default();
     setup.wall.distance_mm = distance_mm;
-    let mut board = Board::warm(Rig::new(image, Plant::new(&setup), &Options::confirmed())?)?;
+    let mut board = Board::warm(Rig::new(image, Surroundings::plant(&setup), &Options::confirmed())?)?;
     let mut port = Port::open(place)?;
     let stop = port.stopper();
     ctrlc::set_handler(move || stop.stop()).map_err(std::io::Error::other)?;

@@ -118,17 +118,19 @@ impl Rig {
                     gaps.push(format!("  unmapped {:#010x} (from {:#010x})", entry.address, entry.program_counter));
                 }
             }
-            gaps.extend(
-                session.refused().iter().map(|(address, fault)| format!("  refused {address:#010x} ({fault:?})")),
-            );
+            for (address, fault) in session.refused() {
+                gaps.push(format!("  refused {address:#010x} ({fault:?})"));
+            }
             for entry in session.unimplemented().values() {
                 let accesses = format!("{} reads, {} writes", entry.reads, entry.writes);
                 gaps.push(format!("  unimplemented {} {} ({accesses})", entry.instance, entry.register));
             }
-            gaps.extend(session.unrouted().iter().map(|(instance, number)| format!("  unrouted {instance} {number}")));
-            gaps.extend(
-                session.told().map(|told| format!("  told {} {} ({})", told.instance, told.register, told.reason)),
-            );
+            for (instance, number) in session.unrouted() {
+                gaps.push(format!("  unrouted {instance} {number}"));
+            }
+            for told in session.told() {
+                gaps.push(format!("  told {} {} ({})", told.instance, told.register, told.reason));
+            }
             if let Some(value) = stand.bench.clock.wrong_pll {
                 gaps.push(format!("  refused RCC PLLCFGR (divider Q or R below 2: {value:#010x})"));
             }

@@ -84,10 +84,10 @@ pub const WAIT_NS: u64 = 5_000_000;
 
 impl Rig {
     /// A board with an image and a world, a step after power-on.
-    pub fn new(image: &Path, world: impl Into<Surroundings>, options: &Options) -> Result<Self, Error> {
+    pub fn new(image: &Path, world: Surroundings, options: &Options) -> Result<Self, Error> {
         let image = Firmware::read(image)?;
         let images = images(&image, options)?;
-        let front_end = Shared::new(world.into());
+        let front_end = Shared::new(world);
         let board = Part::new(front_end.clone(), options.brown_out_bits)?;
         let session = Session::new(Box::new(board), 0, VirtualNanos(STEP_NS)).map_err(failure)?;
         let bench = Bench::new(front_end, &image);

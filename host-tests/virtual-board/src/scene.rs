@@ -21,7 +21,7 @@ pub mod host;
 use crate::board::Surroundings;
 use crate::rig::Stand;
 use crate::{Error, Options, Rig};
-use finger::{Clock, Finger};
+use finger::{Clock, Finger, Seen};
 use fingertip::contact::FitLevel;
 use fingertip::params::Params;
 use fingertip::shipped::{Config, Record, TARE_FRAMES, address};
@@ -31,7 +31,7 @@ use sim::SimError;
 use sim::effects::Parts;
 use sim::effects::link;
 use sim::scene::Scene;
-use sim::watch::{Controller, Summary, Watch};
+use sim::watch::{Controller, Step, Summary, Watch};
 use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::mpsc::Receiver;
@@ -82,10 +82,10 @@ impl Boards {
         let mut rigs = Vec::new();
         let clock = Clock::new(start_ns);
         for (number, finger) in Finger::all(scene, clock, moves_from_s)?.into_iter().enumerate() {
-            let mut rig = Rig::new(image, finger, &options)?;
+            let mut rig = Rig::new(image, Surroundings::Scene(Box::new(finger)), &options)?;
             set_up(&mut rig, scene, start_ns)?;
             let offset = frame_offset(&mut rig)?;
-            let host = Host::new(scene, number, Parts::of(scene, number).link, start_ns, frame_ns, offset);
+            let host = Host::new(scene, Parts::of(scene, number).link, start_ns, frame_ns, offset);
             rig.with(move |stand| stand.bench.host = Some(Box::new(host)))?;
             rigs.push(rig);
         }
@@ -121,10 +121,12 @@ impl Boards {
             } else if ahead.is_empty() {
                 break;
             }
-            for (rig, made) in self.rigs.iter_mut().zip(ahead.drain(..fingers)) {
+            for (finger, (rig, made)) in self.rigs.iter_mut().zip(ahead.drain(..fingers)).enumerate() {
                 rig.await_reached()?;
                 let (shown, trouble) = rig.answer(&made)?;
-                shown.iter().for_each(|shown| watch.step(&shown.step()));
+                for (Seen { time_s, frame, sense, truth, .. }, command, status) in &shown {
+                    watch.step(&Step { finger, time_s: *time_s, frame, sense, command, status, truth });
+                }
                 if let Some(why) = trouble {
                     return Err(Error::Host(rig.now_ns(), why.into()));
                 }

@@ -167,14 +167,6 @@ impl ScanTimer {
         }
     }
 
-    fn forget(&mut self) {
-        self.reference = Level::Low;
-        self.updates_seen = self.timer.dma_requests().update;
-        self.updates_served = self.updates_seen;
-        self.updates.running = None;
-        self.wake = None;
-    }
-
     fn announce(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         let reference = self.timer.reference(CHANNEL_1);
         if reference != self.reference {
@@ -286,7 +278,11 @@ impl Device for ScanTimer {
 
     fn reset_line(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         Device::reset_line(&mut self.timer, registers, context);
-        self.forget();
+        self.reference = Level::Low;
+        self.updates_seen = self.timer.dma_requests().update;
+        self.updates_served = self.updates_seen;
+        self.updates.running = None;
+        self.wake = None;
     }
 }
 

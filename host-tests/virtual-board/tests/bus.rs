@@ -149,24 +149,14 @@ fn no_byte_of_a_fast_bus_is_lost(rig: &mut Rig) {
 /// Random bytes, and every other stretch of 16 a write of a goal with one byte changed; the same in every run.
 fn noise(count: usize) -> Vec<u8> {
     const WRITE: [u8; 16] = [0xff, 0xff, 0xfd, 0, 1, 9, 0, 3, 0, 1, 0x88, 0x13, 0, 0, 0, 0];
-    let mut state = 1u64;
-    let mut next = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 56) as u8
+    let mut random = fastrand::Rng::with_seed(1);
+    let stretch = |number: usize| {
+        let mut bytes = WRITE;
+        random.fill(&mut bytes[if number.is_multiple_of(2) { 0 } else { 14 }..]);
+        bytes[random.usize(..16)] ^= random.u8(..);
+        bytes
     };
-    let mut bytes = Vec::with_capacity(count);
-    while bytes.len() < count {
-        let mut stretch = WRITE;
-        if bytes.len() / 16 % 2 == 0 {
-            stretch.fill_with(&mut next);
-        } else {
-            stretch[14..].fill_with(&mut next);
-            let place = usize::from(next()) % stretch.len();
-            stretch[place] ^= next();
-        }
-        bytes.extend(stretch);
-    }
-    bytes
+    (0..count.div_ceil(16)).flat_map(stretch).collect()
 }
 
 fn noise_moves_nothing(rig: &mut Rig, bytes: usize) {

@@ -8,11 +8,9 @@
 #[allow(dead_code, unused_imports, reason = "the link's tests take more of it")]
 mod bench;
 
-use crate::common::{image, named};
+use crate::common::*;
 use bench::Bench;
 use dynamixel2::Bus;
-use fingertip::params::Params;
-use fingertip::shipped::address;
 use serial2::SerialPort;
 use serve::{Event, Place, Port};
 use std::io::{BufRead, BufReader};

@@ -9,6 +9,7 @@ use rigless::emulator::{Access, AccessKind};
 pub use rigless::soc::Width;
 pub use sim::plant::{Plant, Setup};
 use std::path::PathBuf;
+pub use virtual_board::board::Surroundings;
 pub use virtual_board::rig::{Stand, WAIT_NS};
 pub use virtual_board::{Error, Fault, Options, Rig};
 
@@ -142,7 +143,7 @@ pub fn poke(rig: &mut Rig, register: u64, bits: u64) {
 
 /// A board that has run for 20 ms, so that it is up.
 pub fn running(setup: &Setup, options: &Options) -> Rig {
-    let mut rig = Rig::new(&image(), Plant::new(setup), options).expect("the image starts");
+    let mut rig = Rig::new(&image(), Surroundings::plant(setup), options).expect("the image starts");
     rig.run_until_ns(20_000_000).expect("it runs");
     rig
 }

@@ -189,7 +189,7 @@ fn the_bridge_keeps_step_with_the_scan(rig: &mut Rig) {
 /// 300 ms in which the array is tared and the tip goes for the wall, 0.5 mm away, with a ping in the middle. The board's
 /// thread pauses once for this long: the client waits in virtual time, not by the wall clock.
 fn eventful(pause: Duration) -> Rig {
-    let mut rig = Rig::new(&image(), Plant::new(&away(0.5)), &Options::confirmed()).expect("the image starts");
+    let mut rig = Rig::new(&image(), Surroundings::plant(&away(0.5)), &Options::confirmed()).expect("the image starts");
     rig.run_until_ns(50_000_000).expect("it runs");
     write_u8(&mut rig, address::TARE, 1);
     rig.run_until_ns(150_000_000).expect("it runs");

@@ -36,7 +36,7 @@ fn warming(factory: Option<Factory>) -> Rig {
     let scene = sim::cli::load("hot_hour", &keys, None).unwrap_or_else(|error| panic!("{error}"));
     let clock = Clock::new(START_MS * 1_000_000);
     let finger = Finger::all(&scene, clock, -0.001).expect("the world is simulated").remove(0);
-    let mut rig = Rig::new(&image(), finger, &options).expect("the image starts");
+    let mut rig = Rig::new(&image(), Surroundings::Scene(Box::new(finger)), &options).expect("the image starts");
     rig.run_until_ns(20_000_000).expect("it runs");
     write_u8(&mut rig, address::TARE, 1);
     rig.run_until_ns(START_MS * 1_000_000).expect("it runs");

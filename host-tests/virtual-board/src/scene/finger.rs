@@ -70,7 +70,10 @@ pub struct Finger {
     pub bridge: Bridge,
     /// Scene time until which the world is frozen, s.
     from_s: f64,
-    joint: Joint,
+    /// Number of the finger in its world.
+    number: usize,
+    meeting: Arc<Meeting>,
+    held: Held,
     sensor: sensor::Named,
     readout: Readout,
     pub reference_v: f64,
@@ -100,13 +103,27 @@ impl Finger {
             effects.push((drive, contact));
         }
         let world = World::new(&setup, &Surroundings::of(scene), effects);
-        let joints = Joint::all(scene, world, moves_from_s)?;
-        let finger = |(number, (joint, sensor))| Self {
+        let longest_s = scene.table("world").number("step_us") * 1e-6;
+        world.check_step(longest_s)?;
+        let state = SharedWorld {
+            world,
+            bridges: vec![Bridge::Coast; fingers],
+            reached_ns: vec![0; fingers],
+            moved_to_ns: 0,
+            now_s: moves_from_s,
+            closed: false,
+        };
+        let longest_ns = (longest_s * 1e9).round() as u64;
+        let grid_ns = GRIDS_NS.into_iter().find(|grid_ns| *grid_ns <= longest_ns).unwrap_or(STEP_NS);
+        let meeting = Arc::new(Meeting { state: Mutex::new(state), moved: Condvar::new(), longest_s, grid_ns });
+        let finger = |(number, sensor)| Self {
             clock,
             wants_pressures: false,
             bridge: Bridge::Coast,
             from_s: moves_from_s,
-            joint,
+            number,
+            meeting: meeting.clone(),
+            held: Held { from_ns: 0, until_ns: 0, duty_ns: 0.0, last: Bridge::Coast },
             sensor,
             readout: Readout::new(&setup.array, ArrayEvents::of(scene, number)),
             reference_v: setup.array.reference_v,
@@ -115,7 +132,7 @@ impl Finger {
             frame: Frame::EMPTY,
             seen: Vec::new(),
         };
-        Ok(joints.into_iter().zip(sensors).enumerate().map(finger).collect())
+        Ok(sensors.into_iter().enumerate().map(finger).collect())
     }
 
     /// These slots are to come, with the rows driven in them. They may be asked for later than they begin, when the
@@ -132,16 +149,16 @@ impl Finger {
         while let Some((begun_ns, rows)) = self.expected.pop_front_if(|(begun_ns, _)| *begun_ns < to_ns) {
             self.slot(rows, begun_ns);
         }
-        self.joint.advance(to_ns, &self.clock, self.bridge);
+        self.advance_world(to_ns);
     }
 
     /// The world's grid: it must come to each of its instants.
     pub fn grid_ns(&self) -> u64 {
-        self.joint.meeting.grid_ns
+        self.meeting.grid_ns
     }
 
     pub fn supply_v(&self) -> f64 {
-        self.joint.meeting.lock().world.fingers[self.joint.finger].supply_v()
+        self.meeting.lock().world.fingers[self.number].supply_v()
     }
 
     /// The microcontroller's temperature, a room's where the scene does not tell.
@@ -150,7 +167,9 @@ impl Finger {
     }
 
     pub fn encoder_counts(&self, at_ns: u64) -> i32 {
-        self.joint.encoder_counts(self.clock.time_s(at_ns))
+        let mut state = self.meeting.lock();
+        let ahead_s = (self.clock.time_s(at_ns) - state.now_s).max(0.0);
+        state.world.fingers[self.number].count_ahead(ahead_s)
     }
 
     /// The columns' codes in the sequence that began at an instant. A sequence is sampled at once, at its beginning: both
@@ -173,7 +192,12 @@ impl Finger {
             _ => return [Array::CODES as u16 - 1; COLUMNS],
         };
         let time_s = self.clock.time_s(begun_ns).max(self.from_s);
-        let kpa = if slot < ROWS { self.joint.row_kpa(time_s, slot) } else { [0.0; COLUMNS] };
+        let mut kpa = [0.0; COLUMNS];
+        if slot < ROWS {
+            let mut state = self.meeting.lock();
+            let off_s = time_s - state.now_s;
+            kpa = state.world.row_off_kpa(self.number, off_s, slot);
+        }
         let codes = self.readout.codes(&mut self.sensor, slot, time_s, &kpa);
         for (column, code) in codes.into_iter().enumerate() {
             self.frame.set_code(slot.min(SLOTS - 1), column, code);
@@ -184,16 +208,15 @@ impl Finger {
     /// The last slot of a frame was converted.
     pub fn frame_done(&mut self, number: u64, end_ns: u64) {
         self.advance(end_ns);
-        let time_s = self.joint.now_s();
-        let (sense, truth) = self.joint.look(self.wants_pressures);
         self.frame.sequence = number as u32;
-        self.seen.push(Seen { number, end_ns, time_s, frame: self.frame, sense, truth });
+        let SharedWorld { world, now_s: time_s, .. } = &mut *self.meeting.lock();
+        let (sense, truth) = (world.sense(self.number, 0), world.truth(self.number, self.wants_pressures));
+        self.seen.push(Seen { number, end_ns, time_s: *time_s, frame: self.frame, sense, truth });
     }
 
     /// Costs of the effects on sensor, contact and drive.
     pub fn costs(&self) -> Vec<Cost> {
-        let world = &self.joint.meeting.lock().world;
-        let finger = &world.fingers[self.joint.finger];
+        let finger = &self.meeting.lock().world.fingers[self.number];
         self.sensor.costs().chain(finger.contact.effects.costs()).chain(finger.drive.costs()).collect()
     }
 }
@@ -230,14 +253,6 @@ impl Meeting {
     }
 }
 
-/// A finger's hold on the world.
-struct Joint {
-    finger: usize,
-    meeting: Arc<Meeting>,
-    shared: bool,
-    held: Held,
-}
-
 /// Bridge states since the last meeting.
 struct Held {
     from_ns: u64,
@@ -268,67 +283,43 @@ impl Held {
 /// Steps of the grid that fit a millisecond.
 const GRIDS_NS: [u64; 3] = [100_000, 50_000, 20_000];
 
-impl Drop for Joint {
+impl Drop for Finger {
     fn drop(&mut self) {
         self.meeting.lock().closed = true;
         self.meeting.moved.notify_all();
     }
 }
 
-impl Joint {
-    /// A hold for each finger of a world at scene time `now_s`.
-    fn all(scene: &Scene, world: World, now_s: f64) -> Result<Vec<Self>, SimError> {
-        let longest_s = scene.table("world").number("step_us") * 1e-6;
-        world.check_step(longest_s)?;
-        let fingers = world.fingers.len();
-        let state = SharedWorld {
-            world,
-            bridges: vec![Bridge::Coast; fingers],
-            reached_ns: vec![0; fingers],
-            moved_to_ns: 0,
-            now_s,
-            closed: false,
-        };
-        let longest_ns = (longest_s * 1e9).round() as u64;
-        let grid_ns = GRIDS_NS.into_iter().find(|grid_ns| *grid_ns <= longest_ns).unwrap_or(STEP_NS);
-        let meeting = Arc::new(Meeting { state: Mutex::new(state), moved: Condvar::new(), longest_s, grid_ns });
-        let joint = |finger| Self {
-            finger,
-            meeting: meeting.clone(),
-            shared: fingers > 1,
-            held: Held { from_ns: 0, until_ns: 0, duty_ns: 0.0, last: Bridge::Coast },
-        };
-        Ok((0..fingers).map(joint).collect())
-    }
-
+impl Finger {
     /// Goes on to an instant with this finger's bridge held. A shared world moves by whole steps of the grid.
-    fn advance(&mut self, to_ns: u64, clock: &Clock, bridge: Bridge) {
-        let to_s = clock.time_s(to_ns);
-        if !self.shared {
-            let mut state = self.meeting.lock();
-            state.bridges[self.finger] = bridge;
+    fn advance_world(&mut self, to_ns: u64) {
+        let to_s = self.clock.time_s(to_ns);
+        let mut state = self.meeting.lock();
+        if let [bridge] = &mut state.bridges[..] {
+            *bridge = self.bridge;
             return state.advance(to_s, self.meeting.longest_s);
         }
-        if to_s <= self.now_s() {
+        if to_s <= state.now_s {
             // The shared world does not move yet, so this finger need not wait for the others.
-            self.held = Held { from_ns: to_ns, until_ns: to_ns, duty_ns: 0.0, last: bridge };
+            self.held = Held { from_ns: to_ns, until_ns: to_ns, duty_ns: 0.0, last: self.bridge };
             return;
         }
+        drop(state);
         // The emulator may come to an instant of the grid an instruction late, with something done there first.
         while let next_ns = (self.held.from_ns / self.meeting.grid_ns + 1) * self.meeting.grid_ns
             && next_ns <= to_ns
         {
-            self.held.hold(next_ns, bridge);
+            self.held.hold(next_ns, self.bridge);
             let mean = self.held.mean();
-            self.meet(next_ns, clock.time_s(next_ns), mean);
+            self.meet(next_ns, self.clock.time_s(next_ns), mean);
         }
-        self.held.hold(to_ns, bridge);
+        self.held.hold(to_ns, self.bridge);
     }
 
     fn meet(&self, to_ns: u64, to_s: f64, bridge: Bridge) {
         let mut state = self.meeting.lock();
-        state.bridges[self.finger] = bridge;
-        state.reached_ns[self.finger] = to_ns;
+        state.bridges[self.number] = bridge;
+        state.reached_ns[self.number] = to_ns;
         if state.reached_ns.iter().all(|reached_ns| *reached_ns >= to_ns) {
             state.advance(to_s, self.meeting.longest_s);
             state.moved_to_ns = to_ns;
@@ -337,29 +328,6 @@ impl Joint {
         while state.moved_to_ns < to_ns && !state.closed {
             state = self.meeting.moved.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
-    }
-
-    fn now_s(&self) -> f64 {
-        self.meeting.lock().now_s
-    }
-
-    fn encoder_counts(&self, time_s: f64) -> i32 {
-        let mut state = self.meeting.lock();
-        let ahead_s = (time_s - state.now_s).max(0.0);
-        state.world.fingers[self.finger].count_ahead(ahead_s)
-    }
-
-    /// Mean pressures on a row's taxels at a time.
-    fn row_kpa(&self, time_s: f64, row: usize) -> [f64; COLUMNS] {
-        let mut state = self.meeting.lock();
-        let off_s = time_s - state.now_s;
-        state.world.row_off_kpa(self.finger, off_s, row)
-    }
-
-    /// Encoder and supply, and the true state.
-    fn look(&self, pressures: bool) -> (Sense, Truth) {
-        let world = &mut self.meeting.lock().world;
-        (world.sense(self.finger, 0), world.truth(self.finger, pressures))
     }
 }
 
@@ -384,11 +352,10 @@ mod tests {
 
     const DRIVEN: fn(f64) -> Bridge = |duty| Bridge::Driven { duty };
 
-    fn two() -> Vec<Joint> {
+    fn two() -> Vec<Finger> {
         let text = "about = \"two\"\nduration_s = 1.0\n[hand]\nfingers = 2\n";
         let scene = sim::scene::read("test.toml", text).unwrap_or_else(|errors| panic!("{errors}"));
-        let fingers = Finger::all(&scene, Clock::new(0), 0.0).expect("the world is sound");
-        fingers.into_iter().map(|finger| finger.joint).collect()
+        Finger::all(&scene, Clock::new(0), 0.0).expect("the world is sound")
     }
 
     #[test]
@@ -405,16 +372,17 @@ mod tests {
 
     #[test]
     fn boards_meet_though_one_comes_late_to_the_grid() {
-        let mut joints = two();
-        let clock = Clock::new(0);
-        let (grid_ns, mut late) = (joints[0].meeting.grid_ns, joints.remove(1));
-        let mut early = joints.remove(0);
+        let mut fingers = two();
+        fingers.iter_mut().for_each(|finger| finger.bridge = DRIVEN(0.5));
+        let (grid_ns, mut late) = (fingers[0].grid_ns(), fingers.remove(1));
+        let mut early = fingers.remove(0);
         std::thread::scope(|scope| {
-            scope.spawn(|| (1..=50).for_each(|step| early.advance(step * grid_ns, &clock, DRIVEN(0.5))));
-            scope.spawn(|| (1..=50).for_each(|step| late.advance(step * grid_ns + 8, &clock, DRIVEN(0.5))));
+            scope.spawn(|| (1..=50).for_each(|step| early.advance(step * grid_ns)));
+            scope.spawn(|| (1..=50).for_each(|step| late.advance(step * grid_ns + 8)));
         });
-        assert_eq!(early.now_s(), clock.time_s(50 * grid_ns));
-        assert_eq!(late.encoder_counts(early.now_s()), early.encoder_counts(early.now_s()));
-        assert!(early.encoder_counts(early.now_s()) > 10);
+        let end_ns = 50 * grid_ns;
+        assert_eq!(early.meeting.lock().now_s, early.clock.time_s(end_ns));
+        assert_eq!(late.encoder_counts(end_ns), early.encoder_counts(end_ns));
+        assert!(early.encoder_counts(end_ns) > 10);
     }
 }

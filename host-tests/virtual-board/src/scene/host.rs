@@ -20,7 +20,6 @@ use sim::effects::link::Named;
 use sim::events::Request;
 use sim::host::Reading;
 use sim::scene::Scene;
-use sim::watch::Step;
 use std::collections::VecDeque;
 
 /// Longest time for which a read and its answer occupy the line, ns.
@@ -50,31 +49,11 @@ struct Sent {
     write: Write,
 }
 
-#[derive(Clone, Copy, Debug)]
-pub struct Shown {
-    finger: usize,
-    seen: Seen,
-    command: Command,
-    status: Status,
-}
-
-impl Shown {
-    pub fn step(&self) -> Step<'_> {
-        Step {
-            finger: self.finger,
-            time_s: self.seen.time_s,
-            frame: &self.seen.frame,
-            sense: &self.seen.sense,
-            command: &self.command,
-            status: &self.status,
-            truth: &self.seen.truth,
-        }
-    }
-}
+/// A frame to show, with the command that the board had and the status that it answered.
+pub type Shown = (Seen, Command, Status);
 
 /// The host of one finger during a run.
 pub struct Host {
-    finger: usize,
     host: sim::host::Host,
     pub link: Named,
     pub clock: Clock,
@@ -111,11 +90,10 @@ pub struct Host {
 
 impl Host {
     /// Host before the start; `offset` leads from the converters' frame numbers to the board's.
-    pub fn new(scene: &Scene, finger: usize, link: Named, start_ns: u64, frame_ns: u64, offset: u32) -> Self {
+    pub fn new(scene: &Scene, link: Named, start_ns: u64, frame_ns: u64, offset: u32) -> Self {
         let watchdog_ms = scene.table("host").whole("watchdog_ms") as u64;
         let least_ns = (scene.duration_s * 1e9 / LOOKS) as u64;
         Self {
-            finger,
             host: sim::host::Host::new(scene),
             link,
             clock: Clock::new(start_ns),
@@ -162,9 +140,7 @@ impl Host {
     /// Acts once: processes bytes and frames since the last time, and sends the packets due before the next.
     pub fn turn(&mut self, now_ns: u64, next_ns: u64, received: Vec<TimedByte>, seen: Vec<Seen>, wire: &mut Wire) {
         self.frames.extend(seen);
-        while self.frames.len() > FRAMES {
-            self.frames.pop_front();
-        }
+        self.frames.drain(..self.frames.len().saturating_sub(FRAMES));
         for timed in received {
             if let Some(status) = heard(&mut self.receiver, timed.byte) {
                 self.answered(status, timed.at_ns);
@@ -205,7 +181,7 @@ impl Host {
         while let Some(sent) = self.sent.pop_front_if(|sent| sent.arrives_ns <= at_ns) {
             sent.write.apply(&mut self.command);
         }
-        self.shown.push(Shown { finger: self.finger, seen, command: self.command, status: self.status });
+        self.shown.push((seen, self.command, self.status));
     }
 
     fn send(&mut self, now_ns: u64, next_ns: u64, wire: &mut Wire) {

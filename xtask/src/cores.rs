@@ -62,8 +62,7 @@ pub fn page() -> Result<String> {
     let folder = host::made("cores")?;
     let mut list = String::new();
     for (number, (name, array, target, flags, board)) in CORES.iter().enumerate() {
-        let mut command = image::apart("build", LOOP, target, flags);
-        console::prepare(command.arg("--release"))?;
+        console::prepare(image::apart("build", LOOP, target, flags).arg("--release"))?;
         // Two boards have the same target and name.
         let elf = folder.join(format!("{number}.elf"));
         fs::copy(toolchain::images_for(target, flags).join("cores"), &elf).with_context(|| host::shown(&elf))?;
@@ -81,8 +80,7 @@ pub fn example() -> Result<()> {
     let target = TARGET_OF_EXAMPLE;
     toolchain::ensure_for(&[target], "the example for another board is built for it")?;
     let size = |features: &[&str]| {
-        let mut command = image::apart("build", EXAMPLE, target, &[]);
-        console::prepare(command.arg("--release").args(features))?;
+        console::prepare(image::apart("build", EXAMPLE, target, &[]).arg("--release").args(features))?;
         Ok::<_, anyhow::Error>(Image::read(&toolchain::images_for(target, &[]).join("rp2040"))?.bytes.len())
     };
     let measures = size(&["--features", "fingertip/measure"])?;
@@ -103,9 +101,7 @@ const VERSION_MIN: u32 = 9;
 
 /// Runs recorded stimulus, and random inputs of functions with own instructions, there and here, and compares.
 pub fn run_m4() -> Result<()> {
-    let image = prepare()?;
-    let mut replay = Program::tool("qemu-host").build()?;
-    console::run(replay.arg(&image).arg(host::target().join("stimulus")))
+    console::run(Program::tool("qemu-host").build()?.arg(prepare()?).arg(host::target().join("stimulus")))
 }
 
 pub fn test_m4() -> Result<()> {

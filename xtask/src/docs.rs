@@ -35,8 +35,8 @@ pub fn run(args: &Args) -> Result<()> {
     for (path, example) in GENERATED.split(' ').map(|path| (path, "generated")).chain([SCENES]) {
         renew(path, &print(example, Some(Path::new(path)))?, args.check, &mut stale)?;
     }
-    let mut budget = Program::sim("budget").build()?;
-    renew(BUDGET.0, &console::output(budget.args(["--fingers", BUDGET.1]))?, args.check, &mut stale)?;
+    let budget = console::output(Program::sim("budget").build()?.args(["--fingers", BUDGET.1]))?;
+    renew(BUDGET.0, &budget, args.check, &mut stale)?;
     renew(cores::PAGE.0, &cores::page()?, args.check, &mut stale)?;
 
     let root = host::root();

@@ -219,8 +219,7 @@ pub fn bringup(args: &BringupArgs) -> Result<()> {
 fn estimates() -> Result<PathBuf> {
     let folder = host::made("study")?;
     let [kept, full, file] = ["kept.bin", "few.bin", "few.txt"].map(|name| folder.join(name));
-    let mut inputs = Program::tool("study").build()?;
-    console::run(inputs.arg("few").arg(&kept).arg(&full))?;
+    console::run(Program::tool("study").build()?.arg("few").arg(&kept).arg(&full))?;
     let study = image::build("study", "study")?;
     let (_, regions) = timing::measure(&study, Some(&full))?;
     let call = regions.first().map_or(0, |region| region.flash.median);

@@ -57,8 +57,7 @@ impl Program {
 
 /// Builds one of the tools of `host-tests` and runs it.
 pub fn run_tool(name: &'static str, words: &[impl AsRef<OsStr>]) -> Result<()> {
-    let mut command = Program::tool(name).build()?;
-    console::run(command.args(words))
+    console::run(Program::tool(name).build()?.args(words))
 }
 
 /// `cargo <subcommand>` for a package of this machine. The emulator's crate asks for a newer compiler than it needs.

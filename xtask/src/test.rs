@@ -25,34 +25,19 @@ pub fn run(args: &Args) -> Result<()> {
         return long(stages);
     }
     stages.stage("core and host tests", || host::test(&mut host::tests(&["--no-fail-fast"])));
-    stages.stage("fit of a sensor to recordings", || {
-        let mut command = install::sensor_test()?;
-        console::run(&mut command)
-    });
-    let image = stages.stage("flash image", || {
-        let image = image::firmware()?;
-        console::print(&image.summary());
-        Ok(image)
-    });
+    stages.stage("fit of a sensor to recordings", || console::run(&mut install::sensor_test()?));
+    let image = stages.stage("flash image", || image::firmware().inspect(|image| console::print(&image.summary())));
     let image = || image.as_ref().context("the flash image did not build; see above");
-    stages.stage("size of the flash image", || {
-        console::print(&image::sizes(image()?)?);
-        Ok(())
-    });
+    stages.stage("size of the flash image", || image::sizes(image()?).map(|sizes| console::print(&sizes)));
     stages.stage("panic-free proof", image::prove_panic_free);
     stages.stage("emulated Cortex-M4F against this machine", cores::test_m4);
     stages.stage("example for another board", cores::example);
     stages.stage("timing model against published measurements", || timing::check().map(drop));
     stages.stage("virtual board", || {
-        let python = install::environment(&install::BUS)?;
-        let mut command = host::tests(&["--test", "board"]);
-        command.env("FINGERTIP_IMAGE", &image()?.elf).env("FINGERTIP_PYTHON", &python);
-        host::test(&mut command)
+        host::test(with_python(&["--test", "board"])?.env("FINGERTIP_IMAGE", &image()?.elf))
     });
     stages.stage("Python package on a served finger", || {
-        let python = install::environment(&install::BUS)?;
-        let mut command = host::tests(&["--test", "served", "--", "--ignored", "--skip", "long_"]);
-        host::test(command.env("FINGERTIP_PYTHON", &python))
+        host::test(&mut with_python(&["--test", "served", "--", "--ignored", "--skip", "long_"])?)
     });
     stages.stage("reports in a browser", || {
         let mut command = install::browser_test()?;
@@ -63,12 +48,17 @@ pub fn run(args: &Args) -> Result<()> {
     stages.finish("test")
 }
 
+/// Returns the command that runs tests with clients of the bus in Python.
+fn with_python(words: &[&str]) -> Result<Command> {
+    let mut command = host::tests(words);
+    command.env("FINGERTIP_PYTHON", install::environment(&install::BUS)?);
+    Ok(command)
+}
+
 /// Runs the larger sizes (tests whose names begin with `long_`), and checks the tables of proofs and fits.
 fn long(mut stages: Stages) -> Result<()> {
     stages.stage("long core and host tests", || {
-        let python = install::environment(&install::BUS)?;
-        let mut command = host::tests(&["--no-fail-fast", "--", "--ignored", "long_"]);
-        host::test(command.env("FINGERTIP_PYTHON", &python))
+        host::test(&mut with_python(&["--no-fail-fast", "--", "--ignored", "long_"])?)
     });
     stages.stage("long tests on the virtual board", || {
         let image = image::firmware()?;

@@ -152,8 +152,7 @@ pub fn measure(image: &Path, argument: Option<&Path>) -> Result<(String, Vec<Mea
 }
 
 fn plugin() -> Result<PathBuf> {
-    let mut command = host::cargo("build", "m4-timing");
-    console::prepare(command.args(["--features", "plugin"]))?;
+    console::prepare(host::cargo("build", "m4-timing").args(["--features", "plugin"]))?;
     let file = host::target().join(host::PROGRAMS).join(format!("{DLL_PREFIX}m4_timing{DLL_SUFFIX}"));
     fs::canonicalize(&file).with_context(|| host::shown(&file))
 }
@@ -198,13 +197,11 @@ pub fn study(args: &StudyArgs) -> Result<()> {
     let folder = host::made("study")?;
     let inputs = folder.join("inputs.bin");
     let judge = Program::tool("study");
-    let mut command = judge.build()?;
-    console::run(command.arg("inputs").arg(&inputs))?;
+    console::run(judge.build()?.arg("inputs").arg(&inputs))?;
     let shipped = image::build(STUDY, STUDY)?;
     let shipped = measured(&shipped, &inputs, &folder.join("shipped.txt"))?;
     let quick = measured(&build_quick()?, &inputs, &folder.join("quick.txt"))?;
-    let mut fingers = Program::sim("budget").build()?;
-    let held = console::output(fingers.args(["--whole-loop", "--fingers", FINGERS]))?;
+    let held = console::output(Program::sim("budget").build()?.args(["--whole-loop", "--fingers", FINGERS]))?;
     let whole_loop = folder.join("whole-loop.txt");
     host::write(&whole_loop, held)?;
     let mut command = judge.build()?;

@@ -46,7 +46,7 @@ impl Rig {
     /// Bytes from the first address of the flash on, which `cargo xtask build` writes beside an image. Fails if the
     /// emulated flash does not hold exactly these.
     pub fn flashed(&mut self) -> Result<Vec<u8>, Error> {
-        let path = self.image().path.with_extension("bin");
+        let path = self.image.path.with_extension("bin");
         let bytes = std::fs::read(&path).map_err(|why| Error::ReadImage(path, why))?;
         let mut places = (FLASH..).zip(bytes.clone());
         let differs = self.with(move |stand| {
@@ -54,7 +54,7 @@ impl Rig {
         })?;
         differs.map_or(Ok(bytes), |(at, _)| {
             let why = format!("the emulated flash differs from it at {at:#010x}");
-            Err(Error::NotAnImage(self.image().path.clone(), why))
+            Err(Error::NotAnImage(self.image.path.clone(), why))
         })
     }
 }

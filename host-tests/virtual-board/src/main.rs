@@ -14,7 +14,7 @@ use virtual_board::board::Surroundings;
 use virtual_board::demo;
 #[cfg(feature = "scenes")]
 use virtual_board::scene::simulate;
-use virtual_board::serve::Board;
+use virtual_board::serve::warm;
 use virtual_board::{Error, Options, Rig};
 
 /// Runs the flash image on an emulated STM32 with the simulated fingertip around it.
@@ -130,7 +130,8 @@ fn demo(image: &Path, json: Option<&Path>, out: &Path, quick: bool) -> Result<()
 fn serve(image: &Path, place: &Place, distance_mm: f64) -> Result<(), Error> {
     let mut setup = Setup::default();
     setup.wall.distance_mm = distance_mm;
-    let mut board = Board::warm(Rig::new(image, Surroundings::plant(&setup), &Options::confirmed())?)?;
+    let mut board = Rig::new(image, Surroundings::plant(&setup), &Options::confirmed())?;
+    warm(&mut board)?;
     let mut port = Port::open(place)?;
     let stop = port.stopper();
     ctrlc::set_handler(move || stop.stop()).map_err(std::io::Error::other)?;

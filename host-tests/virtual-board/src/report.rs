@@ -12,14 +12,6 @@ use rigless::soc::Width;
 use rigless::soc::stm32f427::generated::gpioa::Register;
 use rigless::soc::stm32f427::peripherals::gpio::{Gpio, Pin};
 
-fn cause(cause: ResetCause) -> String {
-    match cause {
-        ResetCause::Core => "software".to_owned(),
-        ResetCause::Model(instance) => instance.to_owned(),
-        other => format!("{other:?}"),
-    }
-}
-
 /// Required mode of a pin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Mode {
@@ -69,7 +61,12 @@ impl Rig {
 
     /// Resets since power-on: cause and time, ns. The cause is `software`, or the name of a peripheral, for example `IWDG`.
     pub fn resets(&mut self) -> Result<Vec<(String, u64)>, Error> {
-        self.with(|stand| stand.session.resets().iter().map(|reset| (cause(reset.cause), reset.at.0)).collect())
+        let cause = |cause| match cause {
+            ResetCause::Core => "software".to_owned(),
+            ResetCause::Model(instance) => instance.to_owned(),
+            other => format!("{other:?}"),
+        };
+        self.with(move |stand| stand.session.resets().iter().map(|reset| (cause(reset.cause), reset.at.0)).collect())
     }
 
     /// Pins whose mode does not fit the board's wiring.
@@ -98,7 +95,7 @@ impl Rig {
 
     /// Stack use since the last reset, or `None` if the image has no symbols for its stack.
     pub fn stack_use(&mut self) -> Result<Option<StackUse>, Error> {
-        let ends = self.image().symbol("_stack_end").zip(self.image().symbol("_stack_start"));
+        let ends = self.image.symbol("_stack_end").zip(self.image.symbol("_stack_start"));
         let Some((low, high)) = ends.filter(|(low, high)| low < high) else { return Ok(None) };
         self.with(move |stand| {
             let painted = |address: &u64| stand.host.read(*address, Width::W32).is_ok_and(|word| word == PAINT);

@@ -70,7 +70,7 @@ enum Order {
 /// A run. After the emulator has stopped, every method that returns a `Result` returns why.
 #[derive(Debug)]
 pub struct Rig {
-    image: Firmware,
+    pub image: Firmware,
     orders: Option<mpsc::Sender<Order>>,
     reached: mpsc::Receiver<u64>,
     thread: Option<JoinHandle<Result<(), Error>>>,
@@ -100,10 +100,6 @@ impl Rig {
         let mut rig = Self { image, orders: Some(orders), reached, thread: Some(thread), now_ns: 0, wait_ns: WAIT_NS };
         rig.await_reached()?;
         Ok(rig)
-    }
-
-    pub fn image(&self) -> &Firmware {
-        &self.image
     }
 
     /// Present time of the run, virtual ns since power-on.

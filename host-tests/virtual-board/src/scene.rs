@@ -201,7 +201,7 @@ fn set_up(rig: &mut Rig, scene: &Scene, start_ns: u64) -> Result<(), Error> {
 ///
 /// The status alone does not show it: the least delay of an answer depends on the load of the core.
 fn frame_offset(rig: &mut Rig) -> Result<u32, Error> {
-    let Some(address) = rig.image().item("scan", "SEQUENCE") else {
+    let Some(address) = rig.image.item("scan", "SEQUENCE") else {
         let why = "the image has no counter of frames named `scan::SEQUENCE`".into();
         return Err(Error::Host(rig.now_ns(), why));
     };

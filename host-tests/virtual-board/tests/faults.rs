@@ -212,7 +212,7 @@ fn a_store_below_ram_or_to_the_image_is_a_hard_fault_there_and_then(rig: &mut Ri
         assert_eq!(causes_since(rig, from_ns), ["software"], "{address:#x}");
     }
     // The patch outlives the reset, so the board cannot come up to be asked: its record says where it was.
-    let record = rig.image().item("crash", "RECORD").expect("the image has a crash record");
+    let record = rig.image.item("crash", "RECORD").expect("the image has a crash record");
     let word = move |stand: &mut Stand<'_>, offset| stand.host.read(record + offset, Width::W32).unwrap_or(0);
     let [cause, pc] = with(rig, move |stand| [4, 12].map(|offset| word(stand, offset)));
     assert_eq!((cause, pc), (2, 0x0803_f008), "a hard fault at the store");

@@ -2,46 +2,6 @@
 
 use crate::common::*;
 
-/// Presses with 1 N and releases; after a time the object is pushed into the tip for 2 s and taken away; then a press
-/// with 1 N. Returns the reading and the true force of that touch, and the largest force of the second press.
-fn next_press(torque: bool, after_s: f64, depth_mm: f64) -> [f64; 3] {
-    let mut board = ready();
-    board.hold(1_000, 1.0);
-    board.hold(0, after_s);
-    board.command().torque = torque;
-    let travel = board.truth().travel_mm;
-    board.carry_object(5.0, travel - depth_mm, 100.0, |_| {});
-    board.run(2.0);
-    let touch = [board.status().contact.force.0.to_num(), board.truth().force_n];
-    board.place_object(5.0);
-    board.run(0.01);
-    (board.command().torque, board.command().goal) = (true, newtons(1_000));
-    let [read, held] = touch;
-    [read, held, board.run(1.0)]
-}
-
-/// With torque the tip backs off from it; without, the object keeps pressing.
-#[test]
-fn what_comes_to_a_released_tip_is_not_learnt() {
-    let cases = [(0.5, 0.3), (0.5, 0.6), (0.5, 1.0), (2.0, 0.3), (2.0, 1.0), (0.05, 1.0)];
-    // At once after the contact, when a residue is learnt.
-    let soon = [(0.05, 0.3), (0.05, 0.5), (0.05, 0.6), (0.05, 0.8)];
-    let all = cases.into_iter().flat_map(|case| [(false, case), (true, case)]);
-    for (torque, (after_s, depth_mm)) in all.chain(soon.map(|case| (true, case))) {
-        let [read, held, largest] = next_press(torque, after_s, depth_mm);
-        let name = format!("torque {torque}, {depth_mm} mm deep after {after_s} s: {read} of {held} N, then {largest}");
-        assert!(if torque { held == 0.0 } else { held > 0.05 }, "{name}");
-        assert!((read - held).abs() < 0.01 + 0.01 * held, "{name}");
-        assert!(largest < 1.02, "{name}");
-    }
-}
-
-#[test]
-fn no_more_than_the_force_of_a_contact_is_learnt() {
-    let [read, held, largest] = next_press(true, 0.05, 0.2);
-    assert!(read < 0.01 && held > 0.02 && largest < 1.06, "{read} of {held} N, then {largest}");
-}
-
 fn bench(params: &Params) -> Bench {
     let mut board = Bench::of(&Setup::default(), &allowed(*params));
     board.tare();
@@ -374,12 +334,4 @@ fn torque_after_a_flagged_tare_is_refused_unless_it_was_forced() {
         assert!(status.fault.is_none() && status.limits.has(Limits::TARED_TOUCHING));
         assert_eq!(status.mode, mode);
     }
-}
-
-#[test]
-fn a_new_calibration_forgets_the_flag() {
-    let mut finger = Finger::new(2, 250.0);
-    assert!(finger.tare(1.0, [0.0; 2]));
-    finger.pipeline.calibrate(&Calibration::NONE);
-    assert!(!finger.tare(0.0, [0.0; 2]));
 }

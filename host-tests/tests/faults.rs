@@ -2,7 +2,6 @@
 //! each mode, and in the middle of the scan of a frame.
 
 use crate::common::*;
-use sim::plant::Faults;
 
 /// Steps until a fault; the number of frames that took.
 fn frames_to_fault(board: &mut Bench, at_most: u32) -> (u32, Status) {
@@ -44,41 +43,6 @@ fn taxels_that_are_bad_for_one_frame_are_no_fault() {
 }
 
 #[test]
-fn after_a_fault_what_was_touched_is_known() {
-    let mut board = holding(1_000);
-    board.pipeline().stop(Fault::MissedDeadline);
-    board.command().torque = false;
-    board.command().clear_request += 1;
-    board.step();
-    board.command().torque = true;
-    assert_eq!(board.step().mode, Mode::Force);
-}
-
-/// Interference in a single frame, too weak to make a taxel bad, changes the force that is held for no longer.
-#[test]
-fn a_frame_that_reads_too_much_or_too_little_is_forgotten() {
-    for goal_mn in [100, 1_000, 3_000] {
-        for (rows, codes) in
-            [(0..10, 15), (0..10, 40), (0..10, 150), (3..7, 60), (0..10, -15), (3..7, -60), (3..7, -300)]
-        {
-            let mut board = holding(goal_mn);
-            let name = format!("goal {goal_mn} mN, {codes} codes in rows {rows:?}");
-            let spoilt = |row, code| if rows.contains(&row) { (i32::from(code) + codes).max(400) as u16 } else { code };
-            board.step_with(|record| recode(&mut record.frame, |row, _, code| spoilt(row, code)));
-            let (mut least_n, mut largest_n) = (f64::MAX, 0.0_f64);
-            for _ in 0..10_000 {
-                let mode = board.step().mode;
-                let force_n = if mode == Mode::Force { board.truth().force_n } else { 0.0 };
-                (least_n, largest_n) = (least_n.min(force_n), largest_n.max(force_n));
-            }
-            let goal_n = f64::from(goal_mn) * 1e-3;
-            let (told, near) = (told(&mut board), 0.9 * goal_n <= least_n && largest_n <= 1.1 * goal_n);
-            assert!(near, "{name}: {least_n:.3} to {largest_n:.3} N, {told}");
-        }
-    }
-}
-
-#[test]
 fn taxels_that_die_within_the_contact_do_not_change_the_force() {
     for goal_mn in [200, 1_000, 4_000] {
         let mut board = holding(goal_mn);
@@ -104,23 +68,6 @@ fn noise_at_no_force_is_not_a_frozen_encoder() {
         let more = if number % 10 < 5 { 2 } else { 0 };
         let status = board.step_with(|record| recode(&mut record.frame, |_, _, code| code + more));
         assert_eq!(status.fault, None, "frame {number}");
-    }
-}
-
-/// Swapped encoder channels or motor leads: stopped within 5 ms of the first drive, 0.5 mm on.
-#[test]
-fn a_motor_that_runs_the_wrong_way() {
-    for (encoder_reversed, leads_swapped) in [(true, false), (false, true)] {
-        for goal_mn in [100, 1_000, 7_000] {
-            let mut board = ready();
-            board.harm(|faults| *faults = Faults { encoder_reversed, leads_swapped, ..Faults::default() });
-            board.command().goal = newtons(goal_mn);
-            let (_, status) = frames_to_fault(&mut board, 200);
-            assert!(matches!(status.fault, Some(Fault::Reversed)), "{:?}", status.fault);
-            assert!(board.truth().travel_mm.abs() <= 0.5, "{} mm", board.truth().travel_mm);
-            board.frames(5_000);
-            assert!(board.truth().travel_mm.abs() <= 1.5, "{} mm", board.truth().travel_mm);
-        }
     }
 }
 

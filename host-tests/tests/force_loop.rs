@@ -42,47 +42,6 @@ fn force_steps_are_quick_and_true() {
     }
 }
 
-#[test]
-fn an_object_that_goes_away_is_not_chased() {
-    let mut board = ready();
-    run(&mut board, 2_000, 0.5);
-    // 10 mm away, at half a metre in a second.
-    board.carry_object(5.0, 15.0, 500.0, |_| {});
-    let (_, status) = run(&mut board, 2_000, 0.05);
-    assert_eq!(status.mode, Mode::Approach);
-    let speed = board.truth().speed_mm_per_s;
-    assert!((25.0..=35.0).contains(&speed), "{speed} mm/s");
-    let (_, status) = run(&mut board, 2_000, 0.6);
-    assert_eq!(status.mode, Mode::Force);
-    assert!((board.truth().force_n - 2.0).abs() < 0.015);
-}
-
-/// The reading vanishes within a frame while the tip rests: it is the array's, so the finger does not press
-/// harder. After 3 ms without a force the finger releases the object, and seeks it then.
-#[test]
-fn a_reading_that_vanishes_at_once_does_not_make_it_press_harder() {
-    for goal_mn in [200, 1_000, 5_000] {
-        let mut board = ready();
-        run(&mut board, goal_mn, 0.5);
-        let mut free = Bench::default();
-        free.step();
-        let blank = free.frame().codes;
-        let (mut largest_n, mut modes) = (0.0_f64, Vec::new());
-        for _ in 0..20_000 {
-            let mode = board.step_with(|record| record.frame.codes = blank).mode;
-            largest_n = largest_n.max(board.truth().force_n);
-            modes.push(mode);
-            if mode == Mode::Approach {
-                break;
-            }
-        }
-        assert!(largest_n < 1.02e-3 * f64::from(goal_mn) + 0.005, "{goal_mn} mN: {largest_n} N");
-        modes.dedup();
-        assert_eq!(modes, [Mode::Force, Mode::Release, Mode::Approach], "{goal_mn} mN");
-        assert_eq!((board.truth().force_n, board.status().fault), (0.0, None), "{goal_mn} mN");
-    }
-}
-
 // A motor that is shorted at any moment of a step stops below 1.3 times the goal and 0.4 N.
 sim::sizes!(a_motor_that_is_shorted_on_the_way_stops_within_its_bound, shorted_every(20), shorted_every(5));
 
@@ -201,28 +160,6 @@ fn a_press_from_a_released_tip_ends_at_the_clearance() {
     assert!(board.truth().force_n <= 0.0, "nearer: {}", told(&mut board));
 }
 
-/// A residue of an earlier contact is not an object. Parameters that are written with torque off forget the touch.
-#[test]
-fn a_residue_from_before_torque_does_not_make_the_tip_go_back() {
-    for seed in 0..4 {
-        let mut board = ordinary(seed, 1.0, 4, 2);
-        board.hold(6_000, 3.0);
-        board.command().torque = false;
-        board.hold(0, 0.3);
-        let config = board.pipeline().config().clone();
-        board.pipeline().configure(&config);
-        board.carry_object(5.0, 15.0, CARRIED_MM_PER_S, |_| {});
-        let before_mm = board.truth().travel_mm;
-        let residue_n: f64 = board.status().contact.force.0.to_num();
-        board.command().torque = true;
-        board.run(1.0);
-        let back_mm = before_mm - board.truth().travel_mm;
-        // The clearance, half a millimetre to see that the force does not fall, and the residue's indentation.
-        let name = format!("{seed}: a residue of {residue_n:.3} N, {back_mm:.3} mm back");
-        assert!((-0.1..2.2).contains(&back_mm), "{name}: {}", told(&mut board));
-    }
-}
-
 #[test]
 fn what_came_to_a_released_tip_is_held_and_let_go() {
     for (to_mm, goal_mn) in [(3.0, 1_000), (2.5, 1_000), (2.0, 1_000), (1.5, 200), (0.8, 200)] {
@@ -236,22 +173,5 @@ fn what_came_to_a_released_tip_is_held_and_let_go() {
         let held = off <= 0.05 && board.status().mode == Mode::Force;
         assert!(held, "to {to_mm} mm, goal {goal_mn} mN: {}", told(&mut board));
         lets_go(&mut board, 2.0, &format!("to {to_mm} mm, {goal_mn} mN"));
-    }
-}
-
-/// Whether torque was off in between or not.
-#[test]
-fn the_end_of_the_travel_stops_an_approach() {
-    let mut board = ready();
-    board.place_object(100.0);
-    board.command().goal = newtons(1_000);
-    for _ in 0..3 {
-        board.run(1.0);
-        let truth = board.truth();
-        let at_rest = (19.5..20.5).contains(&truth.travel_mm) && truth.speed_mm_per_s.abs() < 1.0;
-        assert!(at_rest && board.status().limits.has(Limits::TRAVEL), "{}", told(&mut board));
-        board.command().torque = false;
-        board.run(0.1);
-        board.command().torque = true;
     }
 }

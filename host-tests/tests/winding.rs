@@ -392,19 +392,6 @@ fn hold(config: &Config, goal_mn: i32, seconds: f64) -> (f64, Bench) {
 }
 
 #[test]
-fn what_is_held_grows_by_the_rate_and_no_more_than_that() {
-    // This array does not creep: the loop presses harder by all that it takes for creep.
-    let (force, board) = hold(&creeping(100, 500), 2_000, 4.0);
-    assert!((2.19..2.21).contains(&force), "{force}");
-    let status = board.status();
-    assert_eq!((status.mode, status.fault), (Mode::Force, None));
-    let [contact, creep]: [f64; 2] = [status.contact.force, status.creep].map(|force| force.0.to_num());
-    assert!((contact - force).abs() < 0.01 && (contact - creep - 2.0).abs() < 0.01, "{contact} {creep}");
-    let (force, _) = hold(&creeping(0, 500), 2_000, 4.0);
-    assert!((1.99..2.01).contains(&force), "{force}");
-}
-
-#[test]
 fn it_never_leads_beyond_the_largest_force() {
     let params = Params { creep_permille: 300, creep_time_ms: 50, force_max_mn: 3_000, ..images::CONFIRMED };
     let (force, board) = hold(&allowed(params), 3_000, 3.0);

@@ -336,7 +336,9 @@ fn a_jog_keeps_to_its_share_of_the_supply() {
     for percent_of_friction in (100..=600).step_by(100) {
         let mut setup = Setup::default();
         setup.motor.friction_nm *= f64::from(percent_of_friction) / 100.0;
-        let mut finger = taring(Made::of(&setup, &config()), TARE_FRAMES + 2);
+        let mut finger = Made::of(&setup, &config());
+        finger.bench.command().tare_request += 1;
+        finger.frames(TARE_FRAMES + 2);
         finger.begin(Task::Jog);
         let mut most = 0;
         while finger.frame().measure.state == MeasureState::Running {
@@ -395,102 +397,4 @@ fn a_record_ended_by_the_host_is_whole() {
     finger.ends();
     finger.assert_ended(Task::Strokes, Ended::Complete);
     assert_eq!(finger.capture.standing().count, 2);
-}
-
-// A request that cannot be served has its reason at once.
-
-/// The array with the object pressed in.
-fn pressed(mut finger: Made) -> Made {
-    finger.bench.place_object(-0.8);
-    finger.frames(20);
-    finger
-}
-
-fn with_torque(mut finger: Made) -> Made {
-    finger.bench.command().torque = true;
-    finger.frame();
-    finger
-}
-
-/// During a tare, or after it.
-fn taring(mut finger: Made, frames: u32) -> Made {
-    finger.bench.command().tare_request += 1;
-    finger.frames(frames);
-    finger
-}
-
-fn unconfirmed() -> Made {
-    let mut finger = Made::of(&Setup::default(), &allowed(Params::DEFAULT));
-    finger.bench.tare();
-    finger.bench.command().torque = false;
-    finger.frames(200);
-    finger
-}
-
-fn recalibrated() -> Made {
-    let mut finger = Made::tared();
-    finger.bench.pipeline().calibrate(&Calibration::NONE);
-    finger
-}
-
-fn faulted() -> Made {
-    let mut finger = with_torque(Made::tared());
-    finger.frame_with(|record| record.sense.bridge_fault = true);
-    finger.bench.command().torque = false;
-    finger.frame();
-    assert_eq!(finger.bench.status().mode, Mode::Fault);
-    finger
-}
-
-/// A state, how it is made, and how a jog, strokes and a press end in it.
-type Case = (&'static str, fn() -> Made, [Option<Ended>; 3]);
-
-/// States of a finger, with the refusals of a jog, of strokes and of a press in each; `None` if the motion begins.
-#[test]
-fn every_state_has_its_answer() {
-    const NO: Option<Ended> = Some(Ended::NotReady);
-    let states: [Case; 10] = [
-        ("not tared", Made::untared, [NO; 3]),
-        ("not tared, torque on", || with_torque(Made::untared()), [NO; 3]),
-        ("tared", Made::tared, [None, None, NO]),
-        ("unconfirmed", unconfirmed, [None, Some(Ended::Unconfirmed), NO]),
-        ("torque on", || with_torque(Made::tared()), [NO, NO, None]),
-        ("taring", || taring(Made::tared(), 1), [NO; 3]),
-        ("touching", || pressed(Made::tared()), [NO; 3]),
-        ("tared while touching", || taring(pressed(Made::untared()), 700), [NO; 3]),
-        ("gains changed", recalibrated, [NO; 3]),
-        ("fault", faulted, [NO; 3]),
-    ];
-    for (name, made, answers) in states {
-        for (task, answer) in [Task::Jog, Task::Strokes, Task::Press].into_iter().zip(answers) {
-            let mut finger = made();
-            finger.bench.request(task);
-            let status = finger.frame();
-            let (measure, taken) = (status.measure, status.taken.measure);
-            assert_eq!((measure.task, taken), (task, finger.bench.command().measure_request), "{name}");
-            let began = (MeasureState::Running, Ended::Complete);
-            let expected = answer.map_or(began, |ended| (MeasureState::Ended, ended));
-            assert_eq!((measure.state, measure.ended), expected, "{name}: {task:?}");
-            assert_eq!(matches!(status.mode, Mode::Press | Mode::Strokes), answer.is_none(), "{name}: {task:?}");
-        }
-    }
-}
-
-#[test]
-fn a_request_during_a_motion_is_answered_by_its_end() {
-    for task in [Task::Jog, Task::Press] {
-        let end = |others: &[Task]| {
-            let mut finger = Made::begun(task);
-            for other in others {
-                finger.bench.request(*other);
-                let status = finger.frame();
-                assert_eq!((status.measure.task, status.measure.state), (task, MeasureState::Running));
-                assert_eq!(status.taken.measure, finger.bench.command().measure_request);
-            }
-            finger.ends().measure
-        };
-        let alone = end(&[]);
-        assert_eq!(end(&[Task::Jog, Task::Strokes, Task::Press]), alone);
-        assert_eq!(alone.state, MeasureState::Done);
-    }
 }

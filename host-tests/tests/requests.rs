@@ -57,9 +57,13 @@ fn pressed(record: &mut Record) {
 /// A tare was requested these frames ago.
 fn taring(frames: u32) -> Bench {
     let mut board = Bench::default();
+    tare_for(&mut board, frames);
+    board
+}
+
+fn tare_for(board: &mut Bench, frames: u32) {
     board.command().tare_request += 1;
     board.frames(frames);
-    board
 }
 
 /// A tare lasts for these frames.
@@ -94,18 +98,6 @@ fn a_tare_that_comes_with_another_request_is_done() {
         tares(&mut board, TARE_FRAMES, name);
         assert_eq!((board.status().mode, board.step().mode), (Mode::Off, after), "{name}");
     }
-}
-
-/// Also in the frame of the request.
-#[test]
-fn a_fault_ends_a_tare_for_all_to_see() {
-    for ((spoil, fault), frames_before) in EARLY_AND_LATE.into_iter().flat_map(|case| [(case, 0), (case, 1)]) {
-        let status = taring(frames_before).step_with(spoil);
-        assert_eq!((status.mode, status.fault, status.tare), (Mode::Fault, Some(fault), Taring::Refused));
-    }
-    let mut board = taring(1);
-    board.pipeline().stop(Fault::LostFrames);
-    assert_eq!(board.status().tare, Taring::Refused);
 }
 
 /// The array is the same, so is its tare, to the rounding of its means.
@@ -144,17 +136,6 @@ fn new_parameters_do_not_hide_what_is_pressed() {
 }
 
 #[test]
-fn a_press_in_the_frame_of_a_fault_leaves_no_old_outcome() {
-    for (spoil, fault) in EARLY_AND_LATE {
-        let mut board = ready();
-        board.request(Task::Press);
-        let status = board.step_with(spoil);
-        let interrupted = MeasureStatus::over(Task::Press, Ended::Interrupted, 0);
-        assert_eq!((status.mode, status.fault, status.measure), (Mode::Fault, Some(fault), interrupted));
-    }
-}
-
-#[test]
 fn a_press_that_comes_with_torque_or_during_a_tare_waits_for_the_drive() {
     let mut board = taring(1);
     board.command().torque = true;
@@ -175,44 +156,61 @@ fn a_press_that_comes_with_torque_or_during_a_tare_waits_for_the_drive() {
     assert_eq!(board.step().mode, Mode::Press);
 }
 
-#[test]
-fn a_press_that_waits_is_refused_once_torque_is_off() {
-    let mut board = taring(0);
+fn touched(board: &mut Bench) {
+    board.place_object(-0.8);
+    board.frames(20);
+}
+
+fn tared_touching(board: &mut Bench) {
+    touched(board);
+    tare_for(board, 700);
+}
+
+fn torque_on(board: &mut Bench) {
     board.command().torque = true;
-    board.request(Task::Press);
     board.step();
-    assert_eq!(board.step().measure, MeasureStatus::default());
-    board.command().torque = false;
-    let status = board.step();
-    let refused = MeasureStatus::over(Task::Press, Ended::NotReady, 0);
-    assert_eq!((status.mode, status.measure), (Mode::Tare, refused));
 }
 
-/// A request while a measurement runs is answered by its outcome, also in its last frame; the next one begins another.
+/// A change of a finger that is tared or not, at rest without torque; and how a jog, strokes and a press end after it,
+/// `None` if the motion begins.
+type Case = (&'static str, bool, Change, [Option<Ended>; 3]);
+
 #[test]
-fn a_press_in_the_frame_in_which_another_ends_has_its_outcome() {
-    let mut board = measuring();
-    let refused_at = (1..20_000).find(|_| board.step().measure.state != MeasureState::Running).expect("an end");
-    let mut board = measuring();
-    for _ in 1..refused_at {
-        assert_eq!(board.step().measure, RUNNING);
+fn every_state_has_its_answer() {
+    const NO: Option<Ended> = Some(Ended::NotReady);
+    let states: [Case; 10] = [
+        ("not tared", false, |_| {}, [NO; 3]),
+        ("not tared, torque on", false, torque_on, [NO; 3]),
+        ("tared", true, |_| {}, [None, None, NO]),
+        (
+            "unconfirmed",
+            true,
+            |board| board.pipeline().configure(&allowed(Params::DEFAULT)),
+            [None, Some(Ended::Unconfirmed), NO],
+        ),
+        ("torque on", true, torque_on, [NO, NO, None]),
+        ("taring", true, |board| tare_for(board, 1), [NO; 3]),
+        ("touching", true, touched, [NO; 3]),
+        ("tared while touching", false, tared_touching, [NO; 3]),
+        ("gains changed", true, |board| board.pipeline().calibrate(&Calibration::NONE), [NO; 3]),
+        ("fault", true, |board| board.pipeline().stop(Fault::Bridge), [NO; 3]),
+    ];
+    for (name, tared, change, answers) in states {
+        for (task, answer) in [Task::Jog, Task::Strokes, Task::Press].into_iter().zip(answers) {
+            let mut board = if tared { crate::common::ready() } else { Bench::default() };
+            board.command().torque = false;
+            board.frames(if tared { 200 } else { 0 });
+            change(&mut board);
+            board.request(task);
+            let status = board.step();
+            let (measure, taken) = (status.measure, status.taken.measure);
+            assert_eq!((measure.task, taken), (task, board.command().measure_request), "{name}");
+            let began = (MeasureState::Running, Ended::Complete);
+            let expected = answer.map_or(began, |ended| (MeasureState::Ended, ended));
+            assert_eq!((measure.state, measure.ended), expected, "{name}: {task:?}");
+            assert_eq!(matches!(status.mode, Mode::Press | Mode::Strokes), answer.is_none(), "{name}: {task:?}");
+        }
     }
-    for outcome in [(MeasureState::Ended, Ended::NoContact), (MeasureState::Running, Ended::Complete)] {
-        board.request(Task::Press);
-        let status = board.step();
-        assert_eq!((status.measure.state, status.measure.ended), outcome);
-        assert_eq!(status.taken.measure, board.command().measure_request);
-    }
-}
-
-/// With nothing to touch.
-fn measuring() -> Bench {
-    let mut board = at(40.0);
-    board.tare();
-    board.step();
-    board.request(Task::Press);
-    assert_eq!(board.step().measure, RUNNING);
-    board
 }
 
 /// Like every later frame: not driven at all where it shows a fault. Without torque a wrong supply is no fault.
@@ -274,18 +272,6 @@ fn torque_waits_until_the_tip_is_slow() {
 }
 
 #[test]
-fn torque_is_refused_before_the_direction_is_confirmed() {
-    let mut board = Bench::of(&Setup::default(), &allowed(Params::DEFAULT));
-    board.tare();
-    board.command().goal = newtons(1_000);
-    for _ in 0..1_000 {
-        let status = board.step();
-        assert_eq!((status.mode, status.duty.0), (Mode::Off, 0));
-        assert!(status.limits.has(Limits::DIRECTION) && !status.limits.has(Limits::TORQUE_HELD));
-    }
-}
-
-#[test]
 fn torque_that_was_on_before_a_tare_or_a_configuration_drives_nothing_until_it_was_off() {
     let tare: fn(&mut Bench) = |board| board.command().tare_request += 1;
     let configure: fn(&mut Bench) = |board| board.pipeline().configure(&config());
@@ -342,27 +328,6 @@ fn before_a_tare_no_contact_is_reported() {
     board.command().tare_forced = true;
     board.tare();
     assert_ne!(board.step().contact, Contact { bad_taxels: 1, ..Contact::default() });
-}
-
-/// Torque that was off in between changes nothing: the next approach does not know the surface of the one before.
-#[test]
-fn an_approach_after_a_release_forgets_the_surface() {
-    let [kept, cycled] = [false, true].map(|cycles| {
-        let mut board = ready();
-        board.hold(1_000, 0.5);
-        board.hold(0, 0.5);
-        if cycles {
-            board.command().torque = false;
-            board.frames(500);
-            board.command().torque = true;
-        }
-        board.place_object(100.0);
-        board.hold(1_000, 0.2);
-        let turned_mm = board.truth().travel_mm;
-        board.hold(0, 0.5);
-        board.truth().travel_mm - turned_mm
-    });
-    assert!(kept.abs() < 0.2 && (kept - cycled).abs() < 0.1, "{kept} mm with torque on, {cycled} mm after it was off");
 }
 
 /// The flag of a tare under a touch lasts until the next tare, also where that is not judged, since the tip was released.

@@ -119,37 +119,6 @@ fn an_object_that_vanishes_after_a_lowered_goal_is_followed_slowly() {
     judge("an object that vanishes after a lowered goal", "mm/s", &cases);
 }
 
-#[test]
-fn torque_off_just_after_the_touch_does_not_let_the_tip_run_into_the_object() {
-    let goals = ["", LOSSES].map(|losses| [0.5, 1.0, 3.0, 7.0].map(|goal_n| (losses, goal_n)));
-    let cases = each(goals.as_flattened(), &[1, 2, 4, 6, 8, 10, 12, 14, 17, 20], |(losses, goal_n), after_ms| {
-        let mut finger = finger(&(object(2.0, 0.0) + losses));
-        set_goal(&mut finger, goal_n);
-        touch(&mut finger);
-        let before_n = finger.run(1e-3 * f64::from(after_ms));
-        let peak_n = before_n.max(interrupt_torque(&mut finger, 0.5));
-        let losses = if losses.is_empty() { "no losses" } else { "losses" };
-        Case::new(format!("goal {goal_n} N, off {after_ms} ms after the touch, {losses}"), peak_n, most_n(goal_n))
-    });
-    judge("torque off just after the touch", "N", &cases);
-}
-
-#[test]
-fn torque_off_during_a_release_does_not_let_the_tip_fly_back() {
-    let clearance_mm = f64::from(Params::DEFAULT.clearance_um) * 1e-3;
-    let cases = each(&[1.0, 3.0, 7.0], &[0.004, 0.012, 0.03, 0.1], |goal_n, after_s| {
-        let mut finger = finger(&(object(5.0, 0.0) + LOSSES));
-        press(&mut finger, goal_n, 1.0);
-        let indentation_mm = finger.truth().indentation_mm;
-        press(&mut finger, 0.0, after_s);
-        interrupt_torque(&mut finger, 3.0);
-        let behind_mm = 5.0 - finger.truth().travel_mm;
-        let what = format!("goal {goal_n} N, off {after_s} s after the release began");
-        Case::new(what, behind_mm, clearance_mm + indentation_mm + 3.0)
-    });
-    judge("torque off during a release, behind the surface", "mm", &cases);
-}
-
 /// One press, torque off somewhere in it, and on again while the motor still turns.
 fn restarted(seed: u64) -> Case {
     let mut rng = Rng::with_seed(seed);
@@ -192,27 +161,6 @@ fn restarted(seed: u64) -> Case {
 #[test]
 fn torque_on_while_the_motor_coasts_is_no_fault() {
     judge("torque on while the motor coasts", "faults 5, 14 or 15", &cores::map(0..100, restarted));
-}
-
-/// An object that is pushed into a released tip and taken away leaves the next goal as it is.
-#[test]
-fn a_push_against_a_released_tip_does_not_change_the_next_goal() {
-    let cases = each(&[0.02, 0.04, 0.06, 0.1, 0.16, 0.2, 0.3], &[1.0, 1.45], |wait_s, depth_mm| {
-        let mut finger = finger(&(object(5.0, 0.0) + LOSSES));
-        press(&mut finger, 7.0, 1.0);
-        press(&mut finger, 0.0, wait_s);
-        let travel_mm = finger.truth().travel_mm;
-        finger.carry_object(5.0, (travel_mm - depth_mm).min(5.0), 100.0, |_| {});
-        finger.run(1.0);
-        let pushed_n = finger.truth().force_n;
-        finger.place_object(8.0);
-        finger.run(0.05);
-        press(&mut finger, 1.0, 1.5);
-        let off_n = (finger.truth().force_n - 1.0).abs();
-        let what = format!("{depth_mm} mm, {wait_s} s after the release began ({pushed_n:.2} N at last)");
-        Case::new(what, off_n, 0.15)
-    });
-    judge("a push against a released tip, then 1 N: off by", "N", &cases);
 }
 
 // A residual reading after a contact does not move a tip that touches nothing.

@@ -326,63 +326,47 @@ const OBJECTS_MM_PER_N: [f64; 2] = [0.0, 1.0];
 /// Largest force that a release may leave, N. A touch that reads just below `contact_on_mn` is not released.
 const LEFT_N: f64 = CONTACT_ON_N + 0.005;
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Disturbance {
-    TorqueOff,
-    GoalZero,
-    BridgeFault,
-    LostSignal,
-    SilentBus,
-}
+/// An event: its name, whether the motor then moves the tip off the object, so that friction holds no force, a change of
+/// the finger, and one of every frame from then on, with the codes of a tip that touches nothing.
+type Disturbance = (&'static str, bool, fn(&mut Finger), fn(&mut Record, &Frame));
 
-impl Disturbance {
-    const ALL: [Self; 5] = [Self::TorqueOff, Self::GoalZero, Self::BridgeFault, Self::LostSignal, Self::SilentBus];
+const BRIDGE_FAULT: &str = "a fault of the bridge";
 
-    /// Returns true if the motor moves the tip off the object, so that friction holds no force.
-    fn releases(self) -> bool {
-        matches!(self, Self::GoalZero | Self::SilentBus)
-    }
-
-    /// Lets it happen to a copy of the finger; returns the largest true force until the end, and the last one, N.
-    fn happens(self, finger: &Finger, scene: &Scene, blank: &Frame) -> (f64, f64) {
-        let mut finger = finger.fork(scene).unwrap_or_else(|error| panic!("{error}"));
-        match self {
-            Self::TorqueOff => finger.command().torque = false,
-            Self::GoalZero => set_goal(&mut finger, 0.0),
-            Self::SilentBus => finger.command().bus_watchdog_ms = 100,
-            Self::BridgeFault | Self::LostSignal => {}
-        }
-        let peak_n = finger.run_with(WATCHED_S, |record| match self {
-            Self::BridgeFault => record.sense.bridge_fault = true,
-            Self::LostSignal => show(record, blank),
-            Self::SilentBus => record.sense.bus_silent_ms = 200,
-            Self::TorqueOff | Self::GoalZero => {}
-        });
-        if self == Self::SilentBus {
-            assert_eq!(finger.status().fault, Some(Fault::BusSilent));
-        }
-        (peak_n, finger.truth().force_n)
-    }
-}
+const DISTURBANCES: [Disturbance; 5] = [
+    ("torque off", false, |finger| finger.command().torque = false, |_, _| {}),
+    ("goal 0", true, |finger| set_goal(finger, 0.0), |_, _| {}),
+    (BRIDGE_FAULT, false, |_| {}, |record, _| record.sense.bridge_fault = true),
+    ("a lost signal", false, |_| {}, show),
+    (
+        "a silent bus",
+        true,
+        |finger| finger.command().bus_watchdog_ms = 100,
+        |record, _| record.sense.bus_silent_ms = 200,
+    ),
+];
 
 /// The largest force after each event in one press, with the time after the touch, and the largest that is left 0.5 s
 /// later. `first` and `every` choose the instants.
-fn press(goal_n: f64, yield_mm_per_n: f64, first: u64, every: u64) -> [(f64, f64, f64); Disturbance::ALL.len()] {
+fn press(goal_n: f64, yield_mm_per_n: f64, first: u64, every: u64) -> [(f64, f64, f64); DISTURBANCES.len()] {
     let tables = object(2.0, yield_mm_per_n) + LOSSES;
     let (scene, approach_s) = (scene(&tables), touch_s(&tables, goal_n));
     let mut finger = begun(&scene);
     let (blank, begun_s) = (*finger.frame(), finger.time_s());
     set_goal(&mut finger, goal_n);
-    let mut worst = [(0.0, 0.0, 0.0_f64); Disturbance::ALL.len()];
+    let mut worst = [(0.0, 0.0, 0.0_f64); DISTURBANCES.len()];
     for instant in (first..INSTANTS).step_by(every as usize) {
         let at_s = (approach_s + AFTER_TOUCH_S) * instant as f64 / INSTANTS as f64;
         while finger.time_s() < begun_s + at_s {
             finger.step();
         }
-        for (event, worst) in Disturbance::ALL.into_iter().zip(&mut worst) {
-            let (peak_n, left_n) = event.happens(&finger, &scene, &blank);
-            let peak_n = peak_n.max(finger.truth().force_n);
-            worst.2 = worst.2.max(left_n);
+        for ((.., happens, change), worst) in DISTURBANCES.into_iter().zip(&mut worst) {
+            let mut copy = finger.fork(&scene).unwrap_or_else(|error| panic!("{error}"));
+            happens(&mut copy);
+            let peak_n = copy.run_with(WATCHED_S, |record| change(record, &blank)).max(finger.truth().force_n);
+            if copy.command().bus_watchdog_ms > 0 {
+                assert_eq!(copy.status().fault, Some(Fault::BusSilent));
+            }
+            worst.2 = worst.2.max(copy.truth().force_n);
             if peak_n > worst.0 {
                 (worst.0, worst.1) = (peak_n, at_s - approach_s);
             }
@@ -405,15 +389,15 @@ fn keep_the_force(every: u64) {
         press(*goal_n, *object, every * number as u64 / presses.len() as u64, every)
     });
     let (mut cases, mut released) = (Vec::new(), Vec::new());
-    for (index, event) in Disturbance::ALL.into_iter().enumerate() {
+    for (index, (event, releases, ..)) in DISTURBANCES.into_iter().enumerate() {
         for ((goal_n, object), worst) in presses.iter().zip(&worst) {
             let (peak_n, at_s, left_n) = worst[index];
-            let what = format!("{event:?} {at_s:+.4} s from the touch, goal {goal_n} N, {object} mm/N");
-            if event.releases() {
+            let what = format!("{event} {at_s:+.4} s from the touch, goal {goal_n} N, {object} mm/N");
+            if releases {
                 released.push(Case::new(what.clone(), left_n, LEFT_N));
             }
             // The bridge is open after its fault: the motor coasts, and nothing can stop it.
-            let most_n = if event == Disturbance::BridgeFault { f64::INFINITY } else { most_n(*goal_n) };
+            let most_n = if event == BRIDGE_FAULT { f64::INFINITY } else { most_n(*goal_n) };
             cases.push(Case::new(what, peak_n, most_n));
         }
     }

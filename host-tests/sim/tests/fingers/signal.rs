@@ -2,7 +2,7 @@
 //! Errors of worn sensors, of fingers far from their parameters, and in the heat.
 
 use crate::*;
-use fingertip::shipped::{COLUMNS, ROWS};
+use fingertip::shipped::COLUMNS;
 use sim::native::calibrated::{Calibrated, fingers, percentiles};
 use sim::native::simulate_calibrated;
 use sim::run::Run;
@@ -33,36 +33,6 @@ fn stops_in_time(moduli_kpa: &[f64]) {
         });
         judge("signal lost", "N", &cases);
     }
-}
-
-/// Halves all codes relative to the level of an undriven column.
-fn halve(record: &mut Record) {
-    for column in 0..COLUMNS {
-        let undriven = record.frame.code(ROWS, column);
-        for row in 0..ROWS {
-            let above = record.frame.code(row, column).saturating_sub(undriven);
-            record.frame.set_code(row, column, undriven + above / 2);
-        }
-    }
-}
-
-#[test]
-fn gains_that_halve_during_a_press_do_not_double_the_force() {
-    let cases = each(&[0.5, 1.0, 2.2, 5.0], &[-0.03, 0.003, 0.01, 0.03, 0.5], |goal_n, after_s| {
-        let mut finger = finger(&(object(3.0, 0.0) + LOSSES));
-        set_goal(&mut finger, goal_n);
-        if after_s < 0.0 {
-            finger.run(0.03);
-        } else {
-            touch(&mut finger);
-            finger.run(after_s);
-        }
-        let peak_n = finger.run_with(1.5, halve);
-        let (force_n, fault) = (finger.truth().force_n, finger.status().fault);
-        let what = format!("goal {goal_n} N, {after_s} s after the touch, {force_n:.2} N at last: {fault:?}");
-        Case::new(what, peak_n, most_n(goal_n))
-    });
-    judge("gains halved", "N", &cases);
 }
 
 /// What is withheld after a step down ends with its reason: a step up before it, and torque that was off meanwhile.

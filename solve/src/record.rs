@@ -32,6 +32,8 @@ const DEVIATION_CODES: f64 = 0.25;
 const VOLTS_PER_LSB: f64 = 0.25e-3;
 /// Absolute zero, degrees Celsius.
 const ZERO_K: f64 = -273.15;
+/// Bytes of a press step before its taxels.
+const TAXELS_AT: usize = 24;
 /// Standard uncertainty of the resistance in the parameters, as a share: 1 % of an ohmmeter, and copper that is 5 K warmer
 /// than it was then (0.4 %/K).
 const RESISTANCE_PART: f64 = 0.022;
@@ -106,32 +108,30 @@ pub fn press(bytes: &[u8], params: &Params) -> Result<Press, NoRecord> {
     let mut steps: Vec<Step> = Vec::new();
     let mut before = 0;
     for (index, record) in body.chunks_exact(head.record).enumerate() {
-        let mut cursor = Cursor(record);
-        let frames = [cursor.u32(), cursor.u32()];
-        let counts = [cursor.i32(), cursor.i32()];
-        let [averaged, branch] = [cursor.u16(), u16::from(cursor.u8())];
-        // A zero, and the mean voltage at the bridge.
-        let _: [u8; 3] = cursor.take();
-        let chip = cursor.u16();
+        let frames = [0, 4].map(|at| u32::from_le_bytes(number(record, at)));
+        let counts = [8, 12].map(|at| i32::from_le_bytes(number(record, at)));
+        let [averaged, chip] = [16, 22].map(|at| u16::from_le_bytes(number(record, at)));
         if frames[0] > frames[1] || frames[0] < before {
             return Err(NoRecord::Order(index));
         } else if averaged == 0 {
             return Err(NoRecord::Frames(index));
         }
         before = frames[1];
-        let branch = match branch {
+        let branch = match record[18] {
             0 => Branch::Loading,
             1 => Branch::Unloading,
-            other => return Err(NoRecord::Branch(index, other as u8)),
+            other => return Err(NoRecord::Branch(index, other)),
         };
-        let mut taxels: Vec<Reading> = (0..array.taxels())
-            .map(|_| Reading { mean: CODES_PER_LSB * f64::from(cursor.u16()) + LEAST_CODES, ..Reading::default() })
-            .collect();
-        taxels.iter_mut().for_each(|taxel| taxel.deviation = deviation(cursor.u8()));
-        for taxels in taxels.chunks_mut(8) {
-            let bits = cursor.u8();
-            taxels.iter_mut().enumerate().for_each(|(bit, taxel)| taxel.bad = bits >> bit & 1 == 1);
-        }
+        let [deviations, bits] = [2, 3].map(|bytes| TAXELS_AT + bytes * array.taxels());
+        let taxel = |taxel: usize| {
+            let mean = f64::from(u16::from_le_bytes(number(record, TAXELS_AT + 2 * taxel)));
+            Reading {
+                mean: CODES_PER_LSB * mean + LEAST_CODES,
+                deviation: deviation(record[deviations + taxel]),
+                bad: record[bits + taxel / 8] >> (taxel % 8) & 1 == 1,
+            }
+        };
+        let taxels = (0..array.taxels()).map(taxel).collect();
         steps.push(Step {
             time_s: frames.map(|frame| f64::from(frame) * head.frame_s),
             travel_mm: counts.map(|count| (f64::from(count) - f64::from(head.origin)) * mm_per_count),
@@ -151,8 +151,7 @@ pub fn strokes(bytes: &[u8], params: &Params) -> Result<Record, NoRecord> {
     let (head, body) = Head::of(bytes, Kind::Strokes)?;
     let mut strokes: Vec<Stroke> = Vec::new();
     for (index, record) in body.chunks_exact(head.record).enumerate() {
-        let mut cursor = Cursor(record);
-        let [count, voltage] = [cursor.u16().cast_signed(), cursor.u16().cast_signed()];
+        let [count, voltage] = [0, 2].map(|at| i16::from_le_bytes(number(record, at)));
         if count == START && voltage == 0 {
             strokes.push(Stroke::default());
             continue;
@@ -202,11 +201,10 @@ impl Head {
     /// Head and body of a series of this kind.
     fn of(bytes: &[u8], kind: Kind) -> Result<(Self, &[u8]), NoRecord> {
         let (head, body) = bytes.split_at_checked(HEAD).ok_or(NoRecord::Short(bytes.len()))?;
-        let mut cursor = Cursor(head);
-        let magic = [cursor.u8(), cursor.u8(), cursor.u8()];
-        let [version, number, rows, columns, ended] = [(); 5].map(|()| cursor.u8());
-        let [records, expected, frame_ns] = [(); 3].map(|()| cursor.u32());
-        let (origin, delay_ns, value) = (cursor.i32(), cursor.u32(), cursor.i32());
+        let [magic @ .., version, number, rows, columns, ended]: [u8; 8] = self::number(head, 0);
+        let [records, expected, frame_ns, delay_ns] =
+            [8, 12, 16, 24].map(|at| u32::from_le_bytes(self::number(head, at)));
+        let [origin, value] = [20, 28].map(|at| i32::from_le_bytes(self::number(head, at)));
         if magic != MAGIC {
             return Err(NoRecord::Magic(magic));
         } else if version != VERSION {
@@ -239,32 +237,9 @@ impl Head {
     }
 }
 
-/// Bytes that are read from the front. Behind the end it reads zeros; the lengths were checked before.
-struct Cursor<'a>(&'a [u8]);
-
-impl Cursor<'_> {
-    fn take<const N: usize>(&mut self) -> [u8; N] {
-        let Some((bytes, rest)) = self.0.split_first_chunk() else { return [0; N] };
-        self.0 = rest;
-        *bytes
-    }
-
-    fn u8(&mut self) -> u8 {
-        let [byte] = self.take();
-        byte
-    }
-
-    fn u16(&mut self) -> u16 {
-        u16::from_le_bytes(self.take())
-    }
-
-    fn u32(&mut self) -> u32 {
-        u32::from_le_bytes(self.take())
-    }
-
-    fn i32(&mut self) -> i32 {
-        i32::from_le_bytes(self.take())
-    }
+/// The bytes from a place on; the lengths were checked before.
+fn number<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
+    *bytes[at..].first_chunk().expect("the number lies within its record")
 }
 
 impl fmt::Display for Ended {

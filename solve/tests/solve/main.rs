@@ -5,9 +5,10 @@ mod modulus;
 mod record;
 mod strokes;
 
-use crate::finger::{Draw, Finger, Part, cycle, plan, presses};
+use crate::finger::{Draw, Finger, presses};
 use fingertip::measure::series::{HEAD, Head, check, step_bytes};
 use fingertip::params::Params;
+use sim::effects::Parts;
 use sim::native::calibrated::Place;
 use solve::gains::{Condition, NoGains, Verdict};
 use solve::press::{Branch, Press};
@@ -40,14 +41,14 @@ fn a_scale_gives_the_factor() {
 #[test]
 fn a_hold_shows_the_creep() {
     for percent in [1.0, 4.0] {
-        let mut finger = Finger::new(&Draw { creep_percent: percent, ..Draw::plain(250.0) });
-        finger.go(&Place::default());
-        finger.tare();
-        let ends_s = (1..=120).map(|n| 0.25 * f64::from(n)).collect();
-        let press =
-            finger.press(&[Part::Ramp { to_mm: 2.0, mm_per_s: 10.0, step_mm: 9.0 }, Part::Hold { ends_s }], 8.0);
-        let readings = press.steps[1..].iter().map(|step| [step.middle_s(), step.force_n(&press.array)]);
-        let found = creep(&readings.collect::<Vec<_>>()).expect("a hold");
+        let draw = Draw { creep_percent: percent, ..Draw::plain(250.0) };
+        let mut sensor = Parts::of(&draw.scene(&Place::default()), 0).sensor;
+        let readings = (0..=120).map(|n| {
+            let (time_s, mut kpa) = (0.25 * f64::from(n), [20.0; 10]);
+            sensor.pressure.each(|part| part(4, time_s, &mut kpa));
+            [time_s, kpa[4]]
+        });
+        let found = creep(&readings.skip(1).collect::<Vec<_>>()).expect("a hold");
         assert!(found.share.value > 0.005 * percent && found.left < 0.002 * percent, "{found:?}");
     }
 }
@@ -62,16 +63,17 @@ fn two_presses_show_the_temperature() {
         relaxation: 0.05,
         ..Draw::plain(250.0)
     };
-    let mut finger = Finger::new(&draw);
-    finger.go(&Place { centre_mm: [0.4, -0.3], tilt_deg: [1.0, 0.5] });
-    finger.pause(30.0);
-    finger.tare();
-    let mut warm = finger.press(&plan(), 8.0);
-    warm.steps.iter_mut().for_each(|step| step.chip_c = Some(45.0));
-    let mut finger = Finger::new(&Draw { extra: String::new(), ..draw });
-    finger.go(&Place { centre_mm: [0.4, -0.3], tilt_deg: [1.0, 0.5] });
-    finger.tare();
-    let cold = finger.press(&plan(), 8.0);
+    let place = Place { centre_mm: [0.4, -0.3], tilt_deg: [1.0, 0.5] };
+    let press = |draw: &Draw, chip_c| {
+        let mut finger = Finger::new(draw);
+        // Until the array is as warm as it gets.
+        finger.bench.rest(30.0);
+        let mut press = finger.press(&place, 0.0);
+        press.steps.iter_mut().for_each(|step| step.chip_c = Some(chip_c));
+        press
+    };
+    let warm = press(&draw, 45.0);
+    let cold = press(&Draw { extra: String::new(), ..draw }, 25.0);
     let found = temperature(&cold, &warm).expect("two presses");
     let per_k = found.per_k;
     assert!((per_k.value - 0.0036).abs() < 3.0 * per_k.sigma && per_k.sigma < 5e-4, "{found:?}");
@@ -87,7 +89,7 @@ fn drawn_arrays(seeds: Range<u64>) {
     for seed in seeds {
         let draw = Draw::any(seed, [15.0, 25.0], [1, 3]);
         let truth = draw.gains();
-        let found = gains(&presses(&draw, 3, &plan())).unwrap_or_else(|why| panic!("{why:?} {draw:?}"));
+        let found = gains(&presses(&draw, 3)).unwrap_or_else(|why| panic!("{why:?} {draw:?}"));
         let known = || found.taxels.iter().zip(&truth).filter(|(gain, _)| gain.condition == Condition::Sound);
         let count = known().count() as f64;
         let factor = known().map(|(gain, truth)| truth / gain.reads).sum::<f64>() / count;
@@ -117,7 +119,7 @@ fn drawn_arrays(seeds: Range<u64>) {
 #[test]
 fn odd_taxels_are_named() {
     let draw = Draw { gains_percent: 5.0, creep_percent: 2.0, ..Draw::plain(250.0) };
-    let mut presses = presses(&draw, 2, &plan());
+    let mut presses = presses(&draw, 2);
     let before = gains(&presses).expect("gains");
     for step in presses.iter_mut().flat_map(|press| &mut press.steps) {
         // One conducts as the square, one is read from its neighbour, one was counted as bad by the chip.

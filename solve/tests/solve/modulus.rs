@@ -1,6 +1,6 @@
 //! Young's modulus of drawn tips.
 
-use crate::finger::any_place;
+use crate::finger::{DISTANCE_MM, any_place};
 use crate::*;
 use solve::modulus;
 use solve::modulus::Modulus;
@@ -36,7 +36,7 @@ fn summary(name: &str, errors: &[[f64; 2]]) -> [f64; 4] {
 sim::sizes!(three_presses_give_a_better_one, better(200..202), better(200..203));
 
 fn better(seeds: Range<u64>) {
-    let three = |draw: &Draw| presses(draw, 3, &plan());
+    let three = |draw: &Draw| presses(draw, 3);
     let [median, worst, sigma, within] = errors("three presses", seeds, 10.0, three);
     assert!(median < 1.0 && worst < 4.0 && within >= 2.0 && sigma < 1.4, "{median} {worst} {within} {sigma}");
 }
@@ -44,7 +44,12 @@ fn better(seeds: Range<u64>) {
 /// A record that ends at the deepest place, as one that filled the memory, shows less than both strokes.
 #[test]
 fn the_forward_stroke_alone_is_solved_too() {
-    let forward = |draw: &Draw| presses(draw, 1, &cycle(5.0, 3.0)[..2]);
+    let forward = |draw: &Draw| {
+        let mut presses = presses(draw, 1);
+        let deepest = presses[0].steps.iter().rposition(|step| step.branch == Branch::Loading).expect("a way in");
+        presses[0].steps.truncate(deepest + 1);
+        presses
+    };
     let [median, worst, .., within] = errors("in alone", 300..303, 10.0, forward);
     assert!(median < 6.0 && within >= 2.0, "{median} {worst} {within}");
 }
@@ -57,7 +62,7 @@ fn an_array_of_any_shape_gives_the_modulus() {
         .enumerate()
         .map(|(seed, [rows, columns])| {
             let draw = Draw::any(600 + seed as u64, [0.0, 5.0], [0, 0]);
-            let mut presses = presses(&draw, 1, &plan());
+            let mut presses = presses(&draw, 1);
             let whole = gains(&presses).expect("gains").presses[0].pose.axis_mm;
             let press = &mut presses[0];
             (press.array.rows, press.array.columns) = (rows, columns);
@@ -86,12 +91,8 @@ fn an_array_of_any_shape_gives_the_modulus() {
 /// A contact that reaches over the array's edge is measured by what lies on the array.
 #[test]
 fn an_edge_does_not_refuse_a_press() {
-    let [_, worst, ..] = errors("over the edge", 400..403, 3.0, |draw| {
-        let mut finger = Finger::new(draw);
-        finger.go(&Place { centre_mm: [4.5, -2.0], tilt_deg: [1.0, 1.0] });
-        finger.tare();
-        vec![finger.press(&plan(), 8.0)]
-    });
+    let edge = Place { centre_mm: [4.5, -2.0], tilt_deg: [1.0, 1.0] };
+    let [_, worst, ..] = errors("over the edge", 400..403, 3.0, |draw| vec![Finger::new(draw).press(&edge, 0.0)]);
     assert!(worst < 4.0, "{worst}");
 }
 
@@ -100,7 +101,7 @@ fn an_edge_does_not_refuse_a_press() {
 fn a_wrong_radius_hardly_matters() {
     for share in [0.98, 1.02] {
         let [_, worst, .., within] = errors("radius", 500..502, 3.0, |draw| {
-            let mut presses = presses(draw, 1, &plan());
+            let mut presses = presses(draw, 1);
             presses[0].radius_mm *= share;
             presses
         });
@@ -113,12 +114,8 @@ fn drawn(seed: u64, yields_mm_per_n: f64) -> Draw {
     Draw { extra, ..Draw::any(seed, [0.0, 5.0], [0, 2]) }
 }
 
-fn press(draw: &Draw, moves_mm_per_s: f64, plan: &[Part]) -> Press {
-    let mut finger = Finger::new(draw);
-    finger.go(&any_place(&mut fastrand::Rng::with_seed(draw.seed), 1.5, 2.0));
-    finger.tare();
-    finger.carry(moves_mm_per_s);
-    finger.press(plan, 8.0)
+fn press(draw: &Draw, mm_per_s: f64) -> Press {
+    Finger::new(draw).press(&any_place(&mut fastrand::Rng::with_seed(draw.seed), 1.5, 2.0), mm_per_s)
 }
 
 sim::sizes!(a_soft_plate_is_measured, soft_plates(0..1), soft_plates(1..2));
@@ -127,7 +124,7 @@ fn soft_plates(seeds: Range<u64>) {
     for seed in seeds {
         for yields_mm_per_n in [0.0, 0.03, 0.06] {
             let draw = drawn(seed, yields_mm_per_n);
-            let (found, [error, _]) = solved(&draw, &[press(&draw, 0.0, &plan())]);
+            let (found, [error, _]) = solved(&draw, &[press(&draw, 0.0)]);
             let solve::gains::Posed { yields_mm_per_n: [yields, _], verdict, .. } = found.gains.presses[0];
             assert!((yields - yields_mm_per_n).abs() < 0.003 + 0.1 * yields_mm_per_n, "{yields} {draw:?}");
             assert_eq!(matches!(verdict, Verdict::Soft(_)), yields_mm_per_n > 0.0, "{verdict:?}");
@@ -140,7 +137,7 @@ fn soft_plates(seeds: Range<u64>) {
 fn a_moving_plate_is_refused_with_its_speed() {
     for seed in 0..2 {
         for mm_per_s in [0.02, -0.05, 0.07] {
-            let refused = gains(&[press(&drawn(seed, 0.0), mm_per_s, &plan())]);
+            let refused = gains(&[press(&drawn(seed, 0.0), mm_per_s)]);
             let Err(NoGains::Judged(Verdict::Moving(speed))) = refused else { panic!("{mm_per_s}: {refused:?}") };
             assert!((speed / mm_per_s - 1.0).abs() < 0.5, "{mm_per_s} {speed}");
         }
@@ -150,30 +147,31 @@ fn a_moving_plate_is_refused_with_its_speed() {
 #[test]
 fn a_press_that_counts_is_kept_beside_one_that_does_not() {
     let draw = drawn(5, 0.0);
-    let found = gains(&[press(&draw, 0.05, &plan()), press(&draw, 0.0, &plan())]).expect("one counts");
+    let found = gains(&[press(&draw, 0.05), press(&draw, 0.0)]).expect("one counts");
     assert!(matches!(found.left_out.as_slice(), [(0, NoGains::Judged(Verdict::Moving(_)))]), "{:?}", found.left_out);
     assert_eq!(found.presses.len(), 1);
 }
 
 #[test]
 fn lost_and_shallow_presses_are_refused() {
-    let draw = drawn(1, 0.0);
-    let mut lost = press(&draw, 0.0, &plan());
+    let whole = press(&drawn(1, 0.0), 0.0);
+    let mut lost = whole.clone();
     let deepest_mm = lost.deepest_mm();
     let away = lost.steps.iter_mut().filter(|step| step.middle_mm() > deepest_mm - 0.3);
     away.flat_map(|step| &mut step.taxels).for_each(|taxel| taxel.mean *= 0.01);
     let refused = modulus(&[lost]);
     let Err(NoGains::Judged(Verdict::Lost(share))) = refused else { panic!("{refused:?}") };
     assert!(share < 0.1, "{share}");
-    let shallow = [
-        Part::Ramp { to_mm: 0.2, mm_per_s: 2.0, step_mm: 0.02 },
-        Part::Ramp { to_mm: -0.3, mm_per_s: 2.0, step_mm: 0.02 },
-    ];
-    let refused = modulus(&[press(&draw, 0.0, &shallow)]);
+    let shallow = |most_mm: f64| {
+        let mut press = whole.clone();
+        press.steps.retain(|step| step.branch == Branch::Loading && step.middle_mm() < DISTANCE_MM + most_mm);
+        modulus(&[press])
+    };
+    let refused = shallow(0.25);
     let Err(NoGains::Judged(Verdict::TooLittle(_)) | NoGains::Steps(_) | NoGains::Taxels(_)) = refused else {
         panic!("{refused:?}")
     };
-    let air = modulus(&[press(&draw, 0.0, &[Part::Ramp { to_mm: -0.1, mm_per_s: 2.0, step_mm: 0.1 }])]);
+    let air = shallow(-0.1);
     assert!(air.is_err_and(|why| !matches!(why, NoGains::Fit(_))));
     assert_eq!(modulus(&[]), Err(NoGains::NoPress));
 }

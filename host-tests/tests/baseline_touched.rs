@@ -111,35 +111,6 @@ fn a_tare_forgets_what_was_held() {
     assert!(largest[1] < largest[0] + 0.02, "goal 1 N has {largest:?} N without and with a history");
 }
 
-// A contact is not judged by the one before.
-
-/// Touched at 4 mm; then it is at 13 mm, and over the array's edge. A finger without that history holds the goal.
-#[test]
-fn another_object_at_the_edge_is_taken_hold_of() {
-    for x_mm in [7.0, 7.25, 7.5] {
-        for goal_mn in [200, 1_000] {
-            for history in ["none", "let go", "slipped away"] {
-                let mut setup = Setup::default();
-                setup.wall.centre_x_mm = x_mm;
-                let mut board: Bench = Bench::of(&setup, &config());
-                board.place_object(4.0);
-                board.tare();
-                if history != "none" {
-                    board.hold(goal_mn, 0.7);
-                }
-                if history == "let go" {
-                    board.hold(0, 0.7);
-                }
-                board.place_object(13.0);
-                board.hold(goal_mn, 2.0);
-                let off = (board.truth().force_n - 1e-3 * f64::from(goal_mn)).abs();
-                let held = off <= 0.02 && board.status().mode == Mode::Force;
-                assert!(held, "{history}, {x_mm} mm, goal {goal_mn} mN: {}", told(&mut board));
-            }
-        }
-    }
-}
-
 /// A contact at the edge was fitted before a press: its ratio must not be in the force at the end of the press.
 #[test]
 fn a_press_that_measures_loses_the_fit() {

@@ -3,23 +3,6 @@
 
 use crate::common::*;
 
-/// Steps until a fault; the number of frames that took.
-fn frames_to_fault(board: &mut Bench, at_most: u32) -> (u32, Status) {
-    for frames in 1..=at_most {
-        let status = board.step();
-        if status.mode == Mode::Fault {
-            assert_eq!(status.duty.0, 0);
-            return (frames, status);
-        }
-    }
-    panic!("no fault in {at_most} frames");
-}
-
-fn expect(board: &mut Bench, fault: Fault, at_most: u32) {
-    let (frames, status) = frames_to_fault(board, at_most);
-    assert_eq!(status.fault, Some(fault), "after {frames} frames");
-}
-
 /// Interference in a single frame is no fault: the motor is shorted during that frame, and the contact keeps its
 /// values. The same taxels bad twice are a fault, and so is half of the array at once.
 #[test]
@@ -69,19 +52,6 @@ fn noise_at_no_force_is_not_a_frozen_encoder() {
         let status = board.step_with(|record| recode(&mut record.frame, |_, _, code| code + more));
         assert_eq!(status.fault, None, "frame {number}");
     }
-}
-
-#[test]
-fn an_end_stop_on_either_side_stops_the_motor() {
-    let mut board = ready();
-    board.harm(|faults| faults.end_stops_mm = Some([-1.0, 3.0]));
-    board.command().goal = newtons(1_000);
-    expect(&mut board, Fault::EncoderFrozen, 2_000);
-
-    let mut board = holding(1_000);
-    board.harm(|faults| faults.end_stops_mm = Some([4.6, 50.0]));
-    board.command().goal = newtons(0);
-    expect(&mut board, Fault::EncoderFrozen, 3_000);
 }
 
 /// A host that is back within the release finds its fault: at once with torque off or a new configuration, else once the

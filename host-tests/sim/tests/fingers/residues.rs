@@ -32,18 +32,6 @@ fn a_released_finger_yields_to_a_slow_push() {
     judge("a slow push against a released finger", "N", &cases.into_iter().flatten().collect::<Vec<_>>());
 }
 
-#[test]
-fn a_finger_with_little_clearance_yields_to_a_push() {
-    let cases = each(&[500, 600, 800], &[1.0, 5.0, 20.0], |clearance_um, mm_per_s| {
-        let controller = format!("[controller]\nclearance_um = {clearance_um}\n");
-        let mut finger = released(&(noise(0.5) + &controller), 2.0);
-        finger.carry_object(3.0, 1.0, mm_per_s, |_| {});
-        finger.run(0.6);
-        Case::new(format!("{clearance_um} um, {mm_per_s} mm/s"), finger.truth().force_n, 0.1)
-    });
-    judge("a push against a finger with little clearance", "N", &cases);
-}
-
 /// Goal 0 without a contact: the tip rests where the goal found it.
 #[test]
 fn noise_moves_no_finger_that_touched_nothing() {

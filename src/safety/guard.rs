@@ -6,7 +6,7 @@
 //! 1. Beyond an end of the travel no duty drives the tip farther out; 1 mm beyond, the motor stops.
 //! 2. Behind a touch by more than the indentation, the clearance and 1 mm, no duty drives the tip farther back; 1 mm
 //!    on, the motor stops. An object that pushes a tip which does not move forward moves this limit, and the rear end,
-//!    back.
+//!    back. So does whoever moves the tip back while torque is off.
 //! 3. While nothing is surely pressed for 20 ms, no duty speeds up a tip that is faster than 1.5 times the approach; a
 //!    tip that stays so fast for 20 ms stops.
 //! 4. A motor or an encoder that runs in the wrong direction, or does not move though driven, stops within 5 ms and
@@ -120,12 +120,13 @@ struct May {
 
 impl Guard {
     /// Starts with torque enabled at this count of the encoder; travel counts from `zero`. A touch that was seen
-    /// since the last tare is kept.
+    /// since the last tare is kept, and moves back with a tip that was moved back without torque.
     pub fn start(&mut self, encoder: i32, zero: i32, config: &Config) {
         let shift = config.travel(zero.wrapping_sub(self.origin)).to_bits();
         let travel = config.travel(encoder.wrapping_sub(zero)).to_bits();
-        let rear = config.bounds.back.to_bits().saturating_neg();
-        let surface = self.surface.filter(|_| self.touching).map(|surface| surface.saturating_sub(shift));
+        let rear = config.bounds.back.to_bits().saturating_neg().min(travel);
+        let here = travel.saturating_sub(self.depth.to_bits());
+        let surface = self.surface.filter(|_| self.touching).map(|surface| surface.saturating_sub(shift).min(here));
         let rear = surface.map_or(rear, |surface| behind(surface, config).min(rear));
         *self = Self {
             origin: zero,

@@ -325,7 +325,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     fn rest(&mut self, tare_goes_on: bool) {
         let Self { activity, motion, config, array, status, .. } = self;
         status.braking = match activity {
-            Activity::Off(halt) | Activity::Tare { halt, .. } => halt.brakes(motion, config),
+            Activity::Off(halt) | Activity::Tare { halt } => halt.brakes(motion, config),
             _ => true,
         };
         if status.braking {
@@ -333,10 +333,10 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         } else {
             motion.coast()
         }
-        let Activity::Tare { halt, free } = activity else { return };
+        let Activity::Tare { halt } = activity else { return };
         // Not in the frame with the request, which was read with the tare before.
         if tare_goes_on && array.continue_tare() {
-            array.judge_tare(*free, config);
+            array.judge_tare(config);
             (self.tared, status.tare) = (true, Taring::Done);
             *activity = Activity::Off(*halt);
         }
@@ -411,7 +411,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         self.fit.lose();
         self.touch = Touch::default();
         match self.activity {
-            Activity::Tare { .. } => self.array.start_tare(),
+            Activity::Tare { .. } => self.array.start_tare(false),
             Activity::Off(_) => {}
             Activity::LastRelease { .. } => self.stop(Fault::BusSilent),
             _ => {

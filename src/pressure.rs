@@ -343,7 +343,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         (self.picture.bad, self.picture.bad_count, self.picture.bad_again) = (*mask, 0, 0);
         self.begin_again();
         self.touched = Touched::NONE;
-        self.start_tare();
+        self.start_tare(false);
     }
 }
 

@@ -207,7 +207,7 @@ fn arrays(runs: &mut Vec<Run>) {
             array.follow_drift(64);
         };
         let tare = |array: &mut Array, frame: &Frame, config: &Config| {
-            array.start_tare();
+            array.start_tare(false);
             for _ in 0..TARE_FRAMES {
                 array.read(frame, config);
                 array.continue_tare();

@@ -45,13 +45,10 @@ const REST_NS: u32 = 20_000_000;
 pub enum Activity {
     /// The motor is not driven: shorted until the tip is at rest, then open.
     Off(Halt),
-    /// The zero of every taxel is measured; the motor is not driven. After a release the tip is known to be free: what
-    /// the array reads is a residue.
+    /// The zero of every taxel is measured; the motor is not driven.
     Tare {
         /// Braking of the motor.
         halt: Halt,
-        /// True if the tip was released before.
-        free: bool,
     },
     /// Approach, hold and release.
     Grip(Grip),
@@ -214,19 +211,20 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             return;
         }
         let halt = match self.activity {
-            Activity::Off(halt) | Activity::Tare { halt, .. } => halt,
+            Activity::Off(halt) | Activity::Tare { halt } => halt,
             _ => Halt::BRAKES,
         };
+        // After a release the tip is known to be free.
         let free = self.touch.stage() == Stage::Clear;
         // A finger that is tared outside its travel was moved there: a millimetre outside, where the guard stops it.
         let (travel, one) = (self.motion.observer.travel.0, I8F24::ONE);
         let [end, back] = [self.config.travel_max, self.config.bounds.back].map(|length| length.0.saturating_add(one));
         self.zeroed &= travel <= end && travel.saturating_neg() <= back;
         self.leave(halt);
-        self.array.start_tare();
+        self.array.start_tare(free);
         (self.touch, self.guard) = (Touch::default(), Guard::default());
         (self.tared, self.status.tare) = (false, Taring::Running);
-        self.activity = Activity::Tare { halt, free };
+        self.activity = Activity::Tare { halt };
     }
 
     /// Returns true if a tare that is requested now is measured.

@@ -22,8 +22,12 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
     /// Frames between two visits of the same row during a tare. A frame reads two rows, this far apart.
     const TARE_STRIDE: u32 = ROWS.div_ceil(2) as u32;
 
-    /// Drops the tare and starts to measure it again.
-    pub fn start_tare(&mut self) {
+    /// Drops the tare and starts to measure it again. What a released (`free`) tip reads now is a residue of its contact.
+    pub fn start_tare(&mut self, free: bool) {
+        self.touched.residue = free.then(|| {
+            (0..ROWS).for_each(|row| self.learn(row, 1 << 16));
+            self.lines()
+        });
         self.rows.iter_mut().for_each(|row| row.tare = [0; COLUMNS]);
         self.tare_lines = [[0; 2]; ROWS];
         self.tare_sums = [0; 3];
@@ -103,11 +107,13 @@ pub(super) struct Touched<const ROWS: usize> {
     pub flag: bool,
     /// Rows of the last tare without a contact.
     clean: Option<Lines<ROWS>>,
+    /// Rows when the tare of a released tip began.
+    residue: Option<Lines<ROWS>>,
 }
 
 impl<const ROWS: usize> Touched<ROWS> {
     /// State before the first tare.
-    pub const NONE: Self = Self { flag: false, clean: None };
+    pub const NONE: Self = Self { flag: false, clean: None, residue: None };
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
@@ -119,29 +125,35 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         self.touched.flag
     }
 
-    /// Judges the tare that was just completed. What a released (`free`) tip reads is residue: no touch, no reference.
-    #[inline(never)]
-    pub fn judge_tare(&mut self, free: bool, config: &Config) {
-        if free {
-            self.touched.flag = false;
-            return;
-        }
-        let mut now: Lines<ROWS> = [None; ROWS];
-        for ((now, [line, _]), bad) in now.iter_mut().zip(self.tare_lines).zip(self.picture.bad) {
+    /// Returns the load of each row by the tare.
+    fn lines(&self) -> Lines<ROWS> {
+        let mut lines = [None; ROWS];
+        for ((loaded, [line, _]), bad) in lines.iter_mut().zip(self.tare_lines).zip(self.picture.bad) {
             let good = (COLUMNS as u32).saturating_sub(bad.count_ones());
-            *now = (good >= Self::ROW_LEAST).then(|| line.wrapping_mul(COLUMNS as i32) / good.max(1).cast_signed());
+            *loaded = (good >= Self::ROW_LEAST).then(|| line.wrapping_mul(COLUMNS as i32) / good.max(1).cast_signed());
         }
-        let clean = self.touched.clean.unwrap_or([Some(0); ROWS]);
+        lines
+    }
+
+    /// Judges the tare that was just completed. A residue can only fade meanwhile, and is no reference for later tares.
+    #[inline(never)]
+    pub fn judge_tare(&mut self, config: &Config) {
+        let Touched { clean, residue, .. } = self.touched;
+        let now = self.lines();
+        let before = residue.or(clean).unwrap_or([Some(0); ROWS]);
         let (mut most, mut least) = (i32::MIN, i32::MAX);
-        for (now, clean) in now.into_iter().zip(clean) {
-            if let (Some(now), Some(clean)) = (now, clean) {
-                let more = now.saturating_sub(clean);
+        for (now, before) in now.into_iter().zip(before) {
+            if let (Some(now), Some(before)) = (now, before) {
+                let more = now.saturating_sub(before);
                 (most, least) = (most.max(more), least.min(more));
             }
         }
-        let uneven = if self.touched.clean.is_some() { 0 } else { least / 2 };
+        if residue.is_some() {
+            least = 0;
+        }
+        let uneven = if clean.is_some() { 0 } else { least / 2 };
         self.touched.flag = most > least && most.saturating_sub(least) > config.touch_line.max(uneven);
-        if !self.touched.flag {
+        if !self.touched.flag && residue.is_none() {
             self.touched.clean = Some(now);
         }
     }

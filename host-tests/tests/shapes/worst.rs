@@ -127,12 +127,12 @@ fn survives<const ROWS: usize, const COLUMNS: usize>() {
             }
             // And tared by every frame, which the next is then read above.
             for frame in &frames {
-                array.start_tare();
+                array.start_tare(false);
                 for _ in 0..Array::<ROWS, COLUMNS>::TARE_FRAMES {
                     array.read(frame, &config);
                     array.continue_tare();
                 }
-                array.judge_tare(false, &config);
+                array.judge_tare(&config);
                 let picture = *array.read(&frames[0], &config);
                 fits.iter_mut().for_each(|fit| _ = fit.read(&picture, &config));
                 array.follow_drift(1 << 16);

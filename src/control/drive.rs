@@ -85,8 +85,12 @@ impl Drive {
     pub fn apply(&mut self, requested: i32, back_emf: i32, supply_mv: u16, config: &Config, limits: &mut Limits) {
         let slewed = clamp_around(requested, self.given, config.slew_max_q8_mm_per_s2);
         self.spare(supply_mv, config);
-        let within_current =
-            clamp_around(slewed, back_emf, (config.current_max_q8_mm_per_s2 >> 8) * self.share.min(self.allowed));
+        let [drawn, allowed] =
+            [self.share.min(self.allowed), self.allowed].map(|share| (config.current_max_q8_mm_per_s2 >> 8) * share);
+        // A motor that brakes itself draws nothing from a weak supply: that does not limit it, down to the short.
+        let least = back_emf.saturating_sub(drawn).min(back_emf.saturating_sub(allowed).max(0));
+        let most = back_emf.saturating_add(drawn).max(back_emf.saturating_add(allowed).min(0));
+        let within_current = slewed.max(least).min(most);
         let most = voltage_limit(supply_mv, config);
         let applied = within_current.max(-most).min(most);
         if applied != requested {

@@ -211,7 +211,7 @@ impl Release {
     }
 }
 
-/// Returns the indentation to control, extrapolated from the middle of the scan to now.
+/// Returns the indentation to control, extrapolated from the middle of the last scan that showed anything new to now.
 ///
 /// A force that is known only from below must not make the finger press harder: the tip is then at most as deep as it
 /// moved since the touch, and the more of the contact may be hidden, the nearer to that it is taken to be.
@@ -225,7 +225,8 @@ fn sensed(contact: &Contact, touch: &Touch, motion: &SpeedLoop, config: &Config,
     } else {
         contact.indentation
     };
-    let mut sensed = indentation.0.saturating_add(since_scan(motion.observer.speed, config));
+    let since = since_scan(motion.observer.speed, config).saturating_add(touch.unseen(motion.observer.travel).0);
+    let mut sensed = indentation.0.saturating_add(since);
     if contact.doubt > 0 && matches!(touch.stage(), Stage::Held | Stage::Lost) {
         let deeper = touch.deep(motion.observer.travel).0.saturating_sub(sensed).max(I8F24::ZERO);
         if contact.doubt > u8::MAX / 2 {

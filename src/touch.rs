@@ -17,7 +17,7 @@
 use crate::config::Config;
 use crate::contact::Contact;
 use crate::units::{Millimetres, Newtons};
-use fixed::types::I16F16;
+use fixed::types::{I8F24, I16F16};
 
 /// A force that falls by more than this part of itself, and `contact_on_mn`, in one frame did not fall at the tip: 1/4.
 const STEP_BITS: u32 = 2;
@@ -107,6 +107,8 @@ pub struct Touch {
     away_ns: u32,
     /// Frame of the last step up, and the force before it.
     rise: (u32, Newtons),
+    /// Travel at the last frame whose sum differs from the one before.
+    seen_at: Millimetres,
 }
 
 /// Inputs of the record in a frame.
@@ -151,6 +153,9 @@ impl Touch {
                     self.begin(inputs, by_motor());
                 }
             }
+        }
+        if inputs.summed != self.before.1 {
+            self.seen_at = inputs.travel;
         }
         self.lesser = (force.min(self.before.0), inputs.summed.min(self.before.1));
         self.before = (force, inputs.summed, inputs.contact.bad_taxels);
@@ -302,6 +307,12 @@ impl Touch {
         Millimetres(travel.0.saturating_sub(self.surface.0))
     }
 
+    /// Distance that the tip moved into a known object since the array last showed anything new.
+    pub fn unseen(&self, travel: Millimetres) -> Millimetres {
+        let moved = travel.0.saturating_sub(self.seen_at.0).max(I8F24::ZERO);
+        if self.placed() { Millimetres(moved) } else { Millimetres::ZERO }
+    }
+
     /// Indentation by the motor when the touch began.
     pub fn by_motor(&self) -> Millimetres {
         self.by_motor
@@ -361,6 +372,7 @@ impl Touch {
     /// Moves the surface when the zero of the travel moves by `zero`.
     pub fn shift(&mut self, zero: Millimetres) {
         self.surface = Millimetres(self.surface.0.saturating_sub(zero.0));
+        self.seen_at = Millimetres(self.seen_at.0.saturating_sub(zero.0));
     }
 
     /// Weight with which the baseline learns this frame's reading, Q16; none while something may be pressed.

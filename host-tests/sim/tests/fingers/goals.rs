@@ -179,6 +179,37 @@ fn goal_zero_releases_at_the_slowest_approach() {
     judge("released at the slowest approach", "N", &cases);
 }
 
+/// The hand that moved the tip, and may still hold it there, is no fault of the finger.
+#[test]
+fn a_tip_that_is_pushed_back_without_torque_goes_on() {
+    let cases = each(&[1.0, 5.0, 9.0, 20.0], &[20.0, 200.0], |back_mm, mm_per_s| {
+        [false, true].map(|stays| {
+            let mut finger = finger(&(object(3.0, 0.0) + LOSSES));
+            finger.run(0.1);
+            finger.command().torque = false;
+            finger.carry_object(3.0, -back_mm, mm_per_s, |_| {});
+            if !stays {
+                finger.carry_object(-back_mm, 3.0, mm_per_s, |_| {});
+            }
+            finger.run(0.1);
+            finger.command().torque = true;
+            let held_n = finger.truth().force_n;
+            let peak_n = press(&mut finger, 0.0, 1.0);
+            let what = format!("{back_mm} mm at {mm_per_s} mm/s, stays {stays}, {:?}", finger.status().fault);
+            let left_n = finger.truth().force_n;
+            // A tip that was thrown back coasts a long way, and the approach is slow.
+            press(&mut finger, 1.0, 6.0);
+            let off_n = (finger.truth().force_n - 1.0).abs();
+            [
+                Case::new(what.clone() + ": peak at goal 0", peak_n, held_n + 0.1),
+                Case::new(what.clone() + ": left at goal 0", left_n, 0.1),
+                Case::new(what + ": off 1 N", off_n, 0.15),
+            ]
+        })
+    });
+    judge("pushed back without torque", "N", &cases.into_iter().flatten().flatten().collect::<Vec<_>>());
+}
+
 /// The tare takes the force that presses as zero: with torque on, the tip would press harder by as much.
 // With `Command { tare_forced: true, .. }` the same tare allows torque.
 #[test]
@@ -217,6 +248,47 @@ fn a_tare_while_something_presses_does_not_change_the_force() {
     finger.run(0.1);
     cases.push(Case::never("not driven though forced".into(), finger.status().mode == Mode::Off));
     judge("torque after a tare while something presses: the largest force", "N", &cases);
+}
+
+/// What comes to a released tip during a tare is no residue: the tare shows it, or the next force is true.
+#[test]
+fn a_push_during_a_tare_after_a_release_does_not_change_the_next_goal() {
+    let cases = each(&[10.0, 30.0, 100.0, 300.0], &[0.0, 0.002, 0.005, 0.01, 0.014], |mm_per_s, after_s| {
+        let mut finger = finger(&(object(5.0, 0.0) + LOSSES));
+        press(&mut finger, 2.0, 0.7);
+        press(&mut finger, 0.0, 0.4);
+        finger.command().tare_request += 1;
+        finger.run(after_s);
+        let travel_mm = finger.truth().travel_mm;
+        finger.place_object(travel_mm + 0.05);
+        finger.carry_object(travel_mm + 0.05, travel_mm - 0.8, mm_per_s, |_| {});
+        press(&mut finger, 0.5, 0.6);
+        let (force_n, limits) = (finger.truth().force_n, finger.status().limits);
+        let shown = limits.has(Limits::TARED_TOUCHING);
+        let what = format!("{mm_per_s} mm/s, {after_s} s after the tare began, shown: {shown}");
+        Case::new(what, if shown { 0.0 } else { (force_n - 0.5).abs() }, 0.15)
+    });
+    judge("a push during a tare, then 0.5 N: off by", "N", &cases);
+}
+
+/// A supply that is weak, but not so weak that it is a fault, lets the motor brake all the same.
+#[test]
+fn a_supply_that_dips_after_a_larger_goal_does_not_let_the_force_rise() {
+    let dips = [0.85, 0.95].map(|dip_v| [0.002, 0.005, 0.008, 0.011].map(|after_s| (dip_v, after_s)));
+    let goals = [(0.2, 1.0), (0.2, 2.0), (0.2, 4.0), (0.5, 3.0), (1.0, 5.0)];
+    let cases = each(&goals, dips.as_flattened(), |(first_n, second_n), (dip_v, after_s)| {
+        let mut finger = finger(&(object(3.0, 0.0) + LOSSES));
+        press(&mut finger, first_n, 0.7);
+        let before_n = press(&mut finger, second_n, after_s);
+        finger.harm(|faults| faults.supply_drop_v = dip_v);
+        let during_n = finger.run(0.03);
+        finger.harm(|faults| faults.supply_drop_v = 0.0);
+        let peak_n = before_n.max(during_n).max(finger.run(0.2));
+        let what =
+            format!("{first_n} N to {second_n} N, {dip_v} V less {after_s} s later: {:?}", finger.status().fault);
+        Case::new(what, peak_n, most_n(second_n))
+    });
+    judge("a supply that dips after a larger goal", "N", &cases);
 }
 
 // Hysteresis makes the reading stay while the tip follows the object: the array is not frozen.

@@ -17,7 +17,7 @@ use fingertip::config::newtons;
 use fingertip::measure::Task;
 use fingertip::params::Params;
 use fingertip::shipped::{Config, Frame};
-use fingertip::state::{Fault, Mode};
+use fingertip::state::{Fault, Limits, Mode};
 use images::record::Record;
 use sim::native::{self, bench::Bench};
 use sim::run::{Outcome, run};

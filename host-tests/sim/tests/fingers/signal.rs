@@ -2,7 +2,7 @@
 //! Errors of worn sensors, of fingers far from their parameters, and in the heat.
 
 use crate::*;
-use fingertip::shipped::COLUMNS;
+use fingertip::shipped::{COLUMNS, ROWS};
 use sim::native::calibrated::{Calibrated, fingers, percentiles};
 use sim::native::simulate_calibrated;
 use sim::run::Run;
@@ -33,6 +33,54 @@ fn stops_in_time(moduli_kpa: &[f64]) {
         });
         judge("signal lost", "N", &cases);
     }
+}
+
+/// The array repeats a frame from just after a larger goal on, as when its scan hangs, and recovers.
+#[test]
+fn a_frame_that_is_repeated_after_a_larger_goal_does_not_let_the_force_rise() {
+    let goals = [(0.2, 0.5), (0.5, 0.8), (0.5, 2.0), (1.0, 1.3), (1.0, 3.0), (2.0, 5.0), (3.0, 7.0)];
+    let times = [0.0, 0.002, 0.005].map(|after_s| [0.01, 0.03, 0.1].map(|for_s| (after_s, for_s)));
+    let cases = each(&goals, times.as_flattened(), |(first_n, second_n), (after_s, for_s)| {
+        let mut finger = finger(&(object(3.0, 0.0) + LOSSES));
+        press(&mut finger, first_n, 0.7);
+        press(&mut finger, second_n, after_s);
+        let codes = *finger.frame();
+        let frozen_n = finger.run_with(for_s, |record| show(record, &codes));
+        let peak_n = frozen_n.max(finger.run(0.5));
+        let what = format!("{first_n} N to {second_n} N, {after_s} s later for {for_s} s: {:?}", finger.status().fault);
+        Case::new(what, peak_n, most_n(second_n))
+    });
+    judge("a repeated frame after a larger goal", "N", &cases);
+}
+
+/// Halves all codes relative to the level of an undriven column.
+fn halve(record: &mut Record) {
+    for column in 0..COLUMNS {
+        let undriven = record.frame.code(ROWS, column);
+        for row in 0..ROWS {
+            let above = record.frame.code(row, column).saturating_sub(undriven);
+            record.frame.set_code(row, column, undriven + above / 2);
+        }
+    }
+}
+
+#[test]
+fn gains_that_halve_during_a_press_do_not_double_the_force() {
+    let cases = each(&[0.5, 1.0, 2.2, 5.0], &[-0.03, 0.003, 0.01, 0.03, 0.5], |goal_n, after_s| {
+        let mut finger = finger(&(object(3.0, 0.0) + LOSSES));
+        set_goal(&mut finger, goal_n);
+        if after_s < 0.0 {
+            finger.run(0.03);
+        } else {
+            touch(&mut finger);
+            finger.run(after_s);
+        }
+        let peak_n = finger.run_with(1.5, halve);
+        let (force_n, fault) = (finger.truth().force_n, finger.status().fault);
+        let what = format!("goal {goal_n} N, {after_s} s after the touch, {force_n:.2} N at last: {fault:?}");
+        Case::new(what, peak_n, most_n(goal_n))
+    });
+    judge("gains halved", "N", &cases);
 }
 
 /// What is withheld after a step down ends with its reason: a step up before it, and torque that was off meanwhile.

@@ -297,7 +297,7 @@ fn tip(p: &Params) -> Result<Tip, ConfigError> {
 /// between a quarter and twice of it.
 fn brake(motor: i32) -> [i32; 3] {
     let share = i64::from(motor) * i64::from(BRAKE_SHARE_Q8);
-    [(share >> 10).min(BRAKE_MAX) as i32, (share >> 8) as i32, (share >> 7).min(BRAKE_MAX) as i32]
+    [(share >> 10).min(BRAKE_MAX) as i32, (share >> 8).min(BRAKE_MAX) as i32, (share >> 7).min(BRAKE_MAX) as i32]
 }
 
 /// 2^n, exactly.

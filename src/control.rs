@@ -89,7 +89,6 @@ use crate::arith::{clamp_bits, high, nearest_product, nearest_share, product};
 use crate::config::{BRAKE_SHARE_Q8, Config, GAIN_SETS, Gains};
 use crate::state::Limits;
 use crate::units::{Celsius, Duty, Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons};
-use drive::SHARE_BITS;
 use fixed::types::I16F16;
 
 /// The state of the speed loop.
@@ -171,7 +170,7 @@ impl SpeedLoop {
         let brake = self.brake(distance, config);
         let reference = Reference::towards(distance, self.observer.speed, brake, self.schedule.gains(config));
         // A motor with less current brakes less, so it moves more slowly: it may meet something.
-        let limit = MillimetresPerSecond::from_bits(product(limit.to_bits(), self.winding.share(), SHARE_BITS));
+        let limit = MillimetresPerSecond::from_bits(self.winding.allowed(limit.to_bits()));
         let limited = reference.limited(limit);
         (limited, limited != reference)
     }
@@ -210,10 +209,9 @@ impl SpeedLoop {
     #[inline(always)]
     pub fn brake(&self, distance: Millimetres, config: &Config) -> MillimetresPerSecond2 {
         let disturbance = product(self.observer.disturbance.to_bits(), BRAKE_SHARE_Q8, 8);
-        // At most all of it, so it fits. Without `map`, of which the compiler makes a function.
-        let share = i64::from(self.winding.share());
-        let allowed = |brake: i32| ((i64::from(brake) * share) >> SHARE_BITS) as i32;
+        // Without `map`, of which the compiler makes a function.
         let [least, usual, most] = config.brake;
+        let allowed = |brake| self.winding.allowed(brake);
         let [least, usual, most] = [allowed(least), allowed(usual), allowed(most)];
         let pressing = distance >= Millimetres::ZERO;
         let whole = if pressing { usual.saturating_sub(disturbance) } else { usual.saturating_add(disturbance) };

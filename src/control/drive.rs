@@ -17,7 +17,7 @@
 //! The squares of 256 frames, or of fewer slow ones, make one step of the lags. A step is at most half of the
 //! difference, so no lag leaves the range from 0 to its largest target.
 
-use crate::arith::nearest_share;
+use crate::arith::{high, nearest_share};
 use crate::config::{ALLOWANCE_BITS, Config, Heat};
 use crate::state::Limits;
 use crate::units::{Celsius, Duty};
@@ -85,12 +85,11 @@ impl Drive {
     pub fn apply(&mut self, requested: i32, back_emf: i32, supply_mv: u16, config: &Config, limits: &mut Limits) {
         let slewed = clamp_around(requested, self.given, config.slew_max_q8_mm_per_s2);
         self.spare(supply_mv, config);
-        let [drawn, allowed] =
-            [self.share.min(self.allowed), self.allowed].map(|share| (config.current_max_q8_mm_per_s2 >> 8) * share);
-        // A motor that brakes itself draws nothing from a weak supply: that does not limit it, down to the short.
-        let least = back_emf.saturating_sub(drawn).min(back_emf.saturating_sub(allowed).max(0));
-        let most = back_emf.saturating_add(drawn).max(back_emf.saturating_add(allowed).min(0));
-        let within_current = slewed.max(least).min(most);
+        let current_max = config.current_max_q8_mm_per_s2 >> 8;
+        // A motor that brakes itself, down to the short, draws nothing from a weak supply.
+        let drawn = current_max * self.share;
+        let [least, most] = [back_emf.saturating_sub(drawn).min(0), back_emf.saturating_add(drawn).max(0)];
+        let within_current = clamp_around(slewed.max(least).min(most), back_emf, current_max * self.allowed);
         let most = voltage_limit(supply_mv, config);
         let applied = within_current.max(-most).min(most);
         if applied != requested {
@@ -144,7 +143,7 @@ fn voltage_limit(supply_mv: u16, config: &Config) -> i32 {
 }
 
 /// Fractional bits of a share of the current.
-pub const SHARE_BITS: u32 = 8;
+const SHARE_BITS: u32 = 8;
 /// All of the current.
 pub const WHOLE: i32 = 1 << SHARE_BITS;
 /// Number of words of a winding's state.
@@ -192,6 +191,12 @@ impl Winding {
     #[inline(always)]
     pub fn share(&self) -> i32 {
         self.share
+    }
+
+    /// Returns the part of a value, of at most 30 bits with the sign, that the allowed current gives.
+    #[inline(always)]
+    pub fn allowed(&self, value: i32) -> i32 {
+        high(value << 2, self.share << (30 - SHARE_BITS))
     }
 
     /// Returns the whole state, for a pipeline that is made again.

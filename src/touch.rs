@@ -181,7 +181,7 @@ impl Touch {
         // Taxels that fail take their share of the sum with them; in a slow frame an object can leave.
         let comparable = || self.before.2 == inputs.contact.bad_taxels && config.timing.frame_ns <= FRAME_NS_MAX;
         if fell.to_bits().unsigned_abs() > least.to_bits().cast_unsigned() && comparable() {
-            self.note_step(step, fell > 0, least, force, config);
+            self.note_step(step, fell > 0, least, inputs, config);
         } else if self.withheld > Newtons::ZERO && step.saturating_neg() > self.withheld.0 >> 1 {
             // The signal is back.
             self.withheld = Newtons::ZERO;
@@ -212,7 +212,7 @@ impl Touch {
     /// half of the force before that.
     #[cold]
     #[inline(never)]
-    fn note_step(&mut self, step: I16F16, fell: bool, least: I16F16, force: Newtons, config: &Config) {
+    fn note_step(&mut self, step: I16F16, fell: bool, least: I16F16, inputs: &TouchInputs, config: &Config) {
         let (force_before, Newtons(sum_before)) = self.lesser;
         if !fell {
             if step.saturating_neg() > self.withheld.0 >> 1 {
@@ -227,9 +227,12 @@ impl Touch {
         }
         let (at, Newtons(before)) = core::mem::take(&mut self.rise);
         let soon = self.frames.saturating_sub(at).saturating_mul(config.timing.frame_ns) <= ROSE_NS;
-        let off = force.0.saturating_sub(before).saturating_abs();
+        let off = inputs.contact.force.0.saturating_sub(before).saturating_abs();
         if before == I16F16::ZERO || !soon || off > before >> 1 {
             self.withheld = Newtons(self.withheld.0.saturating_add(step)).max(Newtons::from_bits(1));
+            // The object may have moved towards the finger since it was touched, and is where it pressed until now.
+            let deep = config.tip.indentation(force_before);
+            self.surface = self.surface.min(Millimetres(inputs.travel.0.saturating_sub(deep.0)));
         }
     }
 

@@ -35,6 +35,23 @@ fn stops_in_time(moduli_kpa: &[f64]) {
     }
 }
 
+/// The tip that the object pushed back is still in it when the signal ends: it backs off from there, and does not press.
+#[test]
+fn a_signal_that_is_lost_after_the_object_moved_stops_the_motor_in_time() {
+    let cases =
+        each(&[0.5, 1.5, 3.0], &[(1.0, 5.0), (2.0, 20.0), (4.0, 20.0), (4.0, 80.0)], |goal_n, (by_mm, speed)| {
+            let mut finger = finger(&(object(5.0, 0.0) + LOSSES));
+            let blank = *finger.frame();
+            press(&mut finger, goal_n, 0.7);
+            finger.carry_object(5.0, 5.0 - by_mm, speed, |_| {});
+            let before_n = finger.run(0.3);
+            let peak_n = finger.run_with(1.0, |record| show(record, &blank));
+            let what = format!("{goal_n} N, {before_n:.2} N before, by {by_mm} mm at {speed} mm/s");
+            Case::new(format!("{what}: {:?}", finger.status().fault), peak_n, most_n(goal_n))
+        });
+    judge("signal lost after the object moved", "N", &cases);
+}
+
 /// The array repeats a frame from just after a larger goal on, as when its scan hangs, and recovers.
 #[test]
 fn a_frame_that_is_repeated_after_a_larger_goal_does_not_let_the_force_rise() {

@@ -23,6 +23,8 @@ use fixed::types::{I8F24, I16F16};
 const STEP_BITS: u32 = 2;
 /// Time after a step up within which a fall takes it back; one that stays for 8 ms is fault 2.
 const ROSE_NS: u32 = 10_000_000;
+/// Distance that a tip may move at rest while the array shows the same: 1/64 mm.
+const UNSEEN: I8F24 = I8F24::from_bits((1 << 24) / 64);
 /// Longest frame time in which no object moves that far, ns.
 pub const FRAME_NS_MAX: u32 = 500_000;
 /// Time for which a force stays away before the touch is doubtful, or stays before it is no peak of noise, ns.
@@ -310,9 +312,10 @@ impl Touch {
         Millimetres(travel.0.saturating_sub(self.surface.0))
     }
 
-    /// Distance that the tip moved into a known object since the array last showed anything new.
+    /// Distance that the tip moved into a known object since the array last showed anything new, beyond what a tip at rest
+    /// may move.
     pub fn unseen(&self, travel: Millimetres) -> Millimetres {
-        let moved = travel.0.saturating_sub(self.seen_at.0).max(I8F24::ZERO);
+        let moved = travel.0.saturating_sub(self.seen_at.0).saturating_sub(UNSEEN).max(I8F24::ZERO);
         if self.placed() { Millimetres(moved) } else { Millimetres::ZERO }
     }
 

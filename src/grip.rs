@@ -225,7 +225,8 @@ fn sensed(contact: &Contact, touch: &Touch, motion: &SpeedLoop, config: &Config,
     } else {
         contact.indentation
     };
-    let since = since_scan(motion.observer.speed, config).saturating_add(touch.unseen(motion.observer.travel).0);
+    let since =
+        since_scan(motion.observer.speed, config).saturating_add(touch.since_new_image(motion.observer.travel).0);
     let mut sensed = indentation.0.saturating_add(since);
     if contact.doubt > 0 && matches!(touch.stage(), Stage::Held | Stage::Lost) {
         let deeper = touch.deep(motion.observer.travel).0.saturating_sub(sensed).max(I8F24::ZERO);

@@ -24,7 +24,7 @@ const STEP_BITS: u32 = 2;
 /// Time after a step up within which a fall takes it back; one that stays for 8 ms is fault 2.
 const ROSE_NS: u32 = 10_000_000;
 /// Distance that a tip may move at rest while the array shows the same: 1/64 mm.
-const UNSEEN: I8F24 = I8F24::from_bits((1 << 24) / 64);
+const AT_REST: I8F24 = I8F24::from_bits((1 << 24) / 64);
 /// Longest frame time in which no object moves that far, ns.
 pub const FRAME_NS_MAX: u32 = 500_000;
 /// Time for which a force stays away before the touch is doubtful, or stays before it is no peak of noise, ns.
@@ -183,7 +183,7 @@ impl Touch {
         // Taxels that fail take their share of the sum with them; in a slow frame an object can leave.
         let comparable = || self.before.2 == inputs.contact.bad_taxels && config.timing.frame_ns <= FRAME_NS_MAX;
         if fell.to_bits().unsigned_abs() > least.to_bits().cast_unsigned() && comparable() {
-            self.note_step(step, fell > 0, least, inputs, config);
+            self.note_step(step, fell > 0, least, force, config);
         } else if self.withheld > Newtons::ZERO && step.saturating_neg() > self.withheld.0 >> 1 {
             // The signal is back.
             self.withheld = Newtons::ZERO;
@@ -214,7 +214,7 @@ impl Touch {
     /// half of the force before that.
     #[cold]
     #[inline(never)]
-    fn note_step(&mut self, step: I16F16, fell: bool, least: I16F16, inputs: &TouchInputs, config: &Config) {
+    fn note_step(&mut self, step: I16F16, fell: bool, least: I16F16, force: Newtons, config: &Config) {
         let (force_before, Newtons(sum_before)) = self.lesser;
         if !fell {
             if step.saturating_neg() > self.withheld.0 >> 1 {
@@ -229,12 +229,14 @@ impl Touch {
         }
         let (at, Newtons(before)) = core::mem::take(&mut self.rise);
         let soon = self.frames.saturating_sub(at).saturating_mul(config.timing.frame_ns) <= ROSE_NS;
-        let off = inputs.contact.force.0.saturating_sub(before).saturating_abs();
+        let off = force.0.saturating_sub(before).saturating_abs();
         if before == I16F16::ZERO || !soon || off > before >> 1 {
             self.withheld = Newtons(self.withheld.0.saturating_add(step)).max(Newtons::from_bits(1));
-            // The object may have moved towards the finger since it was touched, and is where it pressed until now.
-            let deep = config.tip.indentation(force_before);
-            self.surface = self.surface.min(Millimetres(inputs.travel.0.saturating_sub(deep.0)));
+            // The object may have moved towards the finger since it was touched, and is where the array last showed it. What
+            // a step up added is no force.
+            let pressed = if before == I16F16::ZERO { force_before } else { force_before.min(Newtons(before)) };
+            let deep = config.tip.indentation(pressed);
+            self.surface = self.surface.min(Millimetres(self.seen_at.0.saturating_sub(deep.0)));
         }
     }
 
@@ -314,8 +316,8 @@ impl Touch {
 
     /// Distance that the tip moved into a known object since the array last showed anything new, beyond what a tip at rest
     /// may move.
-    pub fn unseen(&self, travel: Millimetres) -> Millimetres {
-        let moved = travel.0.saturating_sub(self.seen_at.0).saturating_sub(UNSEEN).max(I8F24::ZERO);
+    pub fn since_new_image(&self, travel: Millimetres) -> Millimetres {
+        let moved = travel.0.saturating_sub(self.seen_at.0).saturating_sub(AT_REST).max(I8F24::ZERO);
         if self.placed() { Millimetres(moved) } else { Millimetres::ZERO }
     }
 

@@ -52,6 +52,25 @@ fn a_signal_that_is_lost_after_the_object_moved_stops_the_motor_in_time() {
     judge("signal lost after the object moved", "N", &cases);
 }
 
+/// The force of an old image shows no place of the object: the tip does not back off from it.
+#[test]
+fn a_frozen_image_that_ends_in_a_retreat_moves_no_place_of_rest() {
+    let cases = each(&[0.4, 0.8, 1.6], &[0.03, 0.06, 0.09], |goal_n, after_s| {
+        let mut finger = finger(&(object(6.0, 0.0) + LOSSES));
+        press(&mut finger, goal_n, 0.7);
+        let codes = *finger.frame();
+        set_goal(&mut finger, 0.4 * goal_n);
+        finger.run_with(after_s, |record| show(record, &codes));
+        // The tip rests at most a clearance behind that.
+        let at_mm = 6.0 - finger.truth().travel_mm;
+        press(&mut finger, 0.0, 1.0);
+        let behind_mm = 6.0 - finger.truth().travel_mm;
+        let what = format!("{goal_n} N, for {after_s} s: {:?}", finger.status().fault);
+        Case::new(what, behind_mm, f64::max(2.0, at_mm + 1.1))
+    });
+    judge("a frozen image ends: behind the surface", "mm", &cases);
+}
+
 /// The array repeats a frame from just after a larger goal on, as when its scan hangs, and recovers.
 #[test]
 fn a_frame_that_is_repeated_after_a_larger_goal_does_not_let_the_force_rise() {

@@ -192,7 +192,7 @@ const WIDE: &[Row] = &[
     ("1110 1100 0100 xxxx xxxx 1010 00s1 SSSS", of(Kind::Move(2))),
     ("1110 1100 0101 eeee gggg 1011 00q1 QQQQ", of(Kind::Move(2))),
     ("1110 1100 0100 xxxx xxxx 1011 00p1 PPPP", of(Kind::Move(2))),
-    // VLDR, VSTR; all that is left of this form is VLDM, VSTM, VPUSH, VPOP.
+    // VLDR and VSTR first; the other words of this form are VLDM, VSTM, VPUSH and VPOP.
     ("1110 1101 xs01 aaaa SSSS 1010 xxxx xxxx", of(Kind::FloatWord)),
     ("1110 1101 xp01 aaaa PPPP 1011 xxxx xxxx", of(Kind::Many(2))),
     ("1110 1101 xt00 aaaa TTTT 1010 xxxx xxxx", of(Kind::FloatWord)),

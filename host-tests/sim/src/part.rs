@@ -14,7 +14,7 @@ const CRC: crc::Crc<u64> = crc::Crc::<u64>::new(&crc::CRC_64_XZ);
 /// Lines of a future file NAME so far. They are in NAME.part, and only this process writes NAME.
 #[derive(Debug)]
 pub struct Part {
-    /// Lock under which everything made of the lines is written.
+    /// Lock on NAME and on the files that are made of the lines.
     pub lock: Lock,
     path: PathBuf,
     file: File,

@@ -131,7 +131,7 @@ pub fn replay(path: &Path) -> Result<Replay, RunError> {
 }
 
 fn replay_bytes(bytes: &[u8]) -> Result<Replay, RunError> {
-    file::check(bytes)?;
+    check(bytes)?;
     let setup = metadata(bytes, SETUP)?;
     if setup.metadata.get(WHOLE).is_some_and(|whole| whole == "false") {
         let message = "a recording of the emulated board: what its core was given is not all in it, so it cannot be fed \

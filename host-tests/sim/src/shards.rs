@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
 
-/// Share of the runs: each n-th one.
+/// Share of the runs for one of several machines: every n-th run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
     /// Number of the share, from 1.
@@ -22,8 +22,8 @@ impl Shard {
         self.of == 1
     }
 
-    /// Carries out the runs of the share that are not done yet. Runs count from 1. Passes each result to `keep`, and
-    /// returns all.
+    /// Carries out the runs of the share that are not done yet, numbered from 1. Passes each new result to `keep`, and
+    /// returns the results of all runs.
     pub(crate) fn go_on<T: Send>(
         self,
         all: usize,

@@ -66,7 +66,7 @@ fn two_presses_show_the_temperature() {
     let place = Place { centre_mm: [0.4, -0.3], tilt_deg: [1.0, 0.5] };
     let press = |draw: &Draw, chip_c| {
         let mut finger = Finger::new(draw);
-        // Until the array is as warm as it gets.
+        // The array reaches its final temperature.
         finger.bench.rest(30.0);
         let mut press = finger.press(&place, 0.0);
         press.steps.iter_mut().for_each(|step| step.chip_c = Some(chip_c));

@@ -266,7 +266,7 @@ struct Parts<'a> {
 }
 
 impl Parts<'_> {
-    /// Reads a draw; none if it is wrong.
+    /// Reads the description of a random value; none, with an error noted, if it is invalid.
     fn read(&mut self, value: &Value) -> Option<Draw> {
         self.draw(value).map_err(|(at, message, allowed)| self.reader.error(at, message, allowed)).ok()
     }

@@ -271,7 +271,7 @@ fn a_push_during_a_tare_after_a_release_does_not_change_the_next_goal() {
     judge("a push during a tare, then 0.5 N: off by", "N", &cases);
 }
 
-/// A supply that is weak, but not so weak that it is a fault, lets the motor brake all the same.
+/// A supply that dips without a fault does not limit the braking of the motor.
 #[test]
 fn a_supply_that_dips_after_a_larger_goal_does_not_let_the_force_rise() {
     let dips = [0.85, 0.95].map(|dip_v| [0.002, 0.005, 0.008, 0.011].map(|after_s| (dip_v, after_s)));

@@ -49,7 +49,7 @@ struct Sent {
     write: Write,
 }
 
-/// A frame to show, with the command that the board had and the status that it answered.
+/// A frame for the display, with the command that the board received and the status that it returned.
 pub type Shown = (Seen, Command, Status);
 
 /// The host of one finger during a run.
